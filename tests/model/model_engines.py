@@ -126,6 +126,16 @@ def mjcf(mechanism):
     )
 
 
+def mass_matrix(model, data):
+    """MuJoCo's mass matrix (nv, nv) of a state; `mj_fullM` takes other arguments in every major version."""
+    M = np.zeros((model.nv, model.nv))
+    for column, unit in zip(M.T, np.eye(model.nv), strict=True):
+        product = np.zeros(model.nv)
+        mujoco.mj_mulM(model, data, product, unit)
+        column[:] = product
+    return M
+
+
 def ask_mujoco(mechanism, angles):
     """M, J and the angular J in the independent coordinates, at joint coordinates (n,)."""
     model = mujoco.MjModel.from_xml_string(mjcf(mechanism))
@@ -140,8 +150,7 @@ def ask_mujoco(mechanism, angles):
             data.joint(str(i)).qpos[:] = angles[i]
             order.append(int(model.joint(str(i)).dofadr[0]))
     mujoco.mj_forward(model, data)
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
+    M = mass_matrix(model, data)
     A = data.efc_J.reshape(-1, model.nv)[: data.ne]
     J, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, J, angular, model.site("the handle").id)

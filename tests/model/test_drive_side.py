@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 from model_cases import random_five_bar, some_postures
-from model_engines import mjcf, moving_links
+from model_engines import mass_matrix, mjcf, moving_links
 from random_mechanisms import closure_values, derivative, place, random_mechanisms
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
@@ -73,9 +73,7 @@ def judge(mechanism, angles, u):
             data.joint(str(i)).qpos[:] = angles[i]
             order.append(int(model.joint(str(i)).dofadr[0]))
     mujoco.mj_forward(model, data)
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
-    M = M[np.ix_(order, order)]
+    M = mass_matrix(model, data)[np.ix_(order, order)]
     J = np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, J, None, model.site("the handle").id)
     rows, moving = derivative(lambda q: closure_values(links, mechanism.closures, q), links, angles)

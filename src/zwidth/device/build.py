@@ -30,7 +30,7 @@ from zwidth.device.schema.velocity import (
     KalmanSection,
     VelocitySection,
 )
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop.controller import NOT_KNOWN, Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, LinearMethod, VelocityMethod
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
 from zwidth.model.design_axes import stack_numbers
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 def controller(loop: LoopSection) -> Controller:
     """The sampled wall law; a delay in seconds becomes samples, a filter of no time constant none."""
-    period = math.nan if loop.sampling_period_s is None else loop.sampling_period_s
+    period = value_or(loop.sampling_period_s, NOT_KNOWN)
     delay = loop.delay_s / period if loop.delay_s is not None else value_or(loop.delay_samples, 0.0)
     return Controller(
         sampling_period=period,

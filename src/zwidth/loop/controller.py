@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import floor, inf, isnan
+from math import floor, inf, nan
 from typing import Final
 
 import numpy as np
@@ -39,11 +39,18 @@ def split_delay(delay: float) -> tuple[int, float]:
     return whole, max(delay - whole, 0.0)
 
 
+class NotKnown(float):
+    """nan for a sampling period that nobody has given; a plain nan is a mistake, and refused."""
+
+
+NOT_KNOWN: Final = NotKnown(nan)
+
+
 @dataclass(frozen=True)
 class Controller:
     """The sampled wall law: f = -F (K y + B v), v estimated from samples of y.
 
-    sampling_period         T [s]; nan: not known, of which no loop is made
+    sampling_period         T [s]; NOT_KNOWN where nobody has given it: no loop is made then
     delay                   from reading to force, in samples, any real >= 0
     velocity_filter         acts on the velocity only; None: none
     velocity                how the velocity is estimated
@@ -71,7 +78,7 @@ class Controller:
 
     def __post_init__(self) -> None:
         T = self.sampling_period
-        if not (isinstance(T, float) and isnan(T)):
+        if not isinstance(T, NotKnown):
             check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
         check_number("delay", self.delay, "samples", least=0.0)
         check_number("actuator_time_constant", self.actuator_time_constant, "s", least=0.0)
@@ -122,8 +129,8 @@ class Controller:
     @property
     def timing_text(self) -> str:
         """Sampling and delay in words: "sampled every 0.001 s, 0.5 samples of delay"."""
-        known = not np.isnan(self.sampling_period)
-        sampling = f"sampled every {self.sampling_period:g} s" if known else "sampling period not known"
+        T = self.sampling_period
+        sampling = "sampling period not known" if isinstance(T, NotKnown) else f"sampled every {T:g} s"
         return f"{sampling}, {self.delay:g} samples of delay"
 
     @property

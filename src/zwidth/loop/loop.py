@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth import _verbs
 from zwidth.loop.closed_sections import ClosedSections, closed_sections, closed_table
-from zwidth.loop.controller import Controller
+from zwidth.loop.controller import Controller, NotKnown
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.factor_response import factor_response, rows_response, window_response
 from zwidth.loop.filters import NO_FILTER, Filter, force_path, velocity_estimator
@@ -82,7 +82,7 @@ class Loop:
                 "device.at().loop, or give Feedforward(inertia=...)"
             )
         plant.check_numbers()
-        if np.any(np.isnan(controller.sampling_period)):
+        if isinstance(controller.sampling_period, NotKnown):
             raise ValueError("controller.sampling_period is not known; a loop needs it")
         object.__setattr__(self, "plant", plant)
         object.__setattr__(self, "controller", controller)
