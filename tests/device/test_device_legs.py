@@ -3,11 +3,13 @@ copies; joint limits, free joints, closings by axes and frames in files."""
 
 from __future__ import annotations
 
+import re
 import tomllib
 from copy import deepcopy
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import zwidth
 from tests.device.device_cases import faults
@@ -236,7 +238,25 @@ def test_an_orientation_that_cannot_be_reached_is_said_with_the_nearest():
     del wrist["mechanism"]["assemblies"]["upright"]["joints_rad"]["roll"]
     device = from_document(wrist)
     with pytest.raises(
-        OutOfReach, match=r"cannot reach the rotation .* the nearest orientation it reaches is .* degrees"
+        OutOfReach, match=r"cannot reach roll, pitch, yaw .* the nearest orientation it reaches is .* degrees"
     ):
         device.at(orientation=[0.8, 0.0, 0.0])
     assert device.at(orientation=[0.0, 0.3, 0.2]).posture.status == 0
+
+
+@pytest.mark.parametrize("turn", [[3.0, 0.0, 0.0], [0.0, 0.0, 2.5], [0.96, 1.3, -0.9]])
+def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straight_way(turn):
+    """A descent alone ended half a metre away, where a turn about the same axis by less is reached in place."""
+    device = from_document(tomllib.loads(new_device("Stage", "stewart")))
+    with pytest.raises(OutOfReach, match=r"the nearest pose it reaches is .* [0-9.]+ degrees away") as caught:
+        device.at(orientation=turn)
+    place, vector = re.findall(r"\((.*?)\)", str(caught.value).partition("nearest")[2])
+    position, turned = (np.array([float(x) for x in part.split(",")]) for part in (place, vector))
+    assert device.at(position, orientation=turned).posture.status == 0
+    assert position == pytest.approx([0.0, 0.0, 0.15], abs=1e-9)
+    missing = (Rotation.from_euler("xyz", turn) * Rotation.from_euler("xyz", turned).inv()).magnitude()
+    along = Rotation.from_euler("xyz", turn).as_rotvec()
+    for share in np.arange(0.3, 0.9, 0.05):
+        if missing > (1.0 - share) * np.linalg.norm(along) + 1e-5:
+            with pytest.raises(OutOfReach):
+                device.at(orientation=Rotation.from_rotvec(share * along).as_matrix())

@@ -39,7 +39,11 @@ DESCENTS: Final = 100
 LARGEST_TURN: Final = 0.2  # of a drive in one step [rad]
 SETTLED: Final = 1e-13  # turn of all drives, below which they have arrived [rad]
 # Shares of the way back from the nearest position to where the descent began: at the edge the drives lose control.
-RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.3, 1.0])
+RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.03, *np.linspace(0.1, 1.0, 19)])
+COARSELY: Final = 0.05  # above it shares are looked at again, more closely
+FINER: Final = np.linspace(0.0, 1.0, 21)[
+    1:
+]  # between the share that is reached and the one before it, which is not
 TURN: Final = 0.02  # of a drive in one step to a posture given by its joints [rad]
 
 
@@ -54,11 +58,32 @@ def nearest_goal(mech: MechanismArrays, design: int, references: Floats, goal: F
         starts = road.angles[road.nearest_nodes(goal[None], STARTS)[0]]
     descents = [_descend(mech, design, start, goal) for start in starts]
     begin, end, _ = min(descents, key=lambda way: way[2])
-    candidates = end + RETREAT[:, None] * (begin - end)
-    reachable = (
-        solve_batch(mech, np.full(len(candidates), design, dtype=np.int64), references, candidates).status == OK
-    )
-    return candidates[np.argmax(reachable)] if reachable.any() else None
+    # a descent weighs turns against shifts and may end far away: the straight way is looked at, too
+    ways = [(end, begin), (goal, handle_goal(mech, design, references[design]))]
+    found = [near for way in ways if (near := _first_reached(mech, design, references, *way)) is not None]
+    return min(found, key=lambda near: goal_distance(mech, design, near, goal), default=None)
+
+
+def _first_reached(
+    mech: MechanismArrays, design: int, references: Floats, begin: Floats, end: Floats
+) -> Floats | None:
+    """The first goal (g,) of a straight way that the assembly can have; None where it has none of those tried."""
+
+    def first(shares: Floats) -> int | None:
+        goals = begin + shares[:, None] * (end - begin)
+        status = solve_batch(mech, np.full(len(goals), design, dtype=np.int64), references, goals).status
+        return int(np.argmax(status == OK)) if np.any(status == OK) else None
+
+    reached = first(RETREAT)
+    if reached is None:
+        return None
+    share = float(RETREAT[reached])
+    if share > COARSELY:  # the shares that were tried are far apart
+        before = float(RETREAT[reached - 1])
+        shares = before + FINER * (share - before)
+        if (finer := first(shares)) is not None:
+            share = float(shares[finer])
+    return begin + share * (end - begin)
 
 
 def goal_distance(mech: MechanismArrays, design: int, a: Floats, b: Floats) -> float:

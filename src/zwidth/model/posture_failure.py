@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import degrees
+from typing import Final
 
 import numpy as np
 
@@ -14,10 +15,12 @@ from zwidth.model.continuation import (
     joint_beyond_limit,
 )
 from zwidth.model.forward_kinematics import working_memory
-from zwidth.model.handle_position import goal_distance
 from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Floats, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.ratio_table import RatioTable
+from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix, rotation_vector
+
+ALIKE: Final = 1e-9  # m and degrees that are not worth saying
 
 
 class PostureError(ValueError):
@@ -64,8 +67,9 @@ def posture_failure(
     what = {POSITION: "position", POSE: "pose", ORIENTATION: "orientation"}[mech.controls]
     where, instead = describe_goal(mech, goal), f"ask for a{'n' * (what[0] == 'o')} {what} nearer to the reference"
     if near is not None:
-        away = _distance(mech, near, goal)
-        instead = f"the nearest {what} it reaches is {describe_goal(mech, near)}, {away} away"
+        instead = (
+            f"the nearest {what} it reaches is {describe_goal(mech, near)}, {_distance(mech, near, goal)} away"
+        )
     if status == BEYOND_LIMIT:
         return BeyondLimit(
             f"with its handle at {where} in assembly {assembly!r} {_limit(mechanism, mech, reference, goal)}"
@@ -86,11 +90,12 @@ def posture_failure(
 
 
 def describe_goal(mech: MechanismArrays, goal: Floats) -> str:
-    """A goal (g,) in words: the position in metres, the orientation as its rotation vector in radians."""
-    position, vector = _numbers(goal[:3]) + " m", _numbers(goal[-3:]) + " rad"
+    """A goal (g,) in words: the position in metres, the orientation as roll, pitch and yaw in radians."""
+    position = _numbers(goal[:3]) + " m"
     if mech.controls == POSITION:
         return position
-    return f"the rotation {vector}" if mech.controls == ORIENTATION else f"{position}, turned by {vector},"
+    turned = f"roll, pitch, yaw {_numbers(roll_pitch_yaw_of(rotation_matrix(goal[-3:])))} rad"
+    return turned if mech.controls == ORIENTATION else f"{position} with {turned}"
 
 
 def _numbers(values: Floats) -> str:
@@ -98,10 +103,16 @@ def _numbers(values: Floats) -> str:
 
 
 def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:
-    away = goal_distance(mech, 0, near, goal)
-    if mech.controls == ORIENTATION:
-        return f"{degrees(away / float(mech.size[0])):.4g} degrees"
-    return f"{away:.4g} m" if away >= 1.0 else f"{1e3 * away:.4g} mm"
+    """How far apart two goals (g,) are, in words: in place, in orientation, as far as the drives control them."""
+    place = turn = 0.0
+    if mech.controls != ORIENTATION:
+        place = float(np.linalg.norm(near[:3] - goal[:3]))
+    if mech.controls != POSITION:
+        turned = rotation_matrix(near[-3:]) @ rotation_matrix(goal[-3:]).T
+        turn = degrees(float(np.linalg.norm(rotation_vector(turned))))
+    parts = [f"{place:.4g} m" if place >= 1.0 else f"{1e3 * place:.4g} mm"] if place > ALIKE else []
+    parts += [f"{turn:.4g} degrees"] if turn > ALIKE else []
+    return " and ".join(parts)
 
 
 def _limit(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal: Floats) -> str:

@@ -9,11 +9,14 @@ included; Exp's derivative there does not matter to Newton's method, whose step 
 from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
+from typing import Final
 
 import numpy as np
 
 from zwidth.compiled import compiled_lean
 from zwidth.model.mechanism import Floats
+
+ROUNDING: Final = 1e-15  # of angles that a conversion leaves
 
 
 def rotation_vector(rotation: Floats) -> Floats:
@@ -38,6 +41,23 @@ def rotation_matrix(vector: Floats) -> Floats:
     # sinc(x) is sin(pi x)/(pi x), 1 at 0
     A, B = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
     return np.asarray(np.eye(3) + A * cross + B * (cross @ cross))
+
+
+def roll_pitch_yaw_of(turn: Floats) -> Floats:
+    """Roll, pitch, yaw [rad] with Rz(yaw) Ry(pitch) Rx(roll) = turn.
+
+    Each angle is read off what the ones before it leave, so that nothing is lost where the pitch is a quarter turn
+    and the other two are about one axis.
+    """
+    across = float(np.hypot(turn[0, 0], turn[1, 0]))
+    yaw = float(np.arctan2(turn[1, 0], turn[0, 0])) if across > ROUNDING else 0.0
+    pitch = float(np.arctan2(-turn[2, 0], across))
+    c, s = np.cos(yaw), np.sin(yaw)
+    left = c * turn[1] - s * turn[0]
+    roll = float(np.arctan2(-left[2], left[1]))
+    angles = np.array([roll, pitch, yaw])
+    angles[np.abs(angles) < ROUNDING] = 0.0
+    return angles
 
 
 @compiled_lean

@@ -14,8 +14,9 @@ from zwidth.device.robot_files import freedom
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
 from zwidth.device.robot_files.freedom import Motions
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
-from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot, roll_pitch_yaw_of
+from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
 from zwidth.model.mechanism import Floats
+from zwidth.model.rotations import roll_pitch_yaw_of
 
 HANDLE_WORDS: Final = re.compile(
     r"handle|grip|tool|tcp|eef|end.?effector|attachment|stylus|pen|tip", re.IGNORECASE

@@ -9,8 +9,8 @@ import numpy as np
 from zwidth.device.faults import comma_list
 from zwidth.device.robot_files.decide import Decided, section_of
 from zwidth.device.robot_files.links import LinkTree, listed
-from zwidth.device.robot_files.robot import Motor, Robot, roll_pitch_yaw_of
-from zwidth.model.rotations import rotation_matrix
+from zwidth.device.robot_files.robot import Motor, Robot
+from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix
 
 SETTLED = 1e-9  # of joint coordinates that closing the loops does not change [rad], [m]
 

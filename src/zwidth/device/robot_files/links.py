@@ -17,9 +17,9 @@ from zwidth.device.robot_files.robot import (
     RobotBody,
     RobotJoint,
     joint_motion,
-    roll_pitch_yaw_of,
 )
 from zwidth.model.mechanism import Floats
+from zwidth.model.rotations import roll_pitch_yaw_of
 
 LONGEST_NAME: Final = 64
 X, Y, Z = np.eye(3)

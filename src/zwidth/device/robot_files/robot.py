@@ -17,8 +17,6 @@ BASE: Final = 0  # index of the world among the bodies
 NOTE: Final = "note"
 WARNING: Final = "warning"
 
-ROUNDING: Final = 1e-15  # of angles and directions that a conversion leaves
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -235,20 +233,3 @@ def rotation_of_quaternion(quaternion: Sequence[float] | Floats) -> Floats:
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
         ]
     )
-
-
-def roll_pitch_yaw_of(turn: Floats) -> Floats:
-    """Roll, pitch, yaw [rad] with Rz(yaw) Ry(pitch) Rx(roll) = turn.
-
-    Each angle is read off what the ones before it leave, so that nothing is lost where the pitch is a quarter turn
-    and the other two are about one axis.
-    """
-    across = float(np.hypot(turn[0, 0], turn[1, 0]))
-    yaw = float(np.arctan2(turn[1, 0], turn[0, 0])) if across > ROUNDING else 0.0
-    pitch = float(np.arctan2(-turn[2, 0], across))
-    c, s = np.cos(yaw), np.sin(yaw)
-    left = c * turn[1] - s * turn[0]
-    roll = float(np.arctan2(-left[2], left[1]))
-    angles = np.array([roll, pitch, yaw])
-    angles[np.abs(angles) < ROUNDING] = 0.0
-    return angles
