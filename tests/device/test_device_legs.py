@@ -17,6 +17,7 @@ from zwidth.device.load import from_document
 from zwidth.device.new_device import new_device
 from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH
 from zwidth.model.posture import BeyondLimit, OutOfReach, solve_posture
+from zwidth.study.plane_grid import plane_of
 
 DELTA = tomllib.loads(new_device("Delta", "delta"))
 PLACES = np.array([[0.0, 0.0, -0.12], [0.01, 0.02, -0.13], [-0.02, 0.01, -0.115]])
@@ -247,7 +248,10 @@ def test_an_orientation_that_cannot_be_reached_is_said_with_the_nearest():
 @pytest.mark.parametrize("turn", [[3.0, 0.0, 0.0], [0.0, 0.0, 2.5], [0.96, 1.3, -0.9]])
 def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straight_way(turn):
     """A descent alone ended half a metre away, where a turn about the same axis by less is reached in place."""
-    device = from_document(tomllib.loads(new_device("Stage", "stewart")))
+    stage = tomllib.loads(new_device("Stage", "stewart"))
+    for link in stage["mechanism"]["legs"][0]["links"]:
+        link.pop("limits_m", None)
+    device = from_document(stage)
     with pytest.raises(OutOfReach, match=r"the nearest pose it reaches is .* [0-9.]+ degrees away") as caught:
         device.at(orientation=turn)
     place, vector = re.findall(r"\((.*?)\)", str(caught.value).partition("nearest")[2])
@@ -260,3 +264,31 @@ def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straigh
         if missing > (1.0 - share) * np.linalg.norm(along) + 1e-5:
             with pytest.raises(OutOfReach):
                 device.at(orientation=Rotation.from_rotvec(share * along).as_matrix())
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_a_map_shows_where_a_posed_handle_goes_without_turning(limited):
+    """The map had a single point: six drives are too many for the flood that finds what others reach."""
+    stage = tomllib.loads(new_device("Stage", "stewart"))
+    if not limited:
+        for link in stage["mechanism"]["legs"][0]["links"]:
+            link.pop("limits_m", None)
+    device = from_document(stage)
+    plane = plane_of(device)
+    assert sum(_held(device, x, y) for x in plane.x[::16] for y in plane.y[::16]) > 8
+    assert plane.x[0] < 0.0 < plane.x[-1]
+    for end in (
+        (plane.x[0] - 0.01, 0.0),
+        (plane.x[-1] + 0.01, 0.0),
+        (0.0, plane.y[0] - 0.01),
+        (0.0, plane.y[-1] + 0.01),
+    ):
+        assert not limited or not _held(device, *end)
+
+
+def _held(device, x, y):
+    try:
+        device.at((x, y, 0.15))
+    except (OutOfReach, BeyondLimit):
+        return False
+    return True

@@ -10,7 +10,7 @@ import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm
 from zwidth.device.faults import DeviceError
-from zwidth.device.load import load
+from zwidth.device.load import from_document, load
 from zwidth.model.posture import Singular, reachable_positions, solve_posture
 from zwidth.study.plane_grid import PlaneError, plane_of, reachable_set, rounded_outwards
 
@@ -186,3 +186,45 @@ def test_devices_without_a_workspace(planar):
         plane_of(load("published-two-mass"))
     with pytest.raises(Singular, match="singular wherever"):
         plane_of(planar, assembly="elbows-right")
+
+
+def _slide(name, parent, axis, origin, travel):
+    link = {"name": name, "joint": "prismatic", "axis": axis, "origin_m": origin, "mass_kg": 0.2}
+    link |= {"inertia_kg_m2": [1e-4, 1e-4, 1e-4], "parent": parent} if parent else {"inertia_kg_m2": [1e-4] * 3}
+    return link | ({"limits_m": [-travel, travel]} if travel else {})
+
+
+@pytest.mark.parametrize("high", [0.02, 0.9])
+@pytest.mark.parametrize("travel", [0.1, None])
+def test_slides_reach_to_their_limits_however_large_their_frame(high, travel):
+    """Of a tall frame the map had a single point: steps of slides were a fifth of the mechanism's size."""
+    x, y, z = np.eye(3).tolist()
+    above = [0.0, 0.0, high]
+    links = [_slide("x", "", x, [0.0] * 3, travel), _slide("y", "x", y, above, travel)]
+    links.append(_slide("z", "y", z, above, travel))
+    device = from_document(
+        {
+            "name": "gantry",
+            "mechanism": {
+                "links": links,
+                "drives": [
+                    {
+                        "name": f"motor-{joint}",
+                        "joint": joint,
+                        "motor_inertia_kg_m2": 1e-6,
+                        "transmission_ratio": 100.0,
+                    }
+                    for joint in "xyz"
+                ],
+                "assemblies": {"only": {"joints_m": dict.fromkeys("xyz", 0.0)}},
+                "handle": {"link": "z", "point_m": [0.0, 0.0, 0.0]},
+                "reference": {"position_m": [0.0, 0.0, 2.0 * high], "direction": z, "assembly": "only"},
+            },
+            "loop": {"sampling_period_s": 0.001},
+        }
+    )
+    plane = plane_of(device)
+    ends = 0.1 if travel else high  # half of 2 high, the mechanism's size, where nothing stops it
+    for line in (plane.x, plane.y):
+        assert ends <= line[-1] <= 1.2 * ends
+        assert -1.2 * ends <= line[0] <= -ends

@@ -40,6 +40,7 @@ LARGEST_TURN: Final = 0.2  # of a drive in one step [rad]
 SETTLED: Final = 1e-13  # turn of all drives, below which they have arrived [rad]
 # Shares of the way back from the nearest position to where the descent began: at the edge the drives lose control.
 RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.03, *np.linspace(0.1, 1.0, 19)])
+HALVINGS: Final = 12  # of a ray, down to 1/2000 of the mechanism's size
 COARSELY: Final = 0.05  # above it shares are looked at again, more closely
 FINER: Final = np.linspace(0.0, 1.0, 21)[
     1:
@@ -84,6 +85,28 @@ def _first_reached(
         if (finer := first(shares)) is not None:
             share = float(shares[finer])
     return begin + share * (end - begin)
+
+
+def positions_about_reference(mech: MechanismArrays, reference: Floats) -> Floats:
+    """Positions (K, 3) that a handle of one design reaches without turning, from its reference posture (n,) [m].
+
+    Rays in 26 directions, each halved down to where the handle stops, and at most a size of the mechanism long. A
+    roadmap of so many drives is too coarse to tell this.
+    """
+    goal, references = handle_goal(mech, 0, reference), reference[None]
+    across = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
+    rays = across[np.any(across != 0.0, axis=1)]
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    reached, beyond = np.zeros(len(rays)), np.full(len(rays), float(mech.size[0]))
+    found = [goal[None, :3]]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (reached + beyond)
+        goals = np.tile(goal, (len(rays), 1))
+        goals[:, :3] += middle[:, None] * rays
+        there = solve_batch(mech, np.zeros(len(goals), dtype=np.int64), references, goals).status == OK
+        found.append(goals[there, :3])
+        reached, beyond = np.where(there, middle, reached), np.where(there, beyond, middle)
+    return np.concatenate(found)
 
 
 def goal_distance(mech: MechanismArrays, design: int, a: Floats, b: Floats) -> float:

@@ -21,9 +21,10 @@ from zwidth.model.continuation import (
     reference_batch,
 )
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.handle_position import goal_distance, goal_of_angles, nearest_goal
+from zwidth.model.handle_position import goal_distance, goal_of_angles, nearest_goal, positions_about_reference
 from zwidth.model.mechanism import (
     ORIENTATION,
+    POSE,
     POSITION,
     PRISMATIC,
     Floats,
@@ -256,14 +257,20 @@ def join_postures(postures: Sequence[Posture]) -> Posture:
 def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Floats:
     """Handle positions all over what an assembly reaches without passing a singularity, (K, 3) [m].
 
-    The nodes of its roadmap: a few degrees of a drive from one to the next, and as much away from the edge.
+    The nodes of its roadmap: a few degrees of a drive from one to the next, and as much away from the edge. Where
+    the drives control the handle's orientation, too: those reached without turning, and no farther from the
+    reference than the mechanism is large.
     Raises    LoopOpen    if the loops do not close near the assembly's angles
               Singular    where the assembly is singular throughout
               ValueError  for an unknown assembly, or a batch of designs
     """
     name = _assembly_name(mechanism, assembly)
     mech, reference = _single(mechanism, name, "reachable positions are computed for one design at a time")
-    return roadmap(mech, 0, reference).position
+    return (
+        positions_about_reference(mech, reference)
+        if mech.controls == POSE
+        else roadmap(mech, 0, reference).position
+    )
 
 
 def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismArrays, Floats]:

@@ -206,6 +206,20 @@ def copy_row(source: Floats, target: Floats) -> None:
         target[i] = source[i]
 
 
+@compiled_lean
+def _pitch(mech: MechanismArrays, reference: Floats, drive: int, turns: int) -> float:
+    """From node to node of a drive, in its unit: of one that slides so that half of the `turns` nodes reach its
+    farther limit."""
+    moved = mech.joint.size - mech.free
+    joint = mech.joint[moved - mech.driven + drive]
+    if mech.kind[joint] == REVOLUTE:
+        return 2.0 * np.pi / turns
+    span = max(reference[joint] - mech.lower[0, joint], mech.upper[0, joint] - reference[joint])
+    size = mech.unit[0, moved - mech.driven + drive]
+    # a little less than to the limit itself; no more than what a drive that turns moves a link of that size
+    return min(2.0 * np.pi, 2.0 * (1.0 - 1e-9) * span / size if span < np.inf else 1.0) / turns
+
+
 @compiled
 def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> tuple[Floats, Floats, Floats]:
     """Breadth first over a grid of `turns` per revolution on each of the first `turned` drives: joint coordinates
@@ -214,11 +228,14 @@ def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> 
     A cell of the grid keeps the first posture that reaches it, the one with the shortest way to the reference.
     Nodes keep away from singularities by more than one step may change: two singularities passed at once, where
     they meet, leave the orientation as it was. Where the reference itself is nearer, steps are made shorter.
-    A drive that slides goes half a revolution's worth of its unit either way, and does not come back.
+    A drive that slides goes as far as its limits, or half the mechanism's size, and does not come back.
     """
     d, n = turned, mech.parent.size
     work = working_memory(mech)
-    cells, pitch = turns**d, 2.0 * np.pi / turns
+    cells, pitches, pitch = turns**d, np.zeros(d), 0.0
+    for drive in range(d):
+        pitches[drive] = _pitch(mech, reference, drive, turns)
+        pitch = max(pitch, pitches[drive])
     place_links(mech, 0, reference, work)
     equations(mech, 0, work)
     margin = 0.3 * min(passive_rates(mech, 0, work), newton_step(mech, 0, work))
@@ -253,7 +270,7 @@ def flood(mech: MechanismArrays, reference: Floats, turned: int, turns: int) -> 
                 begin_to_turn(mech, trial, work)
                 free = True
                 for _ in range(substeps):
-                    free = free and turn_drive(mech, trial, drive, sign * pitch / substeps, margin, work)
+                    free = free and turn_drive(mech, trial, drive, sign * pitches[drive] / substeps, margin, work)
                 if free:
                     visited[cell] = True
                     cell_of[count] = cell

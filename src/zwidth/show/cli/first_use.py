@@ -93,7 +93,10 @@ def announce_compiling(command: str) -> Iterator[Callable[[], bool]]:
             return
         if not progress:
             times = KernelTimes.read()
-            progress.append(Progress(times.missing({*times.of_command.get(command, ()), name}), 1))
+            missing = times.missing(times.of_command.get(command, ()))
+            # on disk may be this kernel for other types
+            missing[name] = times.seconds.get(name, USUAL_SECONDS)
+            progress.append(Progress(missing, 1))
             progress[0].announce()
         if ended:
             progress[0].finish(name)
