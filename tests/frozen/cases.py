@@ -86,9 +86,9 @@ def commands_with_arguments() -> set[str]:
     return {"devices", "schema", "sweep"} | set(_SHARE)
 
 
-# commands without a number to compare: `new` writes a template, which tests of its own load and chart; `compile`
-# answers how many kernels it had to compile
-COMMANDS_WITHOUT_NUMBERS = {"new", "compile"}
+# commands without a number to compare: `new` and `import` write a device file, which tests of their own load and
+# chart; `compile` answers how many kernels it had to compile
+COMMANDS_WITHOUT_NUMBERS = {"new", "compile", "import"}
 # what is asked of every n-th device only, because it takes long
 _SHARE = {
     "show": 1,
