@@ -85,7 +85,7 @@ def test_a_velocity_estimate_of_0_in_rounding_leaves_the_chart_as_it_is(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(2000, 2500, 20))
 def test_charts_of_500_random_laws_agree_with_eigenvalues_or_say_that_they_are_in_doubt(first):
-    """Some three in 400 miss a piece of a curve beside z = 1, and say so."""
+    """Some three in 400 miss a piece of a curve, and say so."""
     charts = {seed: multi_chart(random_unlike(seed)) for seed in range(first, first + 20)}
     assert sum(chart.status == "in doubt" for chart in charts.values()) <= 1
     differing = {
