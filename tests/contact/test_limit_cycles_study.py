@@ -48,10 +48,11 @@ def test_saturation(excess, first, full):
 
 @pytest.mark.slow
 def test_saturation_far_beyond_the_edge():
-    """Some vibrations never repeat there: how large they get hangs on the last digit of the wall."""
+    """Some vibrations never repeat there: how large they get hangs on the last digit of the wall, and the bounds
+    hold what walls that differ in the tenth to fourteenth digit gave, 0.93 to 6.7 times and 0.59 to 2.1 times."""
     pairs = [(K, B, pair) for K, B, pair in saturated_cycles(16, (1.3, 2.5))]
     refined = [replace(pair, cycle=with_harmonics(pair.loop, K, B, pair.cycle)) for K, B, pair in pairs]
-    for found, bounds in (([pair for *_, pair in pairs], (1.0, 7.0, 0.4, 1.1)), (refined, (0.8, 2.0, 0.8, 1.1))):
+    for found, bounds in (([pair for *_, pair in pairs], (0.8, 10.0, 0.3, 1.1)), (refined, (0.5, 3.0, 0.6, 1.4))):
         low, high, slow, fast = ranges(found)
         assert bounds[0] < low < high < bounds[1]
         assert bounds[2] < slow < fast < bounds[3]
