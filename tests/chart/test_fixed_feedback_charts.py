@@ -185,9 +185,11 @@ def test_no_wall_decays_faster_than_the_fastest(kind):
         K, B, radius = fastest.stiffness, fastest.damping, fastest.spectral_radius
         tried += 1
         # what the chart leaves out are filters that no feedback uses, with roots of their own
-        own = np.abs(np.linalg.eigvals(case.loop.transition_matrix(K, B))).max()
-        # a triple root is known to the cube root of rounding, of entries that differ in size by 1e6
-        assert own == pytest.approx(radius, abs=2e-4), number
+        roots = np.linalg.eigvals(case.loop.transition_matrix(K, B))
+        leading = roots[np.argmax(np.abs(roots))]
+        # roots that coalesce are known to the cube root of rounding each, and their mean to rounding
+        own = np.abs(roots[np.abs(roots - leading) < 1e-3].mean())
+        assert own == pytest.approx(radius, abs=2e-6), number
         sizes = 10.0 ** rng.uniform(-6.0, -0.5, (2, 200)) * rng.choice([-1.0, 1.0], (2, 200))
         scale = np.array([max(abs(K), chart.stiffness_max), max(abs(B), chart.damping_max)])
         around = np.nan_to_num(scale)[:, None] * sizes + np.array([[K], [B]])

@@ -248,10 +248,7 @@ def test_an_orientation_that_cannot_be_reached_is_said_with_the_nearest():
 @pytest.mark.parametrize("turn", [[3.0, 0.0, 0.0], [0.0, 0.0, 2.5], [0.96, 1.3, -0.9]])
 def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straight_way(turn):
     """A descent alone ended half a metre away, where a turn about the same axis by less is reached in place."""
-    stage = tomllib.loads(new_device("Stage", "stewart"))
-    for link in stage["mechanism"]["legs"][0]["links"]:
-        link.pop("limits_m", None)
-    device = from_document(stage)
+    device = _stage(limited=False)
     with pytest.raises(OutOfReach, match=r"the nearest pose it reaches is .* [0-9.]+ degrees away") as caught:
         device.at(orientation=turn)
     place, vector = re.findall(r"\((.*?)\)", str(caught.value).partition("nearest")[2])
@@ -269,11 +266,7 @@ def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straigh
 @pytest.mark.parametrize("limited", [True, False])
 def test_a_map_shows_where_a_posed_handle_goes_without_turning(limited):
     """The map had a single point: six drives are too many for the flood that finds what others reach."""
-    stage = tomllib.loads(new_device("Stage", "stewart"))
-    if not limited:
-        for link in stage["mechanism"]["legs"][0]["links"]:
-            link.pop("limits_m", None)
-    device = from_document(stage)
+    device = _stage(limited)
     plane = plane_of(device)
     assert sum(_held(device, x, y) for x in plane.x[::16] for y in plane.y[::16]) > 8
     assert plane.x[0] < 0.0 < plane.x[-1]
@@ -284,6 +277,15 @@ def test_a_map_shows_where_a_posed_handle_goes_without_turning(limited):
         (0.0, plane.y[-1] + 0.01),
     ):
         assert not limited or not _held(device, *end)
+
+
+def _stage(limited):
+    """A Stewart platform, with or without the stops of its legs."""
+    stage = tomllib.loads(new_device("Stage", "stewart"))
+    for link in stage["mechanism"]["legs"][0]["links"]:
+        if not limited:
+            link.pop("limits_m", None)
+    return from_document(stage)
 
 
 def _held(device, x, y):

@@ -129,10 +129,8 @@ def mjcf(mechanism):
 def mass_matrix(model, data):
     """MuJoCo's mass matrix (nv, nv) of a state; `mj_fullM` takes other arguments in every major version."""
     M = np.zeros((model.nv, model.nv))
-    for column, unit in zip(M.T, np.eye(model.nv), strict=True):
-        product = np.zeros(model.nv)
-        mujoco.mj_mulM(model, data, product, unit)
-        column[:] = product
+    for row, unit in zip(M, np.eye(model.nv), strict=True):  # of a symmetric matrix
+        mujoco.mj_mulM(model, data, row, unit)
     return M
 
 

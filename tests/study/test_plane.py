@@ -190,8 +190,8 @@ def test_devices_without_a_workspace(planar):
 
 def _slide(name, parent, axis, origin, travel):
     link = {"name": name, "joint": "prismatic", "axis": axis, "origin_m": origin, "mass_kg": 0.2}
-    link |= {"inertia_kg_m2": [1e-4, 1e-4, 1e-4], "parent": parent} if parent else {"inertia_kg_m2": [1e-4] * 3}
-    return link | ({"limits_m": [-travel, travel]} if travel else {})
+    link["inertia_kg_m2"] = [1e-4, 1e-4, 1e-4]
+    return link | ({"parent": parent} if parent else {}) | ({"limits_m": [-travel, travel]} if travel else {})
 
 
 @pytest.mark.parametrize("high", [0.02, 0.9])

@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.compiled import compiled
 from zwidth.model.continuation import OK, SINGULAR_CONDITION
@@ -40,11 +41,7 @@ LARGEST_TURN: Final = 0.2  # of a drive in one step [rad]
 SETTLED: Final = 1e-13  # turn of all drives, below which they have arrived [rad]
 # Shares of the way back from the nearest position to where the descent began: at the edge the drives lose control.
 RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.03, *np.linspace(0.1, 1.0, 19)])
-HALVINGS: Final = 12  # of a ray, down to 1/2000 of the mechanism's size
-COARSELY: Final = 0.05  # above it shares are looked at again, more closely
-FINER: Final = np.linspace(0.0, 1.0, 21)[
-    1:
-]  # between the share that is reached and the one before it, which is not
+HALVINGS: Final = 12  # of a straight way, down to 1/4096 of it
 TURN: Final = 0.02  # of a drive in one step to a posture given by its joints [rad]
 
 
@@ -59,63 +56,64 @@ def nearest_goal(mech: MechanismArrays, design: int, references: Floats, goal: F
         starts = road.angles[road.nearest_nodes(goal[None], STARTS)[0]]
     descents = [_descend(mech, design, start, goal) for start in starts]
     begin, end, _ = min(descents, key=lambda way: way[2])
+    candidates = end + RETREAT[:, None] * (begin - end)
+    reached = _are_reached(mech, design, references, candidates)
     # a descent weighs turns against shifts and may end far away: the straight way is looked at, too
-    ways = [(end, begin), (goal, handle_goal(mech, design, references[design]))]
-    found = [near for way in ways if (near := _first_reached(mech, design, references, *way)) is not None]
+    reference = handle_goal(mech, design, references[design])
+    share = _reached_shares(mech, design, references, reference, goal[None])[0]
+    found = [candidates[np.argmax(reached)]] if reached.any() else []
+    found += [reference + share * (goal - reference)] if share > 0.0 else []
     return min(found, key=lambda near: goal_distance(mech, design, near, goal), default=None)
 
 
-def _first_reached(
-    mech: MechanismArrays, design: int, references: Floats, begin: Floats, end: Floats
-) -> Floats | None:
-    """The first goal (g,) of a straight way that the assembly can have; None where it has none of those tried."""
+def _are_reached(mech: MechanismArrays, design: int, references: Floats, goals: Floats) -> NDArray[np.bool_]:
+    """Whether the assembly of one design has each of the goals (N, g)."""
+    of_each = np.full(len(goals), design, dtype=np.int64)
+    return np.asarray(solve_batch(mech, of_each, references, goals).status == OK)
 
-    def first(shares: Floats) -> int | None:
-        goals = begin + shares[:, None] * (end - begin)
-        status = solve_batch(mech, np.full(len(goals), design, dtype=np.int64), references, goals).status
-        return int(np.argmax(status == OK)) if np.any(status == OK) else None
 
-    reached = first(RETREAT)
-    if reached is None:
-        return None
-    share = float(RETREAT[reached])
-    if share > COARSELY:  # the shares that were tried are far apart
-        before = float(RETREAT[reached - 1])
-        shares = before + FINER * (share - before)
-        if (finer := first(shares)) is not None:
-            share = float(shares[finer])
-    return begin + share * (end - begin)
+def _reached_shares(mech: MechanismArrays, design: int, references: Floats, begin: Floats, ends: Floats) -> Floats:
+    """How far the handle of one design gets on straight ways from a goal that it has (g,) to others (N, g), as
+    shares (N,), by halving."""
+    reached, beyond = np.zeros(len(ends)), np.ones(len(ends))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (reached + beyond)
+        there = _are_reached(mech, design, references, begin + middle[:, None] * (ends - begin))
+        reached, beyond = np.where(there, middle, reached), np.where(there, beyond, middle)
+    return reached
 
 
 def positions_about_reference(mech: MechanismArrays, reference: Floats) -> Floats:
-    """Positions (K, 3) that a handle of one design reaches without turning, from its reference posture (n,) [m].
+    """How far a handle of one design goes without turning from its reference posture (n,), in 26 directions, and
+    where it begins: positions (27, 3) [m].
 
-    Rays in 26 directions, each halved down to where the handle stops, and at most a size of the mechanism long. A
-    roadmap of so many drives is too coarse to tell this.
+    No farther than the mechanism is large. A roadmap of so many drives is too coarse to tell this.
     """
-    goal, references = handle_goal(mech, 0, reference), reference[None]
-    across = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
-    rays = across[np.any(across != 0.0, axis=1)]
-    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
-    reached, beyond = np.zeros(len(rays)), np.full(len(rays), float(mech.size[0]))
-    found = [goal[None, :3]]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (reached + beyond)
-        goals = np.tile(goal, (len(rays), 1))
-        goals[:, :3] += middle[:, None] * rays
-        there = solve_batch(mech, np.zeros(len(goals), dtype=np.int64), references, goals).status == OK
-        found.append(goals[there, :3])
-        reached, beyond = np.where(there, middle, reached), np.where(there, beyond, middle)
-    return np.concatenate(found)
+    begin, references = handle_goal(mech, 0, reference), reference[None]
+    rays = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
+    rays /= np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1.0)  # the one of length 0 stays
+    ends = np.tile(begin, (len(rays), 1))
+    ends[:, :3] += float(mech.size[0]) * rays
+    shares = _reached_shares(mech, 0, references, begin, ends)
+    return np.asarray(begin[:3] + shares[:, None] * (ends[:, :3] - begin[:3]))
 
 
 def goal_distance(mech: MechanismArrays, design: int, a: Floats, b: Floats) -> float:
     """How far two goals (g,) are apart [m]; angles count times the mechanism's size."""
-    square = 0.0 if mech.controls == ORIENTATION else float(np.sum((a[:3] - b[:3]) ** 2))
+    shift, turn = goal_difference(mech, a, b)
+    return float(np.hypot(shift, float(mech.size[design]) * turn))
+
+
+def goal_difference(mech: MechanismArrays, a: Floats, b: Floats) -> tuple[float, float]:
+    """How far two goals (g,) are apart in place [m] and in orientation [rad]; 0 for what the drives do not
+    control."""
+    shift = turn = 0.0
+    if mech.controls != ORIENTATION:
+        shift = float(np.linalg.norm(a[:3] - b[:3]))
     if mech.controls != POSITION:
-        turn = rotation_matrix(a[-3:]) @ rotation_matrix(b[-3:]).T
-        square += float(np.sum((float(mech.size[design]) * rotation_vector(turn)) ** 2))
-    return float(np.sqrt(square))
+        turned = rotation_matrix(a[-3:]) @ rotation_matrix(b[-3:]).T
+        turn = float(np.linalg.norm(rotation_vector(turned)))
+    return shift, turn
 
 
 def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) -> tuple[Floats, Floats, float]:

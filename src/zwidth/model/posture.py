@@ -266,11 +266,9 @@ def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Fl
     """
     name = _assembly_name(mechanism, assembly)
     mech, reference = _single(mechanism, name, "reachable positions are computed for one design at a time")
-    return (
-        positions_about_reference(mech, reference)
-        if mech.controls == POSE
-        else roadmap(mech, 0, reference).position
-    )
+    if mech.controls == POSE:
+        return positions_about_reference(mech, reference)
+    return roadmap(mech, 0, reference).position
 
 
 def _single(mechanism: Mechanism, name: str, otherwise: str) -> tuple[MechanismArrays, Floats]:

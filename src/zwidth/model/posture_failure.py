@@ -15,10 +15,11 @@ from zwidth.model.continuation import (
     joint_beyond_limit,
 )
 from zwidth.model.forward_kinematics import working_memory
+from zwidth.model.handle_position import goal_difference
 from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Floats, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.ratio_table import RatioTable
-from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix, rotation_vector
+from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix
 
 ALIKE: Final = 1e-9  # m and degrees that are not worth saying
 
@@ -104,14 +105,10 @@ def _numbers(values: Floats) -> str:
 
 def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:
     """How far apart two goals (g,) are, in words: in place, in orientation, as far as the drives control them."""
-    place = turn = 0.0
-    if mech.controls != ORIENTATION:
-        place = float(np.linalg.norm(near[:3] - goal[:3]))
-    if mech.controls != POSITION:
-        turned = rotation_matrix(near[-3:]) @ rotation_matrix(goal[-3:]).T
-        turn = degrees(float(np.linalg.norm(rotation_vector(turned))))
-    parts = [f"{place:.4g} m" if place >= 1.0 else f"{1e3 * place:.4g} mm"] if place > ALIKE else []
-    parts += [f"{turn:.4g} degrees"] if turn > ALIKE else []
+    shift, turn = goal_difference(mech, near, goal)
+    angle = degrees(turn)
+    parts = [f"{shift:.4g} m" if shift >= 1.0 else f"{1e3 * shift:.4g} mm"] if shift > ALIKE else []
+    parts += [f"{angle:.4g} degrees"] if angle > ALIKE else []
     return " and ".join(parts)
 
 

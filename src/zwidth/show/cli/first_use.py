@@ -94,7 +94,7 @@ def announce_compiling(command: str) -> Iterator[Callable[[], bool]]:
         if not progress:
             times = KernelTimes.read()
             missing = times.missing(times.of_command.get(command, ()))
-            # on disk may be this kernel for other types
+            # what is on disk may be this kernel for other types, or of older sources
             missing[name] = times.seconds.get(name, USUAL_SECONDS)
             progress.append(Progress(missing, 1))
             progress[0].announce()
