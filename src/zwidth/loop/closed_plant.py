@@ -1,5 +1,8 @@
 """The sampled plant with the computer's fixed feedback closed, from the wall's force to the reading.
 
+Fixed are force sensor, feedforward and local loop, and what a load adds: the wall's constant force, which turns with
+the counted posture (`model.plant.SampledForce`).
+
 All of it is linear, and it repeats itself every sampling period T, at two rates, too. So one period is gone
 through once, in order: readings, estimates and commands at the samples, the plant's exact growth in between. Every
 signal on the way is a row: what the states at the beginning of the period, and the wall's force, contribute to it.
@@ -28,7 +31,7 @@ from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.fixed_feedback import ForceSensor, acts
 from zwidth.loop.hold import lag_share
 from zwidth.loop.low_pass import LowPass
-from zwidth.loop.plant_states import PlantStates, plant_states
+from zwidth.loop.plant_states import PlantStates, SampledInput, plant_states
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 
@@ -76,7 +79,7 @@ def close_plant(plant: Plant, controller: Controller) -> tuple[SampledForm, Plan
     local, sensor = controller.local_loop, controller.force_sensor
     fast = local.rate_multiple if local is not None and acts(local) else 1
     rows = measured_force(plant, sensor) if sensor is not None and acts(sensor) else None
-    states = plant_states(plant, controller.sampling_period / fast, rows)
+    states = plant_states(plant, controller.sampling_period / fast, rows, controller.force_filter)
     return closed_form(states, controller), states
 
 
@@ -93,7 +96,7 @@ def path_responses(plant: Plant, controller: Controller, d: Complexes) -> tuple[
     filter, nothing closed but the local loop, at z = 1 + d (...)."""
     sensor = controller.force_sensor
     rows = None if sensor is None else measured_force(plant, sensor)
-    states = plant_states(plant, controller.sampling_period, rows)
+    states = plant_states(plant, controller.sampling_period, rows, controller.force_filter)
     period = _Period(states, replace(controller, feedforward=None, force_sensor=None), measures=rows is not None)
     form = period.closed()
     resolvent = d[..., None, None] * np.eye(len(form.new)) - form.growth
@@ -176,6 +179,22 @@ class _HeldRows:
         return values[self.whole + (self.part > 0.0)], values[self.whole]
 
 
+class _LoadRows:
+    """A force that the computer adds under load: what it reads of the states, filtered, delayed and held."""
+
+    def __init__(self, rows: _Rows, sampled: SampledInput, controller: Controller, keeps: bool) -> None:
+        self.sampled = sampled
+        self.filter = None
+        if sampled.filter is not None:
+            self.filter = _FilterRows(rows, low_pass_states(sampled.filter, controller.sampling_period))
+        self.held = _HeldRows(rows, controller.delay, keeps and sampled.direct != 0.0)
+
+    def push(self, states: Floats) -> tuple[Floats, Floats]:
+        """Read the states; returns what acts until the part of the sample has passed, and from then on."""
+        signal = np.asarray(self.sampled.reading @ states)
+        return self.held.push(signal if self.filter is None else self.filter.output(signal))
+
+
 class _SlowCommand:
     """The command of the wall's loop: wall, force feedback and feedforward, through the force filter."""
 
@@ -225,9 +244,10 @@ class _Period:
         keeps = self.measures and lag == 0.0 and states.force_direct != 0.0
         self.rows = _Rows()
         self.at = self.rows.add(len(states.output))
-        self.force_at = self.rows.add(1 if lag > 0.0 else 0)
+        self.force_at = self.rows.add(1 + len(states.sampled) if lag > 0.0 else 0)
         self.command = _SlowCommand(self.rows, controller)
         self.slow = _HeldRows(self.rows, controller.delay, keeps)
+        self.loads = [_LoadRows(self.rows, load, controller, self.measures) for load in states.sampled]
         self.local = local if local is not None and acts(local) else None
         if self.local is not None:
             T = controller.sampling_period / self.local.rate_multiple
@@ -243,17 +263,19 @@ class _Period:
         measured = self._measured_force() if self.measures else None
         if measured is not None:
             self.measured = measured[: self.rows.size].copy()
+        own = [load.push(self.rows.now(self.at)) for load in self.loads]
         slow, later = self.slow.push(self.command.of(wall, reading, measured))
         fast = fast_later = np.zeros_like(wall)
         at = 0.0
         for share, what in self._instants():
             if share - at > SAME_INSTANT:
-                self._advance((share - at) * self.controller.sampling_period, slow + fast)
+                commands = np.array([slow + fast, *(before for before, _ in own)])
+                self._advance((share - at) * self.controller.sampling_period, commands)
                 at = share
             if what == SAMPLE:
                 fast, fast_later = self.fast.push(self._fast_command())
             elif what == SLOW:
-                slow = later
+                slow, own = later, [(after, after) for _, after in own]
             elif what == FAST:
                 fast = fast_later
         N = self.rows.size
@@ -277,13 +299,18 @@ class _Period:
     def _measured_force(self) -> Floats:
         """What the sensor measures, with the force that acts just before the sample."""
         force = self.states.force_output @ self.rows.now(self.at)
-        if self.states.force_direct == 0.0:
-            return np.asarray(force)
-        if self.controller.actuator_time_constant > 0.0:
-            acting = self.rows.now(self.force_at)[0]
-        else:
-            acting = self.slow.before() + (0.0 if self.local is None else self.fast.before())
-        return np.asarray(force + self.states.force_direct * acting)
+        lags = self.controller.actuator_time_constant > 0.0
+        if self.states.force_direct != 0.0:
+            if lags:
+                acting = self.rows.now(self.force_at)[0]
+            else:
+                acting = self.slow.before() + (0.0 if self.local is None else self.fast.before())
+            force = force + self.states.force_direct * acting
+        for number, load in enumerate(self.loads):
+            if load.sampled.direct != 0.0:
+                acting = self.rows.now(self.force_at)[1 + number] if lags else load.held.before()
+                force = force + load.sampled.direct * acting
+        return np.asarray(force)
 
     def _fast_command(self) -> Floats:
         """The local loop's own command at one of its samples."""
@@ -294,15 +321,15 @@ class _Period:
             command = command - self.local.damping * self.fast_velocity.output(reading)
         return np.asarray(command)
 
-    def _advance(self, time: float, command: Floats) -> None:
-        """Let the plant move for a time under a held command."""
+    def _advance(self, time: float, commands: Floats) -> None:
+        """Let the plant move for a time under held commands, the wall's and those of a load, a row each."""
         lag, rows = self.controller.actuator_time_constant, self.rows
         growth, lagged, pushed = self._growth(time)
-        states, force = rows.now(self.at), rows.now(self.force_at)
-        rows.change[self.at] += growth @ states + np.outer(pushed, command)
+        states, forces = rows.now(self.at), rows.now(self.force_at)
+        rows.change[self.at] += growth @ states + pushed @ commands
         if lag > 0.0:
-            rows.change[self.at] += np.outer(lagged, force[0])
-            rows.change[self.force_at] += lag_share(time, lag) * (command - force)
+            rows.change[self.at] += lagged @ forces
+            rows.change[self.force_at] += lag_share(time, lag) * (commands - forces)
 
     @cached_property
     def _known_growths(self) -> dict[float, tuple[Floats, Floats, Floats]]:

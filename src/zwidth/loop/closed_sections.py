@@ -79,6 +79,8 @@ def _zero_poles(states: PlantStates, controller: Controller) -> int:
     own = sum((mode.squared == 0.0) * (1 + (mode.decay == 0.0)) for mode in states.modes)
     if states.form is not None:
         own += int(np.count_nonzero(states.form.poles == 0.0))
+    if states.sampled:
+        own = states.neutral
     kept = [own]
     for feedback in controller.fixed_feedback:
         match feedback:

@@ -153,19 +153,25 @@ def _without_subspace(G: Floats, right: Floats, left: Floats) -> Floats:
 
 def step_growth(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
     """exp(A t) - 1 without cancellation, and the states from a unit lagged force and from a unit command."""
+    growth, lagged, pushed = steps_growth(form.dynamics, form.input[:, None], time, lag)
+    return growth, lagged[:, 0], pushed[:, 0]
+
+
+def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
+    """The same of several forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and states (k, r)."""
     from scipy.linalg import expm
 
-    A, b, k = form.dynamics * time, form.input * time, len(form.input)
-    r = time / lag if lag > 0.0 else 0.0
-    M = np.zeros((2 * k + 2, 2 * k + 2))
+    A, b, (k, r) = dynamics * time, inputs * time, inputs.shape
+    M = np.zeros((2 * k + 2 * r, 2 * k + 2 * r))
+    forces, commands = slice(2 * k, 2 * k + r), slice(2 * k + r, 2 * k + 2 * r)
     M[:k, :k] = A
     M[:k, k : 2 * k] = np.eye(k)
     if lag > 0.0:
-        M[:k, 2 * k], M[2 * k, 2 * k], M[2 * k, 2 * k + 1] = b, -r, r
+        M[:k, forces], M[forces, forces], M[forces, commands] = b, -time / lag * np.eye(r), time / lag * np.eye(r)
     else:
-        M[:k, 2 * k + 1] = b
+        M[:k, commands] = b
     F = expm(M)
-    return A @ F[:k, k : 2 * k], F[:k, 2 * k], F[:k, 2 * k + 1]
+    return A @ F[:k, k : 2 * k], F[:k, forces], F[:k, commands]
 
 
 def _pairs(poles: Complexes, period: float) -> list[Complexes]:

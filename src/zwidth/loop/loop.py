@@ -109,8 +109,8 @@ class Loop:
 
     @property
     def has_fixed_feedback(self) -> bool:
-        """Whether the computer adds feedback to the wall law (`Controller.fixed_feedback`)."""
-        return bool(self.controller.fixed_feedback)
+        """Whether the computer adds feedback to the wall law (`Controller.fixed_feedback`), or a load does."""
+        return bool(self.controller.fixed_feedback) or self.plant.is_loaded
 
     @property
     def whole_delay(self) -> int:

@@ -6,6 +6,9 @@ readings belong to the states: the encoder's y, and the force f that a sensor at
     f = force_by_states . X + force_direct a,        a the force at the actuator at that instant
 
 where a motion's acceleration is in it. Motions are left out that the force does not move, or that show in neither.
+
+Under load the computer adds forces of its own that it reads off the states (`model.plant.SampledForce`). All motions
+are kept then.
 """
 
 from __future__ import annotations
@@ -16,8 +19,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.coupled_hold import step_growth
+from zwidth.loop.coupled_hold import step_growth, steps_growth
 from zwidth.loop.hold import modal_row, mode_growth
+from zwidth.loop.low_pass import LowPass
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.loop.sections import equal_modes
 from zwidth.model.first_order_form import (
@@ -26,11 +30,13 @@ from zwidth.model.first_order_form import (
     first_order_form,
     without_hidden_poles,
 )
-from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes
+from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes, undamped_modes
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+NEUTRAL = 1e-12  # share of the stiffnesses that are summed below which a motion has none
 
 
 @dataclass(frozen=True)
@@ -48,11 +54,27 @@ class Mode:
 
 
 @dataclass(frozen=True)
+class SampledInput:
+    """A force that the computer adds, on the states (k,) of a form: command = reading . X at the sample.
+
+    direct    of the force f, per unit of this force
+    filter    that it passes through
+    """
+
+    input: Floats
+    reading: Floats
+    direct: float
+    filter: LowPass | None
+
+
+@dataclass(frozen=True)
 class PlantStates:
     """The states of a plant: two for each mode, then those of a form with coupled dampers.
 
     force_direct  of the force f, per unit of the actuator's force
     hidden        growth rates [1/s] of the motions that were left out, and their names
+    sampled       what the computer adds under load; all states are those of the form then
+    neutral       number of poles at z = 1 that stay there under it, and under its readings
     """
 
     modes: tuple[Mode, ...]
@@ -60,6 +82,8 @@ class PlantStates:
     force_direct: float
     hidden: Floats
     unobserved: tuple[str, ...]
+    sampled: tuple[SampledInput, ...] = ()
+    neutral: int = 0
 
     @cached_property
     def output(self) -> Floats:
@@ -76,23 +100,32 @@ class PlantStates:
         return np.append([x for mode in self.modes for x in mode.force_output], own)
 
     def growth(self, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-        """exp(A t) - 1 (k, k), and the states (k,) that a unit lagged force without command leaves after a time,
-        and a unit command from rest; without lag the command is the force."""
+        """exp(A t) - 1 (k, k), and the states (k, 1 + r) that unit lagged forces without command leave after a time,
+        and unit commands from rest, of the wall and of each of the r forces beside it; without lag the command is
+        the force."""
         from scipy.linalg import block_diag
 
+        if self.sampled and self.form is not None:
+            inputs = np.stack([self.form.input, *(each.input for each in self.sampled)], axis=1)
+            return steps_growth(self.form.dynamics, inputs, time, lag)
         parts = [mode_growth(mode.decay, mode.squared, mode.rate, time, lag) for mode in self.modes]
         if self.form is not None:
             parts.append(step_growth(self.form, time, lag))
         growths, lagged, pushed = zip(*parts, strict=True)
-        return block_diag(*growths), np.concatenate(lagged), np.concatenate(pushed)
+        return block_diag(*growths), np.concatenate(lagged)[:, None], np.concatenate(pushed)[:, None]
 
 
-def plant_states(plant: Plant, period: float, force_rows: Floats | None = None) -> PlantStates:
+def plant_states(
+    plant: Plant, period: float, force_rows: Floats | None = None, force_filter: LowPass | None = None
+) -> PlantStates:
     """The states of a plant whose force is held for a period T [s] at a time.
 
     force_rows  (3, n)  what a force sensor reads per x'', x' and x; None: there is none
+    force_filter        of the computer, for what it adds under load
     Returns     no states where the force moves nothing that shows in a reading
     """
+    if plant.is_loaded:
+        return _loaded_states(plant, period, force_rows, force_filter)
     modes = real_modes(plant)
     # each free motion with damping has a pole at z = 1, for the place where it comes to rest: two share this pole
     if modes is not None and np.count_nonzero((modes.frequency_squared == 0.0) & (modes.decay != 0.0)) < 2:
@@ -138,6 +171,72 @@ def _coupled_states(plant: Plant, period: float, force_rows: Floats | None) -> P
     hidden = np.append(form.hidden_poles.real, np.zeros(form.free_count - len(free)))
     shown = without_hidden_poles(form)
     return PlantStates(tuple(free), shown if len(shown.poles) else None, form.second_direct, hidden, tuple(names))
+
+
+def _loaded_states(
+    plant: Plant, period: float, force_rows: Floats | None, force_filter: LowPass | None
+) -> PlantStates:
+    """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces of
+    lagged dampers. What is neutral without load no longer is, and nothing is left out."""
+    n, T, lags = plant.size, period, plant.lagged_dampers
+    squared, V = undamped_modes(plant.mass, plant.stiffness)
+    K, B = np.diag(squared), V.T @ plant.damping @ V
+    if plant.circulatory is not None:
+        K = K + V.T @ plant.circulatory @ V
+    size = 2 * n + len(lags)
+    A = np.zeros((size, size))
+    A[:n, n : 2 * n], A[n : 2 * n, :n], A[n : 2 * n, n : 2 * n] = np.eye(n) / T, -K * T, -B
+    for i, damper in enumerate(lags):
+        along, own = V.T @ damper.along, 2 * n + i
+        A[n : 2 * n, own] = -damper.damping * along
+        A[own, n : 2 * n] = along / damper.time_constant
+        A[own, own] = -1.0 / damper.time_constant
+
+    def column(vector: Floats) -> Floats:
+        out = np.zeros(size)
+        out[n : 2 * n] = V.T @ vector * T
+        return out
+
+    def row(vector: Floats) -> Floats:
+        return np.append(vector @ V, np.zeros(size - n))
+
+    rows = np.zeros((3, n)) if force_rows is None else force_rows @ V
+    second = np.asarray(rows[0] @ A[n : 2 * n] / T)
+    second[n : 2 * n] += rows[1] / T
+    second[:n] += rows[2]
+    sampled = tuple(
+        SampledInput(
+            column(force.along),
+            row(force.reading),
+            float(rows[0] @ (V.T @ force.along)),
+            force_filter if force.filtered else None,
+        )
+        for force in plant.sampled_forces
+    )
+    form = FirstOrderForm(
+        dynamics=A,
+        input=column(plant.actuator),
+        output=row(plant.sensor),
+        poles=np.linalg.eigvals(A).astype(np.complex128),
+        hidden_poles=np.zeros(0, dtype=np.complex128),
+        free_residue=0.0,
+        free_count=0,
+        second_output=None if force_rows is None else second,
+        second_direct=float(rows[0] @ (V.T @ plant.actuator)),
+    )
+    readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
+    pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
+    drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lags), np.zeros((n, n)))
+    neutral = _nullity(K - pushes.T @ readings, K, pushes.T @ readings)
+    still = _nullity(np.vstack([K, readings, drag / T]), K, drag / T, readings)
+    return PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
+
+
+def _nullity(matrix: Floats, *parts: Floats) -> int:
+    """Dimension of what a matrix (r, n) maps to 0, to rounding of its parts."""
+    scale = max((float(np.max(np.abs(part), initial=0.0)) for part in parts), default=0.0)
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL * scale))
 
 
 def _growth_rate(decay: float, squared: float) -> float:

@@ -77,22 +77,16 @@ def attach(plant: Plant, operator: Operator) -> Plant:
         raise OperatorError(f"an arm held by an elastic grasp needs a mass, got {operator.arm_mass:g} kg")
     arm, slip = np.append(np.zeros(plant.size), 1.0), np.append(h, -1.0)
 
-    def grown(matrix: np.ndarray, own: float, between: float) -> np.ndarray:
-        return np.pad(matrix, (0, 1)) + own * np.outer(arm, arm) + between * np.outer(slip, slip)
-
+    grown = plant.padded(("arm",))
+    grasp_damping = operator.grasp_damping or 0.0
     return replace(
-        plant,
-        mass=grown(plant.mass, operator.arm_mass, 0.0),
-        damping=grown(plant.damping, operator.arm_damping, operator.grasp_damping or 0.0),
-        stiffness=grown(plant.stiffness, operator.arm_stiffness, operator.grasp_stiffness),
-        actuator=np.append(plant.actuator, 0.0),
-        sensor=np.append(plant.sensor, 0.0),
-        handle=np.append(h, 0.0),
-        names=(*plant.names, "arm") if plant.names else (),
-        lagged_dampers=tuple(replace(d, along=np.append(d.along, 0.0)) for d in plant.lagged_dampers),
-        hysteresis=None if plant.hysteresis is None else np.pad(plant.hysteresis, (0, 1)),
-        nonlinear=plant.nonlinear.padded(1),
-        hand_force=_hand_force(plant, -slip, (0.0, operator.grasp_damping or 0.0, operator.grasp_stiffness)),
+        grown,
+        mass=grown.mass + operator.arm_mass * np.outer(arm, arm),
+        damping=grown.damping + operator.arm_damping * np.outer(arm, arm) + grasp_damping * np.outer(slip, slip),
+        stiffness=grown.stiffness
+        + operator.arm_stiffness * np.outer(arm, arm)
+        + operator.grasp_stiffness * np.outer(slip, slip),
+        hand_force=_hand_force(plant, -slip, (0.0, grasp_damping, operator.grasp_stiffness)),
     )
 
 

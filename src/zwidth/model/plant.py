@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +32,32 @@ class LaggedDamper:
 
 
 @dataclass(frozen=True)
+class SampledForce:
+    """A force that the computer adds to the wall's under load, in proportion to where it sees the device:
+
+        force = along (reading . x_j),   x_j the coordinates at the sample, held and delayed as the wall's force is
+
+    It stems from the wall's constant force, which turns with the counted posture (`linearised_load`).
+
+    along     (n,)  where it acts
+    reading   (n,)  [N/m], or [N m/rad] of angles
+    filtered  whether it passes through the computer's force filter
+    """
+
+    along: Array1
+    reading: Array1
+    filtered: bool = False
+
+
+@dataclass(frozen=True)
 class Plant:
     """Linear dynamics about the haptic equilibrium (thesis eq. 2.5).
 
-        M x'' + B x' + K x = actuator * f + lagged dampers,     y = sensor . x
+        M x'' + B x' + (K + C) x = actuator * f + lagged dampers + sampled forces,     y = sensor . x
 
     mass       (n, n)  symmetric positive definite [kg]
     damping    (n, n)  symmetric [N s/m]
-    stiffness  (n, n)  symmetric [N/m]
+    stiffness  (n, n)  K, symmetric [N/m]; under load not always positive
     actuator   (n,)    where the wall force f acts
     sensor     (n,)    what the encoder reads
     handle     (n,)    where the operator holds it; None: not known
@@ -51,6 +69,10 @@ class Plant:
     nonlinear          friction, encoder steps and the like: what only `contact` knows of
     hand_force (3, n)  force of the operator on the handle per x'', x' and x, as he is in the matrices already;
                        None: nobody holds it
+    sampled_forces     what the computer adds under load
+    circulatory (n, n) C, antisymmetric, of forces that turn with what they act on [N/m]; None: none
+    apart              the motions that no wall moves without load, as a plant of their own, if they do not count;
+                       None: there are none, or they count
 
     Arrays may have leading axes of designs (`model.design_axes`); such plants are computed together, see
     `plant_modes`.
@@ -67,6 +89,9 @@ class Plant:
     hysteresis: Array2 | None = None
     nonlinear: Nonlinear = field(default_factory=Nonlinear)
     hand_force: Array2 | None = None
+    sampled_forces: tuple[SampledForce, ...] = ()
+    circulatory: Array2 | None = None
+    apart: Plant | None = None
 
     def __post_init__(self) -> None:
         """Make lists arrays. Raise ValueError for shapes that do not go together."""
@@ -85,6 +110,68 @@ class Plant:
                 raise ValueError(
                     f"{name} must be an array {shape} where mass is {(n, n)}, got one of the shape {own}"
                 )
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether the plant has parts that only a load brings."""
+        return bool(self.sampled_forces) or self.circulatory is not None
+
+    def on_motions(self, motions: Floats) -> Plant:
+        """The plant as it moves on some motions alone, the columns of (n, m); their amplitudes are its coordinates."""
+        Z = np.asarray(motions)
+
+        def both(matrix: Floats | None) -> Floats | None:
+            return None if matrix is None else np.asarray(Z.T @ matrix @ Z)
+
+        return replace(
+            self,
+            mass=Z.T @ self.mass @ Z,
+            damping=Z.T @ self.damping @ Z,
+            stiffness=Z.T @ self.stiffness @ Z,
+            actuator=self.actuator @ Z,
+            sensor=self.sensor @ Z,
+            handle=None if self.handle is None else self.handle @ Z,
+            names=(),
+            lagged_dampers=tuple(replace(damper, along=damper.along @ Z) for damper in self.lagged_dampers),
+            hysteresis=both(self.hysteresis),
+            nonlinear=self.nonlinear.project(Z),
+            hand_force=None if self.hand_force is None else self.hand_force @ Z,
+            sampled_forces=tuple(
+                replace(force, along=force.along @ Z, reading=force.reading @ Z) for force in self.sampled_forces
+            ),
+            circulatory=both(self.circulatory),
+            apart=None,
+        )
+
+    def padded(self, names: tuple[str, ...]) -> Plant:
+        """The plant with more coordinates at its end, of these names, that nothing acts on yet."""
+        count = len(names)
+
+        def longer(vector: Floats) -> Floats:
+            return np.append(vector, np.zeros(count))
+
+        def larger(matrix: Floats | None) -> Floats | None:
+            return None if matrix is None else np.pad(matrix, (0, count))
+
+        return replace(
+            self,
+            mass=np.pad(self.mass, (0, count)),
+            damping=np.pad(self.damping, (0, count)),
+            stiffness=np.pad(self.stiffness, (0, count)),
+            actuator=longer(self.actuator),
+            sensor=longer(self.sensor),
+            handle=None if self.handle is None else longer(self.handle),
+            names=(*self.names, *names) if self.names else (),
+            lagged_dampers=tuple(replace(damper, along=longer(damper.along)) for damper in self.lagged_dampers),
+            hysteresis=larger(self.hysteresis),
+            nonlinear=self.nonlinear.padded(count),
+            hand_force=None if self.hand_force is None else np.pad(self.hand_force, ((0, 0), (0, count))),
+            sampled_forces=tuple(
+                replace(force, along=longer(force.along), reading=longer(force.reading))
+                for force in self.sampled_forces
+            ),
+            circulatory=larger(self.circulatory),
+        )
 
     def check_numbers(self) -> None:
         """Raise ValueError unless matrices and vectors are finite, and the mass matrix positive definite."""

@@ -6,8 +6,8 @@ theta the motor's angle less f(q0), over n(q0), a spring k at the motor gives th
     n(q) k (n(q0) theta - f(q) + f(q0)) = n(q0)^2 k (theta - (q - q0)) + second order
 
 so that every linear answer is that of the constant ratio n(q0). With a torque tau at the motor at rest, as of a
-hand that leans on a wall, the joint has the torque n'(q0) tau (q - q0) besides. It is left out, as is the change
-of the Jacobian under such a force.
+hand that leans on a wall, the joint has the torque n'(q0) tau (q - q0) besides; `equilibrium` has it, with all else
+that a load changes.
 """
 
 from __future__ import annotations
@@ -60,17 +60,42 @@ class RatioTable:
         >>> RatioTable(np.array([0.0, 1.0]), np.array([3.0, 5.0]), True).at(np.array([0.5, 0.5 - TURN, 2.0]))
         array([ 4.,  4., nan])
         """
+        q, inside = self._within(coordinate)
+        c, x, _ = self._cubic(q)
+        return np.asarray(np.where(inside, ((c[0] * x + c[1]) * x + c[2]) * x + c[3], np.nan))
+
+    def slope(self, coordinate: Floats) -> Floats:
+        """Its derivative n'(q) at coordinates (...); nan outside of the table."""
+        q, inside = self._within(coordinate)
+        c, x, _ = self._cubic(q)
+        return np.asarray(np.where(inside, (3.0 * c[0] * x + 2.0 * c[1]) * x + c[2], np.nan))
+
+    def motor_angle(self, coordinate: Floats) -> Floats:
+        """f(q), by which the motor has turned since the joint was at the table's first entry [rad], at coordinates
+        (...) of one design; nan outside of the table."""
+        q, inside = self._within(coordinate)
+        c, x, span = self._cubic(q)
+        every = self._coefficients[:, 0]
+        steps = np.diff(self.coordinate)
+        passed = (((every[0] * steps / 4.0 + every[1] / 3.0) * steps + every[2] / 2.0) * steps + every[3]) * steps
+        before = np.concatenate([[0.0], np.cumsum(passed)])[span]
+        own = (((c[0] * x / 4.0 + c[1] / 3.0) * x + c[2] / 2.0) * x + c[3]) * x
+        return np.asarray(np.where(inside, before + own, np.nan))
+
+    def _within(self, coordinate: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """Coordinates (...) moved into the table by whole turns, and whether they are in it."""
         q, low, high = np.asarray(coordinate, dtype=np.float64), self.coordinate[0], self.coordinate[-1]
         slack = ROUNDING * (high - low)
         if self.turns:
             outside = (q < low - slack) | (q > high + slack)
             q = np.where(outside, q + TURN * np.ceil((low - slack - q) / TURN), q)
         inside = (q >= low - slack) & (q <= high + slack)
-        q = np.where(inside, np.clip(q, low, high), low)
+        return np.where(inside, np.clip(q, low, high), low), inside
+
+    def _cubic(self, q: Floats) -> tuple[Floats, Floats, Ints]:
+        """Coefficients (4, ...) of the cubic at each coordinate (...), the way into its span, and the span."""
         span = np.clip(np.searchsorted(self.coordinate, q, side="right") - 1, 0, len(self.coordinate) - 2)
-        c = self._coefficients[:, self._design(q.shape), span]
-        x = q - self.coordinate[span]
-        return np.asarray(np.where(inside, ((c[0] * x + c[1]) * x + c[2]) * x + c[3], np.nan))
+        return self._coefficients[:, self._design(q.shape), span], q - self.coordinate[span], span
 
     def _design(self, shape: tuple[int, ...]) -> Ints:
         """Which design's numbers are meant at each of coordinates of a shape, with the axes of the designs."""

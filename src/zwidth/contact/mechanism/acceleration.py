@@ -2,69 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from zwidth.compiled import compiled_lean
 from zwidth.contact.mechanism.system import Memory, System
 from zwidth.model.bias import bias
-from zwidth.model.closure import apply_step, closure_step, equations, passive_rates
-from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, largest_magnitude
-from zwidth.model.forward_kinematics import WorkingMemory, move_joints, place_links
+from zwidth.model.closed_posture import NOT_CLOSED, close_at
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.mechanism import Floats
-from zwidth.model.mechanism_arrays import MechanismArrays
-
-NOT_CLOSED: Final = -1.0
-ROUNDING: Final = 1e-14  # turn of a joint below which Newton has nothing more to gain [rad]
-SURE: Final = 1e-7  # turn whose square is rounding: the next iteration would not move [rad]
-
-
-@compiled_lean
-def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: WorkingMemory) -> float:
-    """Move the independent joints to coordinates (c,) and close the loops, the joints' (links,) in place; their
-    reciprocal condition.
-
-    Newton starts from where the passive joints' rates would take them. NOT_CLOSED where it leaves the branch.
-    Links, `rows` and `rates` belong to the closed posture afterwards.
-    """
-    joint, rates, step, ahead = mech.joint, work.rates, work.solution[0], work.solution[1]
-    m, loops, c = mech.joint.size, mech.first_row[mech.a.size], work.rates.shape[0]
-    passive = m - c
-    for s in range(c):
-        ahead[s] = independent[s]
-        for t in range(c):
-            ahead[s] -= mech.to_drive[0, s, t] * angles[joint[passive + t]]
-    for u in range(m):
-        step[u] = 0.0
-        for s in range(c if u < passive else 0):
-            step[u] += rates[s, u] * ahead[s]
-    move_joints(mech, angles, step)
-    for s in range(c):
-        angles[joint[passive + s]] = 0.0
-        for t in range(c):
-            angles[joint[passive + s]] += mech.to_joint[0, s, t] * independent[t]
-    last, moved, sure = 0.0, 0.0, loops == 0
-    for iteration in range(12):
-        place_links(mech, 0, angles, work)
-        equations(mech, 0, work)
-        condition = passive_rates(mech, 0, work)
-        if sure:
-            return condition
-        size = closure_step(mech, work)
-        moved += size
-        if not moved < LARGEST_TURN or not condition > 0.0:
-            return NOT_CLOSED
-        if size < ROUNDING:
-            return condition
-        if iteration > 0 and size > CONTRACTION * last:
-            # rounding moves it to and fro, or there is no closed posture here
-            return condition if largest_magnitude(work.gaps, loops) < 1e-13 * mech.size[0] else NOT_CLOSED
-        apply_step(mech, 0, angles, work)
-        sure = size < SURE
-        last = size
-    return NOT_CLOSED
 
 
 @compiled_lean

@@ -21,10 +21,10 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.environments import MEMORY, environment_at
-from zwidth.contact.mechanism.acceleration import close_at
 from zwidth.contact.mechanism.rendering_inputs import RenderingInputs
 from zwidth.contact.mechanism.surfaces import NONE, penetration
 from zwidth.contact.mechanism.system import System
+from zwidth.model.closed_posture import close_at
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, working_memory
 from zwidth.model.inertia import handle_jacobian, unit_motions
 from zwidth.model.mechanism import Floats

@@ -1,0 +1,177 @@
+"""A device linearised about its haptic equilibrium (thesis eq. 2.5): what a load changes of its plant.
+
+Two halves, since one acts at every instant and the other at samples:
+
+- the links feel the hand's force F, gravity and the torques s of their drives all the time. With second derivatives
+  as in `motions`,
+
+      K += -(F . d2x/dp2 + dw/dp + sum_i s_i d2z_i/dp2)
+
+- the computer turns its force with the motors that it counts: torques change by S dz, S of `command_change`, at
+  samples, held and late as everything that it commands. So does the surface's normal, by 1/R per way along it.
+
+Rigid drives without delay let the halves cancel but for what sampling leaves. Either of them alone is another device.
+
+Springs keep the tangent k + 3 k_3 d^2 that they have at their deflection, on the branch on which they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Final
+
+import numpy as np
+
+from zwidth.model.damping import Damping
+from zwidth.model.equilibrium import Equilibrium, command_change, lever_arms_of
+from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.modes import REPEATED, clusters, undamped_modes
+from zwidth.model.plant import Plant, SampledForce
+from zwidth.model.posture import Posture
+from zwidth.model.reduction import Encoders, reduce_mechanism
+
+MOVED: Final = 1e-9  # share of all motions below which the wall's force moves one by rounding
+ROUNDING: Final = 1e-14  # share of the largest part of a sampled feedback that is none
+
+
+@dataclass(frozen=True)
+class LoadedPlants:
+    """A device's plant with and without what the load changes, on the same coordinates."""
+
+    loaded: Plant
+    unloaded: Plant
+
+
+def linearise(
+    mechanism: Mechanism,
+    posture: Posture,
+    equilibrium: Equilibrium,
+    damping: Damping,
+    encoders: Encoders,
+    axis: Floats,
+) -> LoadedPlants:
+    """The full model of one design in one posture at its equilibrium.
+
+    mechanism  that of the equilibrium;   axis (6,) the rendered direction
+    """
+    drives = mechanism.drives
+    tangent = equilibrium.springs.tangent(equilibrium.deflections, equilibrium.load.branch == "backward")
+    bent = replace(
+        mechanism, drives=replace(drives, stiffness=tangent / drives.transmission**2, ratio_tables=None)
+    )
+    unloaded = reduce_mechanism(bent, posture, axis, "full", damping, encoders)
+    c, n = equilibrium.motions.count, unloaded.size
+    flexible = equilibrium.springs.flexible
+    links = np.concatenate([equilibrium.drives.T, np.zeros((len(tangent), n - c))], axis=1)
+    motors = links.copy()
+    motors[flexible] = np.eye(n)[c:]
+    counted = motors if encoders == "motor" else links
+    K = np.zeros((n, n))
+    K[:c, :c] = _links_stiffness(equilibrium)
+    seen, k = equilibrium.counted, len(mechanism.driven)
+    share = np.linalg.pinv(seen.drives.T[:, :k].T)
+    h = lever_arms_of(seen.motions, axis)[:k]
+    symmetric, turning = 0.5 * (K + K.T), 0.5 * (K - K.T)
+    loaded = replace(
+        unloaded,
+        stiffness=unloaded.stiffness + symmetric,
+        circulatory=turning if np.any(np.abs(turning) > ROUNDING * np.max(np.abs(K), initial=0.0)) else None,
+        actuator=(share @ h) @ motors,
+        sensor=(h @ seen.seen) @ counted,
+        sampled_forces=_sampled_forces(equilibrium, share, motors, counted),
+    )
+    return LoadedPlants(loaded, unloaded)
+
+
+def _links_stiffness(equilibrium: Equilibrium) -> Floats:
+    """-dQ/dp (c, c) of hand, gravity and drives' torques on the links."""
+    handle, drives, load = equilibrium.motions.handle, equilibrium.drives, equilibrium.load
+    force, moment = equilibrium.hand_force, equilibrium.hand_moment
+    K = np.tensordot(force, handle.speed_2, 1) + np.tensordot(moment, handle.turning, 1)
+    if load.hand == "follower":  # the force turns by W dp with the handle's link
+        K = (
+            K
+            + handle.speed.T @ np.cross(handle.spin.T, force).T
+            + handle.spin.T @ np.cross(handle.spin.T, moment).T
+        )
+    if equilibrium.compensation != "counterweight":
+        K = K + equilibrium.motions.weight(load.weight)[1]
+    s = np.where(
+        np.isfinite(equilibrium.springs.forward),
+        equilibrium.springs.torque(equilibrium.deflections),
+        equilibrium.torques,
+    )
+    return -np.asarray(K + np.tensordot(s, drives.Z, 1))
+
+
+def _sampled_forces(
+    equilibrium: Equilibrium, share: Floats, motors: Floats, counted: Floats
+) -> tuple[SampledForce, ...]:
+    """What the computer adds: the turning torques, and those of the surface's curvature."""
+    load, seen, u = equilibrium.load, equilibrium.counted, equilibrium.screw
+    gravity = np.zeros(3) if equilibrium.compensation == "counterweight" else load.weight
+    turning = command_change(seen, u, gravity, equilibrium.compensation, equilibrium.wall_force)
+    forces = _rank_one(turning, motors, counted, False)
+    if isfinite(load.surface_radius):
+        k = seen.seen.shape[0]
+        across = seen.motions.handle.speed[:, :k]
+        across = across - np.outer(u[:3], u[:3] @ across)
+        curved = abs(equilibrium.wall_force) / load.surface_radius * (share @ (across.T @ across) @ seen.seen)
+        forces += _rank_one(curved, motors, counted, True)
+    return forces
+
+
+def _rank_one(change: Floats, motors: Floats, counted: Floats, filtered: bool) -> tuple[SampledForce, ...]:
+    """A feedback (d, d) from counted coordinates to motors, as products of one column and one row each."""
+    left, size, right = np.linalg.svd(change)
+    kept = np.flatnonzero(size > ROUNDING * np.max(size, initial=0.0))
+    return tuple(SampledForce(left[:, i] @ motors, size[i] * (right[i] @ counted), filtered) for i in kept)
+
+
+def set_apart(plants: LoadedPlants) -> Plant:
+    """The loaded plant on the motions that the wall's force moves without load; the others stand apart.
+
+    Without load the two do not know of each other. What couples them is of the order of the load, and moves the
+    poles of either by its square; `Load.count_sideways` keeps it.
+    """
+    moved, still = moved_motions(plants.unloaded)
+    if not still.shape[1]:
+        return plants.loaded
+    return replace(plants.loaded.on_motions(moved), apart=plants.loaded.on_motions(still))
+
+
+def moved_motions(plant: Plant) -> tuple[Floats, Floats]:
+    """Mass-normalised motions (n, m) that a force at the actuator moves and the sensor reads, and the others: the
+    least subspaces that mass, stiffness and damping keep apart."""
+    squared, V = undamped_modes(plant.mass, plant.stiffness)
+    drag = V.T @ plant.damping @ V
+    for damper in plant.lagged_dampers:
+        drag = drag + damper.damping * np.outer(V.T @ damper.along, V.T @ damper.along)
+    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
+    groups = [np.arange(len(squared))[run] for run in clusters(squared, REPEATED * scale)]
+    drag = drag / max(float(np.max(np.abs(drag))), np.finfo(float).tiny)
+    basis = np.zeros((plant.size, 0))
+    fresh = (V.T @ plant.actuator)[:, None]
+    fresh = fresh / np.linalg.norm(fresh)
+    while fresh.shape[1]:
+        parts = np.zeros((plant.size, 0))
+        for group in groups:
+            part = np.zeros_like(fresh)
+            part[group] = fresh[group]
+            parts = np.hstack([parts, part])
+        fresh = _new_directions(basis, parts)
+        basis = np.hstack([basis, fresh])
+        fresh = _new_directions(basis, drag @ fresh)
+    left = np.linalg.svd(basis)[0]
+    return np.asarray(V @ basis), np.asarray(V @ left[:, basis.shape[1] :])
+
+
+def _new_directions(basis: Floats, vectors: Floats) -> Floats:
+    """Orthonormal directions that vectors (n, k) have beyond a basis, where these are more than rounding."""
+    if not vectors.shape[1]:
+        return vectors
+    for _ in range(2):  # the second time takes what rounding has left
+        vectors = vectors - basis @ (basis.T @ vectors)
+    left, size, _ = np.linalg.svd(vectors, full_matrices=False)
+    return np.asarray(left[:, size > MOVED])
