@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.measures.felt_wall import FeltWall
+    from zwidth.model.load import Load
     from zwidth.model.plant import Plant
     from zwidth.model.posture import Posture
     from zwidth.progress import Progress
@@ -47,6 +48,12 @@ def device_with(device: Device, settings: Settings) -> Device:
     from zwidth.device.load import device_with_settings
 
     return device_with_settings(device, settings)
+
+
+def device_under(device: Device, load: Load | ArrayLike | None, gravity: ArrayLike | None, moment: bool) -> Device:
+    from zwidth.device.load import device_under
+
+    return device_under(device, load, gravity, moment)
 
 
 def device_held_by(device: Device, operator: Any) -> Device:

@@ -14,7 +14,7 @@ from zwidth.loop.controller import Butterworth, FirstOrder
 from zwidth.loop.estimators import BackwardDifference, Kalman, WindowedDifference
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
 from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPointError
+from zwidth.loop.point_errors import OperatingPointError
 from zwidth.show.circumstances import computer_text
 
 LOW_PASS = {"type": "butterworth", "order": 2, "cutoff_Hz": 50.0}

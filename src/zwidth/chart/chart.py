@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +52,12 @@ class StabilityChart(Chart):
     def unobserved_modes(self) -> tuple[str, ...]:
         """Motions that no wall moves, by name; they were cancelled and do not count."""
         return self.loop.unobserved_modes
+
+    def document(self) -> dict[str, Any]:
+        own = super().document()
+        if self.loop.plant.apart is not None:
+            own["sideways_motions"] = [motion.document() for motion in self.loop.sideways_motions]
+        return own
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
         """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast, by eigenvalues, whatever the regions say."""

@@ -226,7 +226,7 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
 
     Directions share the full model's matrices and differ in their actuator.
     """
-    check_several_directions(point.mechanism, point.operator, point.encoders)
+    check_several_directions(point.mechanism, point.operator, point.encoders, point.load)
     if point.model != "full":
         return lambda unit: point.towards(unit).plant
     axes = _motions(point.jacobian)

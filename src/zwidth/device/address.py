@@ -30,6 +30,7 @@ EXCLUSIVE: Final[dict[tuple[str, ...], tuple[frozenset[str], ...]]] = {
     ("loop", "feedforward", "velocity", "filter"): FILTERS,
     ("loop", "local", "velocity", "filter"): FILTERS,
     ("operator",): (frozenset({"grasp"}), frozenset({"grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m"})),
+    ("load",): (frozenset({"force_N"}), frozenset({"push_N"}), frozenset({"moment_Nm"})),
     ("mechanism", "damping"): (
         frozenset({"mode_ratio"}),
         frozenset({"mass_coefficient_1_per_s", "stiffness_coefficient_s"}),
@@ -227,7 +228,7 @@ def _from_the_top(document: dict[str, Any], first: str, rest: list[str]) -> str:
     if near:
         right = [near] if near in schema.keys(()) else ["mechanism", near]
         return f"did you mean '{'.'.join([*right, *rest])}'?"
-    for section in ("loop", "plant", "mechanism", "operator", "friction"):
+    for section in ("loop", "plant", "mechanism", "operator", "load", "friction"):
         near = nearest(first, schema.keys((section,))) if section in document else None
         if near:
             return f"did you mean '{'.'.join([section, near, *rest])}'?"

@@ -91,6 +91,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
         controls=CONTROLS[handle.controls],
         reference_rotation=roll_pitch_yaw(reference.orientation_rad or (0.0, 0.0, 0.0)),
         free=_free(tree, loops),
+        gravity_compensation=section.gravity_compensation,
     )
 
 

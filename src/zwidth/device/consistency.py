@@ -14,6 +14,7 @@ from zwidth.device.address import exists, in_schema
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
 from zwidth.device.feedback_consistency import feedback_inconsistencies
 from zwidth.device.legs import spread_tables, written_path
+from zwidth.device.load_consistency import load_inconsistencies
 from zwidth.device.loop_consistency import electrical_inconsistencies, loop_inconsistencies
 from zwidth.device.missing import partly_missing
 from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
@@ -67,6 +68,7 @@ def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyM
     yield from _response(original)
     yield from electrical_inconsistencies(document)
     yield from operator_inconsistencies(document)
+    yield from load_inconsistencies(document)
     yield from _sampling(document)
     mechanism = table(document, "mechanism")
     if mechanism:

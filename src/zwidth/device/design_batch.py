@@ -21,7 +21,8 @@ from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.load import build_device, check
 from zwidth.device.schema.value_types import Section
-from zwidth.loop.operating_point import PROJECTION_TOLERANCE, OperatingPoint
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.posed_device import PROJECTION_TOLERANCE
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.posture import UNSOLVED, Posture, PostureError, join_postures, solve_posture
@@ -240,6 +241,8 @@ def design_batch(
     checked, cleaned = check(document, label)
     leaves = dict(leaf for steps, numbers in columns.items() for leaf in _leaves(steps, numbers))
     valid = certainly_valid(document, leaves, count)
+    if "load" in document:  # each design then has a balance of its own
+        valid = np.zeros(count, dtype=np.bool_)
     with_arrays: Any = checked
     for steps, numbers in columns.items():
         # what is not valid stays out of the arithmetic, too

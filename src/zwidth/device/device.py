@@ -25,11 +25,13 @@ from zwidth.model.response import Response
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
     from zwidth.chart.verdict import WallVerdicts
-    from zwidth.loop.operating_point import OperatingPoint, Position
+    from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.loop.posed_device import Position
     from zwidth.loop.wall_matrices import WallMatrices
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.model.damping import Damping
+    from zwidth.model.load import Load
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
@@ -55,6 +57,7 @@ class Device:
     reference_assembly  assembly meant where none is given; None for a plant
     operator            the arm and grasp at the handle; None: nobody
     operator_name       what he is called; None: nobody
+    load                what the device bears while it renders; None: nothing
     encoders            what a mechanism's encoders read: "motor" or "link"
     document            the file's tables after settings: for saving, and for addressing its numbers
     """
@@ -74,6 +77,7 @@ class Device:
     reference_assembly: str | None
     operator: Operator | None
     operator_name: str | None
+    load: Load | None
     encoders: Encoders
     document: dict[str, Any]
 
@@ -120,6 +124,8 @@ class Device:
         assembly: str | None = None,
         model: str | None = None,
         operator: Operator | str | os.PathLike[str] | None = None,
+        load: Load | ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
     ) -> OperatingPoint:
         """The device with its handle at a position, rendering a direction: where it is linearised.
 
@@ -149,17 +155,23 @@ class Device:
         model       "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a given plant
                     as it is. "motor-mass" holds the link side, and so the operator, fixed: he does nothing to it
         operator    who holds the handle: an Operator, a bundled name or a file, "none"; left out: as the file says
+        load        force of the hand on the handle (2,) or (3,) [N], about an axis its moment [N m], or a `Load`: the
+                    device is linearised about the haptic equilibrium under it, see `docs/equilibrium.md`. Left out:
+                    as the file says
+        gravity     (2,) or (3,) [m/s^2], with a load or without; left out: as the file says
         Raises  DeviceError   with what cannot be meant for this device, or a mechanism that cannot be assembled or
                               driven as the file says
                 MatrixError   (loop.wall_matrices) for what is no matrix of a wall law
                 PostureError  (model.posture) where a single position has no posture: out of reach, or singular
+                EquilibriumError, LoadError  (model.equilibrium) where a single position has no equilibrium
         """
         from zwidth.loop.operating_point import OperatingPoint
         from zwidth.model.reduction import MODELS
 
-        if operator is not None:
-            held = self.held_by(operator)
-            return held.at(
+        if operator is not None or load is not None or gravity is not None:
+            held = self if operator is None else self.held_by(operator)
+            moment = held.renders_moments(direction, axis, characteristic_length)
+            return held.under(load, gravity, moment=moment).at(
                 position,
                 direction,
                 axis=axis,
@@ -193,6 +205,7 @@ class Device:
             shape = np.broadcast_shapes(posture.status.shape, rendered.shape[:-2])
             posture = posture.broadcast_to(shape)
             rendered = np.broadcast_to(rendered, (*shape, *rendered.shape[-2:]))
+            posture = self._posture_under_load(posture, rendered)
             requested_position = self._requested_position(position)
         return OperatingPoint(
             controller=self.controller,
@@ -212,6 +225,7 @@ class Device:
             name=self.name,
             requested_position=requested_position,
             missing=self.missing,
+            load=self.load,
         )
 
     def plant(self, *arguments: Any, **options: Any) -> Any:
@@ -245,6 +259,20 @@ class Device:
         Raises  DeviceError  with all faults
         """
         return _verbs.device_held_by(self, operator)
+
+    def under(
+        self, load: Load | ArrayLike | None = None, gravity: ArrayLike | None = None, *, moment: bool = False
+    ) -> Device:
+        """The device under another load, about which all that is asked of it is linearised.
+
+            device.under((0.0, -5.0)).chart()
+
+        load     force of the hand on the handle (2,) or (3,) [N], or a `Load`; None: as it is
+        gravity  (2,) or (3,) [m/s^2]; None: as it is
+        moment   whether three numbers are a moment [N m], of a wall about an axis
+        Raises   DeviceError  for what is no load, and for a device without a mechanism
+        """
+        return _verbs.device_under(self, load, gravity, moment)
 
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
         """The stable walls at the device's reference; `device.at(...).chart()` elsewhere. See `chart_at`."""
@@ -346,6 +374,17 @@ class Device:
         rendered = self.direction(direction, axis, characteristic_length)
         return rendered.shape[-1] == 6 and not rendered[..., :3].any()
 
+    def _posture_under_load(self, posture: Posture, directions: Floats) -> Posture:
+        """The postures (...) that the device has under its load, rendering directions (..., 1, 3 or 6)."""
+        if self.load is None or directions.shape[-2] != 1:
+            return posture
+        from zwidth.model.effective_parameters import screw
+        from zwidth.model.loaded_posture import loaded_postures
+
+        assert self.mechanism is not None
+        counts_motors = self.encoders == "motor"
+        return loaded_postures(self.mechanism, posture, screw(directions[..., 0, :]), self.load, counts_motors)
+
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
         """The requested position that a point keeps, so that another device can be put there."""
         from zwidth.model.posture import Posture
@@ -394,7 +433,7 @@ class Device:
     def _posture(
         self, position: Position | ArrayLike | Posture | None, orientation: ArrayLike | None, assembly: str | None
     ) -> Posture:
-        from zwidth.loop.operating_point import PROJECTION_TOLERANCE
+        from zwidth.loop.posed_device import PROJECTION_TOLERANCE
         from zwidth.model.mechanism import POSITION
         from zwidth.model.posture import Posture, place_of_joints, solve_posture
 

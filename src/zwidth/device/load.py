@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from zwidth.device import address, build, unsupported
@@ -14,6 +15,7 @@ from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
+from zwidth.device.load_choice import document_under
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.posture_arguments import screws
@@ -22,6 +24,7 @@ from zwidth.device.schema.device_file import DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
+from zwidth.model.load import Load
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
 
@@ -73,6 +76,14 @@ def device_with_settings(device: Device, settings: Settings) -> Device:
 def device_held_by(device: Device, operator: Operator | str | os.PathLike[str]) -> Device:
     """The device with another operator at its handle; see `Device.held_by`."""
     return from_document(document_held_by(device.document, operator), device.label, skip_assembly_check=True)
+
+
+def device_under(device: Device, load: Load | ArrayLike | None, gravity: ArrayLike | None, moment: bool) -> Device:
+    """The device under another load; see `Device.under`. moment: whether numbers are a moment."""
+    document = document_under(device.document, load, gravity, moment, device.label)
+    return (
+        device if document is device.document else from_document(document, device.label, skip_assembly_check=True)
+    )
 
 
 def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:
@@ -167,6 +178,7 @@ def build_device(
         else None,
         operator=build.operator(checked.operator) if checked.operator else None,
         operator_name=(checked.operator.name or UNNAMED_OPERATOR) if checked.operator else None,
+        load=build.load(checked.load) if checked.load else None,
         encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
     )

@@ -157,7 +157,7 @@ def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
     if nearest(key, allowed) is None:
         elsewhere = [
             section
-            for section in ("loop", "plant", "mechanism", "operator", "friction")
+            for section in ("loop", "plant", "mechanism", "operator", "load", "friction")
             if key in schema.keys((section,))
         ]
         if elsewhere and table != (elsewhere[0],):

@@ -21,6 +21,7 @@ from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.plant_rows import plant_rows
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections, sampled_sections
+from zwidth.loop.sideways import SidewaysMotion, sideways_motions
 from zwidth.model.argument_checks import require
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
@@ -189,10 +190,15 @@ class Loop:
         w = self.estimator
         return np.asarray(factor_response(w.numerator, w.denominator, d) * window_response(w.window, at))
 
+    @cached_property
+    def sideways_motions(self) -> tuple[SidewaysMotion, ...]:
+        """Under load, the motions that no wall moves without it, fastest-growing first; () where they count."""
+        return () if self.plant.apart is None else sideways_motions(self.plant.apart, self.controller)
+
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
-        """Motions that no wall moves, by name; they are cancelled and do not count for stability."""
-        return self.sections.unobserved
+        """Motions that no wall moves, by name; they are cancelled, or stand apart, and do not count for stability."""
+        return self.sections.unobserved + tuple(motion.name for motion in self.sideways_motions)
 
     @cached_property
     def state_space(self) -> StateSpace:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from zwidth.model.load import Load
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.operator import Operator
 from zwidth.model.reduction import Encoders
@@ -45,12 +46,15 @@ class SeveralDirectionsError(OperatingPointError):
         )
 
 
-def check_several_directions(mechanism: Mechanism | None, operator: Operator | None, encoders: Encoders) -> None:
+def check_several_directions(
+    mechanism: Mechanism | None, operator: Operator | None, encoders: Encoders, load: Load | None
+) -> None:
     """Raise SeveralDirectionsError if the device has something that several directions together cannot include."""
     windings = None if mechanism is None else mechanism.drives.winding_damping
     present = {
         "an operator": operator is not None,
         "an encoder on the link": encoders != "motor",
+        "a load": load is not None,
         "electrical damping": windings is not None and bool(windings.any()),
     }
     if any(present.values()):

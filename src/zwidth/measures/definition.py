@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 Better = Literal["higher", "lower"]
 
-# Status of an operating point. OK, OUT_OF_REACH, SINGULAR and BEYOND_LIMIT are those of a posture.
+# Status of an operating point. OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT and NO_EQUILIBRIUM are those of a
+# posture.
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
@@ -27,8 +28,9 @@ NO_VALUE: Final = 3
 UNDECIDED: Final = 4
 FAILED: Final = 5
 BEYOND_LIMIT: Final = 6
+NO_EQUILIBRIUM: Final = 7
 MISSING: Final = 255
-UNREACHED: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT)
+UNREACHED: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT, NO_EQUILIBRIUM)
 STATUS: Final = {
     OK: "ok",
     OUT_OF_REACH: "out of reach",
@@ -37,6 +39,7 @@ STATUS: Final = {
     UNDECIDED: "undecided",
     FAILED: "failed",
     BEYOND_LIMIT: "beyond a joint limit",
+    NO_EQUILIBRIUM: "no equilibrium",
     MISSING: "not computed",
 }
 
@@ -111,7 +114,7 @@ class MeasureValues(Result):
     """A measure's values at operating points of shape (...).
 
     values  (...)  nan where the status is not OK
-    status  (...)  OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT, NO_VALUE, UNDECIDED or FAILED
+    status  (...)  OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT, NO_EQUILIBRIUM, NO_VALUE, UNDECIDED or FAILED
     notes   reasons of NO_VALUE, UNDECIDED and FAILED
     """
 

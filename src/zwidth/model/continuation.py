@@ -37,6 +37,7 @@ from zwidth.model.rotations import fill_rotation, vector_between
 OK: Final = 0
 OUT_OF_REACH: Final = 1
 SINGULAR: Final = 2
+NO_EQUILIBRIUM: Final = 7  # there is a posture, but none that is in balance under the load
 BEYOND_LIMIT: Final = 6  # there is a posture, but in it a joint is beyond its limit
 
 CONTRACTION: Final = 0.55  # of one correction by the next; on the edge of the workspace Newton gains a half each

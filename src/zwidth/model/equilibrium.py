@@ -15,18 +15,21 @@ difference, a small force across the direction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_posture
 from zwidth.model.drive_springs import DriveSprings
-from zwidth.model.load import ALONG, Compensation, Load, LoadError
-from zwidth.model.mechanism import ORIENTATION, POSITION, Floats, Mechanism
+from zwidth.model.load import ALONG, Load, LoadError, vector_text
+from zwidth.model.mechanism import ORIENTATION, POSITION, Compensation, Floats, Mechanism
 from zwidth.model.motions import Motions
+from zwidth.model.posture import Posture
 
 STEPS: Final = 50  # of Newton's method
+RAMP: Final = 16  # steps in which a load is brought on, where it cannot be at once
+LARGEST_STEP: Final = 1.0  # of a deflection [rad], [m]
 SETTLED: Final = 1e-12  # share of the torques by which the balance may be off
 UNBALANCED: Final = 1e-7  # share of the torques that counts as a joint that nothing balances
 
@@ -49,6 +52,7 @@ class Equilibrium:
     deflections    (d,)  by which the motors are ahead of their joints, at the joint [rad]
     torques        (d,)  of the motors, at the joint [N m]
     compensation   how gravity is compensated
+    unbalanced     (c,)  generalised forces that neither hand nor drives balance
     """
 
     load: Load
@@ -63,6 +67,7 @@ class Equilibrium:
     deflections: Floats
     torques: Floats
     compensation: Compensation
+    unbalanced: Floats
 
     @property
     def sideways_force(self) -> Floats:
@@ -96,56 +101,50 @@ def lever_arms_of(motions: Motions, screw: Floats) -> Floats:
 
 
 def solve_equilibrium(
-    mechanism: Mechanism,
-    angles: Floats,
-    screw: Floats,
-    load: Load,
-    compensation: Compensation = "none",
-    counts_motors: bool = True,
+    mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool = True
 ) -> Equilibrium:
     """The equilibrium of one design with its links in a given posture.
 
     mechanism  with the ratios of drives with tables looked up at the posture, and their tables
-    angles     (n,)  joint coordinates of the links
+    posture    of the links, a single one. Springs of free joints are at rest where the assembly has these joints
     screw      (6,)  the rendered direction (`effective_parameters.screw`)
     counts_motors  whether the encoders are on the motors, or on the links behind the drives
-    Raises     EquilibriumError  where nothing balances a joint, or the drives' springs cannot hold the load
+    Raises     EquilibriumError  where nothing balances a joint, or drives and their springs cannot hold the load
                LoadError         for a load across the direction that nothing holds
     """
-    motions = Motions(mechanism, angles)
-    return _Balance(mechanism, angles, screw, load, compensation, counts_motors, motions).solve()
+    balance = Balance(mechanism, posture, screw, load, counts_motors)
+    found = balance.solve()
+    balance.check(found)
+    return found
 
 
-class _Balance:
-    """The search for the deflections and the wall's force."""
+class Balance:
+    """The search for the deflections and the wall's force of one posture."""
 
     def __init__(
-        self,
-        mechanism: Mechanism,
-        angles: Floats,
-        screw: Floats,
-        load: Load,
-        compensation: Compensation,
-        counts_motors: bool,
-        motions: Motions,
+        self, mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool
     ) -> None:
-        self.mechanism, self.angles, self.screw, self.load = mechanism, angles, screw, load
-        self.compensation, self.counts_motors, self.motions = compensation, counts_motors, motions
+        self.mechanism, self.angles, self.screw, self.load = mechanism, posture.angles, screw, load
+        self.counts_motors, self.motions = counts_motors, Motions(mechanism, posture.angles)
         self.ratio = np.asarray(mechanism.drives.transmission)
-        self.drives = DriveMotion.of(mechanism, motions, angles, self.ratio)
+        self.drives = DriveMotion.of(mechanism, self.motions, posture.angles, self.ratio)
         self.springs = DriveSprings.of(mechanism.drives)
         self.flexible = self.springs.flexible
-        self.gravity = np.zeros(3) if compensation == "counterweight" else load.weight
-        self.weight = motions.weight(self.gravity)[0]
+        self.compensation = mechanism.gravity_compensation
+        self.gravity = np.zeros(3) if self.compensation == "counterweight" else load.weight
+        self.weight = self.motions.weight(self.gravity)[0]
+        self.free_springs = self._free_springs(mechanism.assemblies[posture.assembly])
         self.along = screw[:3] if np.any(screw[:3]) else screw[3:]
         self.to_wrench = self._wrench_of_torques()
-        given = None if load.force is None else float(load.force @ self.along) / float(self.along @ self.along)
-        if load.force is not None and not abs(given or 0.0) > ALONG * float(np.linalg.norm(load.force)):
-            raise LoadError(
-                f"the load {_numbers(load.force)} does not push along the rendered direction {_numbers(self.along)}, "
-                "where the wall would hold it; choose a load with a part along the direction"
-            )
-        self.normal = given
+        self.normal = load.along(screw)
+
+    def _free_springs(self, rest: Floats) -> Floats:
+        """Torques (c,) of the free joints' own springs."""
+        torques, stiffness = np.zeros(self.motions.count), self.mechanism.links.joint_stiffness
+        for i, link in enumerate(self.mechanism.free if stiffness is not None else ()):
+            assert stiffness is not None
+            torques[len(self.mechanism.driven) + i] = -stiffness[link] * (self.angles[link] - rest[link])
+        return torques
 
     def _wrench_of_torques(self) -> Floats:
         """(6, c): the hand's force and moment that balance generalised forces (c,), the least that do."""
@@ -163,35 +162,50 @@ class _Balance:
         return rows
 
     def solve(self) -> Equilibrium:
-        """Newton's method for the deflections of the flexible drives and the wall's force."""
-        ahead, f = np.zeros(len(self.ratio)), -(self.normal or 0.0)
-        for _ in range(STEPS):
-            counted = self._counted(ahead)
-            torques, unit = command_of(counted, self.screw, self._compensated(counted), f)
-            s = self._spring_torques(ahead, torques)
-            off, jacobian = self._equations(ahead, counted, torques, unit, s, f)
-            size = float(np.max(np.abs(s), initial=0.0))
-            step = np.linalg.solve(jacobian, off)
-            if np.max(np.abs(off), initial=0.0) <= SETTLED * max(size, abs(f)):
-                return self._result(ahead, counted, torques, s, f)
-            if not np.isfinite(step).all():
+        """The deflections of the flexible drives and the wall's force; where the whole load at once leads nowhere, it
+        is brought on in steps."""
+        start = np.zeros(len(self.ratio)), 0.0
+        found = self._newton(1.0, *start)
+        for step in range(1, RAMP + 1) if found is None else ():
+            found = self._newton(step / RAMP, *start)
+            if found is None:
                 break
+            start = found.deflections, found.wall_force
+        if found is None:
+            raise EquilibriumError(self._not_held())
+        return found
+
+    def _newton(self, share: float, ahead: Floats, f: float) -> Equilibrium | None:
+        """The equilibrium under a share of load and gravity, from deflections and a wall's force near it."""
+        ahead = ahead.copy()
+        for _ in range(STEPS):
+            counted = counted_posture(
+                self.mechanism, self.angles, ahead if self.counts_motors else np.zeros_like(ahead), self.ratio
+            )
+            if counted is None:
+                return None
+            weight = share * self._compensated(counted)
+            torques, unit = command_of(counted, self.screw, weight, f)
+            s = torques.copy()  # what each drive hands on to its joint
+            s[self.flexible] = self.springs.torque(ahead)[self.flexible]
+            off, jacobian = self._equations(share, ahead, counted, torques, unit, s, f)
+            size = float(np.max(np.abs(s), initial=0.0))
+            if np.max(np.abs(off), initial=0.0) <= SETTLED * max(size, abs(f)):
+                return self._result(share, ahead, counted, torques, s, f)
+            with np.errstate(all="ignore"):
+                try:
+                    step = np.linalg.solve(jacobian, off)
+                except np.linalg.LinAlgError:
+                    return None
+            if not np.max(np.abs(step[: len(self.flexible)]), initial=0.0) < LARGEST_STEP:
+                return None
             ahead[self.flexible] -= step[: len(self.flexible)]
             f -= step[-1] if self.normal is not None else 0.0
-        raise EquilibriumError(self._not_held())
-
-    def _counted(self, ahead: Floats) -> CountedPosture:
-        counted = counted_posture(
-            self.mechanism, self.angles, ahead if self.counts_motors else np.zeros_like(ahead), self.ratio
-        )
-        if counted is None:
-            raise EquilibriumError(self._not_held())
-        return counted
+        return None
 
     def _not_held(self) -> str:
-        what = "gravity" if self.load.force is None else f"a load of {_numbers(self.load.force)}"
         return (
-            f"no equilibrium was found under {what}: the springs of the drives bend further than the device can move; "
+            f"no equilibrium was found under {self.load.text}: the springs of the drives bend further than the device can move; "
             "is the load too large, or a stiffness too small?"
         )
 
@@ -200,19 +214,20 @@ class _Balance:
             return np.zeros(self.motions.count)
         return counted.motions.weight(self.gravity)[0]
 
-    def _spring_torques(self, ahead: Floats, torques: Floats) -> Floats:
-        """What each drive hands on to its joint: a rigid one the motor's torque."""
-        s = torques.copy()
-        s[self.flexible] = self.springs.torque(ahead)[self.flexible]
-        return s
-
     def _equations(
-        self, ahead: Floats, counted: CountedPosture, torques: Floats, unit: Floats, s: Floats, f: float
+        self,
+        share: float,
+        ahead: Floats,
+        counted: CountedPosture,
+        torques: Floats,
+        unit: Floats,
+        s: Floats,
+        f: float,
     ) -> tuple[Floats, Floats]:
         """What the balance of the flexible drives, and of the load along the direction, is off by, and the
         derivative of both."""
         F, count = self.flexible, len(self.flexible)
-        turning = command_change(counted, self.screw, self.gravity, self.compensation, f)
+        turning = command_change(counted, self.screw, share * self.gravity, self.compensation, f)
         by_ahead = turning[:, F] if self.counts_motors else np.zeros((len(s), count))
         tangent = np.zeros((len(s), count))
         tangent[F] = np.diag(self.springs.tangent(ahead, self.load.branch == "backward")[F])
@@ -227,54 +242,84 @@ class _Balance:
         by_spring = row @ self.drives.T.T
         s_by_ahead, s_by_force = by_ahead.copy(), unit.copy()
         s_by_ahead[F], s_by_force[F] = tangent[F], 0.0
-        off = np.append(off, row @ self.weight + by_spring @ s - self.normal)
+        off = np.append(off, row @ self._borne(share, s) - share * self.normal)
         column = np.append(-unit[F], by_spring @ s_by_force)
         return off, np.column_stack([np.vstack([jacobian, by_spring @ s_by_ahead]), column])
 
-    def _result(self, ahead: Floats, counted: CountedPosture, torques: Floats, s: Floats, f: float) -> Equilibrium:
-        borne = self.weight + self.drives.T.T @ s
-        wrench = -(self.to_wrench @ borne)
-        self._check_balance(wrench, borne, s)
-        found = Equilibrium(
-            self.load, self.screw, self.motions, self.drives, counted, self.springs,
-            float(f), wrench[:3], wrench[3:], ahead, torques, self.compensation,
-        )  # fmt: skip
-        self._check_across(found)
-        return found
+    def _borne(self, share: float, s: Floats) -> Floats:
+        """Generalised forces (c,) on the links but for the hand's."""
+        return np.asarray(share * self.weight + self.free_springs + self.drives.T.T @ s)
 
-    def _check_balance(self, wrench: Floats, borne: Floats, s: Floats) -> None:
-        """Raise EquilibriumError where the hand cannot balance a coordinate."""
-        handle = self.motions.handle
+    def _result(
+        self, share: float, ahead: Floats, counted: CountedPosture, torques: Floats, s: Floats, f: float
+    ) -> Equilibrium:
+        borne = self._borne(share, s)
+        wrench, handle = -(self.to_wrench @ borne), self.motions.handle
         left = borne + wrench[:3] @ handle.speed + wrench[3:] @ handle.spin
+        return Equilibrium(
+            load=self.load,
+            screw=self.screw,
+            motions=self.motions,
+            drives=self.drives,
+            counted=counted,
+            springs=self.springs,
+            wall_force=float(f),
+            hand_force=wrench[:3],
+            hand_moment=wrench[3:],
+            deflections=ahead,
+            torques=torques,
+            compensation=self.compensation,
+            unbalanced=left,
+        )
+
+    def check(self, found: Equilibrium) -> None:
+        """Raise EquilibriumError or LoadError where drives, hand or wall do not hold what they would have to."""
+        self._check_balance(found)
+        self._check_torques(found.torques)
+        self._check_across(found)
+
+    def _check_balance(self, found: Equilibrium) -> None:
+        """Raise EquilibriumError where the hand cannot balance a coordinate."""
+        left, count = found.unbalanced, self.motions.count
         scale = max(
             float(np.max(np.abs(self.weight), initial=0.0)),
-            float(np.max(np.abs(self.drives.T.T) @ np.abs(s), initial=0.0)),
-            float(np.max(np.abs(wrench[:3]) @ np.abs(handle.speed), initial=0.0)),
+            float(np.max(np.abs(self.drives.T.T) @ np.abs(found.torques), initial=0.0)),
+            float(np.max(np.abs(self.free_springs), initial=0.0)),
         )
         loose = np.flatnonzero(np.abs(left) > UNBALANCED * scale)
-        if len(loose):
-            k = len(self.mechanism.driven)
-            names = [
-                self.mechanism.links.names[self.motions.unknowns[len(self.motions.unknowns) - len(left) + i]]
-                for i in loose
-            ]
-            what = "free joint" if np.all(loose >= k) else "joint"
+        if not len(loose):
+            return
+        unknowns = self.motions.unknowns[len(self.motions.unknowns) - count :]
+        name = self.mechanism.links.names[unknowns[loose[0]]]
+        what = "free joint" if loose[0] >= len(self.mechanism.driven) else "joint"
+        raise EquilibriumError(
+            f"nothing balances {abs(float(left[loose[0]])):.4g} N m at the {what} {name!r}, neither a drive nor the "
+            "hand at the handle; give the joint a spring, compensate gravity, or ask for another posture"
+        )
+
+    def _check_torques(self, torques: Floats) -> None:
+        """Raise EquilibriumError where a motor cannot give its torque."""
+        limits = self.mechanism.drives.torque_limit
+        wanted = np.abs(torques) / self.ratio
+        over = np.flatnonzero(wanted > limits)
+        if len(over):
+            i = int(over[np.argmax(wanted[over] / limits[over])])
             raise EquilibriumError(
-                f"nothing balances {float(left[loose[0]]):.4g} N m at the {what} {names[0]!r}, neither a drive nor the "
-                "hand at the handle; give the joint a spring, compensate gravity, or ask for another posture"
+                f"under this load drive {self.mechanism.drives.names[i]!r} needs {wanted[i]:.4g} N m at its motor, "
+                f"more than its limit of {limits[i]:.4g} N m; choose a smaller load, or another posture"
             )
 
     def _check_across(self, found: Equilibrium) -> None:
         """Raise LoadError where the load asks for another force across the direction than the posture needs."""
-        force = self.load.force
+        force = self.load.force if np.any(self.screw[:3]) else self.load.moment
         if force is None or self.load.settle:
             return
         across = force - (force @ self.along) / float(self.along @ self.along) * self.along
         off, needed = np.linalg.norm(across - found.sideways_force), found.sideways_force
         if np.any(np.abs(across) > ALONG * np.linalg.norm(force)) and off > UNBALANCED * np.linalg.norm(force):
             raise LoadError(
-                f"the load {_numbers(force)} has a part {_numbers(across)} across the rendered direction, where the wall "
-                f"does not hold it, and this posture needs {_numbers(needed)}; give the part along the direction "
+                f"the load {vector_text(force)} has a part {vector_text(across)} across the rendered direction, where the wall "
+                f"does not hold it, and this posture needs {vector_text(needed)}; give the part along the direction "
                 "alone, or ask with settle for the posture in which this load is in balance"
             )
 
@@ -303,7 +348,3 @@ def command_change(
     turned = np.einsum("ist,s->it", Z, x)
     inner = np.einsum("ist,i->st", Z, T @ x) + T.T @ turned
     return np.asarray((turned + T @ (G @ (change - inner))) @ counted.seen)
-
-
-def _numbers(values: Floats) -> str:
-    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"

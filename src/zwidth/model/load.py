@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Final, Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.mechanism import Floats
 
 HandForce = Literal["dead", "follower"]
 PostureOf = Literal["handle", "motors"]
-Compensation = Literal["none", "computed", "counterweight"]
 ALONG: Final = 1e-9  # share of a load across the rendered direction that is rounding
 
 
@@ -25,8 +25,10 @@ class LoadError(ValueError):
 class Load:
     """The forces about whose balance, the haptic equilibrium, a device is linearised (thesis eq. 2.4).
 
-    force         (3,)  of the hand on the handle [N], about an axis its moment [N m]; None: the wall is at rest,
-                  without force, and the hand only holds the device
+    force         (3,)  of the hand on the handle [N]
+    moment        (3,)  of the hand instead, where moments about an axis are rendered [N m]
+    push          instead of either: its part along the rendered direction, whichever that is, of either sign [N]. With
+                  none of the three the wall is at rest, without force, and the hand only holds the device
     gravity       (3,)  [m/s^2]
     hand          "dead": the hand's force keeps its direction in space as the device moves; "follower": it turns
                   with the handle's link
@@ -39,10 +41,13 @@ class Load:
     count_sideways  whether the motions that no wall moves without load count for stability, too
     branch        of springs whose torque is 0 where their stiffness changes: "forward", the motor ahead, or "backward"
 
-    Raises  LoadError for a force of 0, numbers that are not finite, a radius of 0, or an unknown word
+    Raises  LoadError  for a force of 0, numbers that are not finite, a radius of 0, several forces
+            ValueError for an unknown word
     """
 
     force: Floats | None = None
+    moment: Floats | None = None
+    push: float | None = None
     gravity: Floats | None = None
     hand: HandForce = "dead"
     posture_of: PostureOf = "handle"
@@ -53,15 +58,23 @@ class Load:
 
     def __post_init__(self) -> None:
         """Make lists arrays (3,) and check them."""
-        for name, unit in (("force", "N"), ("gravity", "m/s^2")):
+        for name, unit in (("force", "N"), ("moment", "N m"), ("gravity", "m/s^2")):
             given = getattr(self, name)
             if given is None:
                 continue
-            vector = np.asarray(given, dtype=np.float64)
+            try:
+                vector = np.asarray(given, dtype=np.float64)
+            except (TypeError, ValueError):
+                vector = np.zeros(0)
             if vector.shape not in ((2,), (3,)) or not np.isfinite(vector).all():
                 raise LoadError(f"{name} must be two or three finite numbers [{unit}], got {given!r}")
             object.__setattr__(self, name, np.append(vector, np.zeros(3 - len(vector))))
-        if self.force is not None and not np.any(self.force):
+        given = [name for name in ("force", "moment", "push") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise LoadError(f"{given[1]} is given beside {given[0]}; give one of them")
+        if self.push is not None and not isfinite(self.push):
+            raise LoadError(f"push must be a finite number [N], got {self.push!r}")
+        if given and not np.any(getattr(self, given[0])):
             raise LoadError(
                 "a load of 0 N leaves a one-sided wall at the edge of contact, where nothing is linear; leave it out "
                 "for the chart of the two-sided wall, or give the force with which the hand leans on the wall"
@@ -78,3 +91,61 @@ class Load:
     def weight(self) -> Floats:
         """Gravity (3,), 0 where there is none [m/s^2]."""
         return np.zeros(3) if self.gravity is None else self.gravity
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the hand leans on the wall."""
+        return self.force is not None or self.moment is not None or self.push is not None
+
+    @property
+    def text(self) -> str:
+        """The load in words: "a push of (0, -5, 0) N, gravity (0, 0, -9.81) m/s²"."""
+        parts = []
+        for what, vector, unit in (
+            ("a push of", self.force, "N"),
+            ("a moment of", self.moment, "N m"),
+            ("gravity", self.gravity, "m/s²"),
+        ):
+            if vector is not None:
+                parts.append(f"{what} {vector_text(vector)} {unit}")
+        if self.push is not None:
+            parts.insert(0, f"a push of {self.push:g} N along the direction")
+        return ", ".join(parts) or "no force"
+
+    def along(self, screw: Floats) -> float | None:
+        """The hand's push along a rendered direction (6,) [N], about an axis [N m]; None: the wall is at rest.
+
+        Raises  LoadError  for a load that does not push along it
+        """
+        if self.push is not None:
+            return float(self.push)
+        linear = bool(np.any(screw[:3]))
+        given, way = (self.force, screw[:3]) if linear else (self.moment, screw[3:])
+        other = self.moment if linear else self.force
+        if other is not None:
+            wanted, unit = ("force", "N") if linear else ("moment", "N m")
+            raise LoadError(
+                f"the wall is rendered along {_way(linear)}; give the load as a {wanted} [{unit}], or push"
+            )
+        if given is None:
+            return None
+        along = float(given @ way) / float(way @ way)
+        if not abs(along) * float(np.linalg.norm(way)) > ALONG * float(np.linalg.norm(given)):
+            raise LoadError(
+                f"the load {vector_text(given)} does not push along the rendered direction {vector_text(way)}, where "
+                "the wall would hold it; choose one with a part along the direction"
+            )
+        return along
+
+    def with_gravity(self, gravity: ArrayLike) -> Load:
+        """The same load under another gravity."""
+        return replace(self, gravity=np.asarray(gravity, dtype=np.float64))
+
+
+def vector_text(values: Floats) -> str:
+    """A vector in words, "(0, -5, 0)"."""
+    return "(" + ", ".join(f"{x + 0.0:.6g}" for x in np.round(values, 12)) + ")"
+
+
+def _way(linear: bool) -> str:
+    return "a direction" if linear else "an axis"

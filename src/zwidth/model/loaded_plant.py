@@ -49,12 +49,12 @@ def linearise(
     equilibrium: Equilibrium,
     damping: Damping,
     encoders: Encoders,
-    axis: Floats,
 ) -> LoadedPlants:
     """The full model of one design in one posture at its equilibrium.
 
-    mechanism  that of the equilibrium;   axis (6,) the rendered direction
+    mechanism  that of the equilibrium
     """
+    axis = equilibrium.screw
     drives = mechanism.drives
     tangent = equilibrium.springs.tangent(equilibrium.deflections, equilibrium.load.branch == "backward")
     bent = replace(

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ from zwidth.model.ratio_table import RatioTable
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+Compensation = Literal["none", "computed", "counterweight"]
 
 FIXED: Final = 0
 REVOLUTE: Final = 1
@@ -199,6 +201,8 @@ class Mechanism:
     reference_rotation  (..., 3, 3)  axes of the handle in the base frame at the reference; None: where the
                   assembly has them, which only a mechanism that controls the position alone may leave open
     free          (f,)         links whose joint coordinate nobody drives and no loop determines
+    gravity_compensation       "none"; "computed", by the computer, from the posture that it counts; "counterweight",
+                  by masses or springs that balance the links in every posture
     """
 
     links: Links
@@ -213,6 +217,7 @@ class Mechanism:
     controls: int = POSITION
     reference_rotation: Array2 | None = None
     free: tuple[int, ...] = ()
+    gravity_compensation: Compensation = "none"
 
     @cached_property
     def driven(self) -> Ints:

@@ -15,6 +15,7 @@ from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import (
     ASSEMBLY_TOLERANCE,
     BEYOND_LIMIT,
+    NO_EQUILIBRIUM,
     OK,
     OUT_OF_REACH,
     SINGULAR,
@@ -49,6 +50,7 @@ from zwidth.model.rotations import rotation_matrix, rotation_vector
 
 __all__ = [
     "BEYOND_LIMIT",
+    "NO_EQUILIBRIUM",
     "OK",
     "OUT_OF_REACH",
     "SINGULAR",
@@ -81,7 +83,7 @@ class Posture:
     assembly          name of the assembly
     position          (..., 3)     handle [m]; where not OK the requested one
     projected         (...)        distance from the requested position [m]; 0 unless it was projected
-    status            (...)        OK, OUT_OF_REACH, SINGULAR or BEYOND_LIMIT; where not OK the numbers below are
+    status            (...)        OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT or NO_EQUILIBRIUM; where not OK the numbers below are
                       nan
     angles            (..., n)     joint coordinates, 0 for fixed joints [rad], of prismatic joints [m]
     mass_matrix       (..., c, c)  M of the links in the independent coordinates [kg m^2]: the driven joints, then

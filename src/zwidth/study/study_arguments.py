@@ -21,7 +21,7 @@ from zwidth.study.study_file import axis_operators
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from zwidth.loop.operating_point import Position
+    from zwidth.loop.posed_device import Position
 
 LABEL: Final = "sweep"
 VECTORS: Final = ("at", "direction")  # of which each value is a list

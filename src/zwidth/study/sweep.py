@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from zwidth.loop.operating_point import Position
+    from zwidth.loop.posed_device import Position
 
 NO_DESIGN: Final = "no design has a value"
 SHOWN: Final = 3  # columns of a repr

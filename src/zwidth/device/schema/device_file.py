@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 from pydantic import BeforeValidator, ConfigDict
 
 from zwidth.device.schema.friction import FrictionSection
+from zwidth.device.schema.load import LoadSection
 from zwidth.device.schema.loop import LoopSection
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.schema.operator import OperatorSection
@@ -55,6 +56,9 @@ class DeviceFile(Section):
     response: ResponseSection | None = documented_key("a measured response, in place of either", default=None)
     loop: LoopSection = documented_key("what the computer does")
     friction: FrictionSection | None = documented_key("dry friction of a [plant]; omitted: none", default=None)
+    load: LoadSection | None = documented_key(
+        "what the device bears while it renders; omitted: nothing", default=None
+    )
     operator: OperatorSection | None = documented_key(
         "the arm and grasp at the handle; omitted: nobody", default=None
     )

@@ -418,6 +418,12 @@ class MechanismSection(Section):
     damping: DampingSection | None = documented_key(
         "structural damping, one of the three ways; omitted only where no drive is flexible", default=None
     )
+    gravity_compensation: Literal["none", "computed", "counterweight"] = documented_key(
+        'how gravity is compensated under a load with gravity: "none"; "computed", by torques that the computer works '
+        'out from the posture that it counts; "counterweight", by masses or springs that balance the links in every '
+        "posture",
+        default="none",
+    )
     friction: DriveFrictionSection = documented_key(
         "how the dry friction of the drives, coulomb_Nm, grips",
         default=DriveFrictionSection(

@@ -80,11 +80,12 @@ class Question:
 
         instead = {
             "an operator": "use --operator none",
+            "a load": "leave out --load and --gravity, and [load]",
             "an encoder on the link": "use --set loop.encoder.at=motor",
             "electrical damping": "unset damping_resistance_ohm",
         }
         try:
-            check_several_directions(device.mechanism, device.operator, device.encoders)
+            check_several_directions(device.mechanism, device.operator, device.encoders, device.load)
         except SeveralDirectionsError as error:
             several = "is not supported over several directions"
             lines = [

@@ -1,0 +1,244 @@
+"""The posture that a device takes under load, from the one that is asked for.
+
+The posture asked for is that of the handle, and the load changes nothing of it but where free joints hang. Or it is
+that of the motors as the computer counts them; then the handle gives way by the bending of the drives. Or the device
+settles: it slides along the surface to where the hand's force, as it is given, is in balance. A free joint turns to
+where gravity and its spring leave it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.compiled import compiled
+from zwidth.model.closed_posture import moved_posture
+from zwidth.model.closure import equations, passive_rates
+from zwidth.model.design_axes import change_designs
+from zwidth.model.equilibrium import Balance, EquilibriumError
+from zwidth.model.forward_kinematics import link_point, place_links, working_memory
+from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
+from zwidth.model.load import Load, LoadError
+from zwidth.model.mechanism import BALL_X, POSITION, Floats, Mechanism
+from zwidth.model.mechanism_arrays import MechanismArrays, pack
+from zwidth.model.motions import Motions
+from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
+from zwidth.model.ratio_table import drives_at
+
+STEPS: Final = 40  # of Newton's method
+SETTLED: Final = 1e-11  # share of the largest force, or of the mechanism's size, that counts as balance
+PROBE: Final = 1e-6  # by which joints are moved for a derivative [rad], [m]
+LARGEST_STEP: Final = 0.5  # of Newton's method [rad], [m]
+
+
+def loaded_postures(
+    mechanism: Mechanism, posture: Posture, screws: Floats, load: Load, counts_motors: bool
+) -> Posture:
+    """The postures under load of postures (...) without it, one by one; designs broadcast with them.
+
+    screws   (..., 6)  rendered directions
+    Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM
+    Raises   EquilibriumError, LoadError  for a single posture without one
+    """
+    if not posture.status.shape:
+        return _loaded(mechanism, posture, screws, load, counts_motors)
+    changed, shape = posture.with_axes(np.array), posture.status.shape
+    for index in np.ndindex(shape):
+        if posture.status[index] != OK:
+            continue
+
+        def single(array: NDArray[Any], index: tuple[int, ...] = index) -> NDArray[Any]:
+            return np.asarray(array[index])
+
+        try:
+            own = change_designs(mechanism, single, shape)
+            one = _loaded(own, posture.with_axes(single), screws[index], load, counts_motors)
+        except EquilibriumError:
+            changed.status[index] = NO_EQUILIBRIUM
+            for array in (changed.angles, changed.mass_matrix, changed.jacobian, changed.angular_jacobian):
+                array[index] = np.nan
+            continue
+        for name in ("position", "angles", "mass_matrix", "jacobian", "angular_jacobian"):
+            getattr(changed, name)[index] = getattr(one, name)
+    return changed
+
+
+def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool) -> Posture:
+    """The posture of one design under load."""
+    tables = mechanism.drives.ratio_tables
+
+    def balance(at: Posture) -> Balance:
+        posed = replace(mechanism, drives=replace(drives_at(mechanism.drives, at), ratio_tables=tables))
+        return Balance(posed, at, screw, load, counts_motors)
+
+    at = posture
+    for _ in range(STEPS):  # each of the three hangs on the others by the load's own small changes
+        before = at.angles
+        if mechanism.free:
+            at = _hung(mechanism, at, balance)
+        if load.posture_of == "motors":
+            at = _behind_motors(mechanism, posture, at, balance)
+        if load.settle:
+            at = _settled(mechanism, at, screw, load, balance)
+        if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
+            break
+    final = balance(at)
+    final.check(final.solve())
+    return at
+
+
+def _behind_motors(
+    mechanism: Mechanism, asked: Posture, at: Posture, balance: Callable[[Posture], Balance]
+) -> Posture:
+    """The links' posture where the motors count the one that is asked for: behind it by the bending of the drives."""
+    k, c = len(mechanism.driven), Motions(mechanism, asked.angles).count
+    for _ in range(STEPS):
+        found = balance(at).solve()
+        away = asked.angles[mechanism.driven] - found.counted.angles[mechanism.driven]
+        if np.max(np.abs(away), initial=0.0) <= SETTLED:
+            return at
+        coordinates = found.motions.mech.to_drive[0, :k, :k] @ away
+        at = _moved(mechanism, at, np.append(coordinates, np.zeros(c - k)))
+    raise EquilibriumError(
+        "no posture was found whose motors stand where they were asked to: the load bends the drives too far; choose "
+        "a smaller load"
+    )
+
+
+def _settled(
+    mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balance: Callable[[Posture], Balance]
+) -> Posture:
+    """The posture, with its handle on the same surface, in which the load as it is given is in balance."""
+    assert load.force is not None
+    if mechanism.controls != POSITION or not np.any(screw[:3]) or np.any(screw[3:]):
+        raise LoadError("settle is for loads on a handle whose position the drives control; leave it out")
+    k, u, force, start = len(mechanism.driven), screw[:3], load.force, at
+    motions = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
+    reached = motions[0][:, motions[1] > 1e-9 * motions[1][0]]
+    across = np.linalg.svd(np.column_stack([u, reached]), full_matrices=False)[0]
+    across = across - np.outer(u, u @ across)
+    across = np.linalg.svd(across, full_matrices=False)[0][:, : reached.shape[1] - 1]
+    size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
+
+    def off(there: Posture) -> Floats:
+        hand = balance(there).solve().hand_force
+        return np.append(across.T @ (hand - force) / strength, u @ (there.position - start.position) / size)
+
+    found = _newton(mechanism, at, off, np.arange(k), SETTLED)
+    if found is None:
+        left = balance(at).solve().hand_force - force
+        raise EquilibriumError(
+            f"no posture was found near this one in which the load alone is in balance: here the hand has to supply "
+            f"{float(np.linalg.norm(across.T @ left)):.4g} N more across the direction; leave settle out, which keeps "
+            "the posture and lets the hand supply it"
+        )
+    return found
+
+
+def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balance]) -> Posture:
+    """The posture with free joints where gravity, their springs and the load leave them."""
+    k, count = len(mechanism.driven), len(mechanism.free)
+
+    def off(there: Posture) -> Floats:
+        own = balance(there)
+        scale = max(
+            float(np.max(np.abs(own.weight), initial=0.0)), float(np.max(np.abs(own.free_springs), initial=0.0))
+        )
+        return np.asarray(own.solve().unbalanced[k:] / (scale or 1.0))
+
+    if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
+        return at
+    names = [mechanism.links.names[i].partition("/")[0] for i in mechanism.free]
+    if any(mechanism.links.joint[i] >= BALL_X for i in mechanism.free):
+        raise EquilibriumError(
+            f"where the free ball joint {names[0]!r} would hang under this load is not searched for; place its centre "
+            "of mass at the joint, or leave gravity out"
+        )
+    found = _newton(mechanism, at, off, np.arange(k, k + count), SETTLED)
+    if found is None:
+        raise EquilibriumError(
+            f"no place was found where the free joint {names[0]!r} is in balance under this load; give it a spring, or "
+            "another angle in the assembly"
+        )
+    return found
+
+
+def _newton(
+    mechanism: Mechanism,
+    at: Posture,
+    off: Callable[[Posture], Floats],
+    moved: NDArray[np.int64],
+    settled: float,
+) -> Posture | None:
+    """The posture near `at` in which `off` (m,) is 0, as m of the independent coordinates move; None if there is none
+    to be found."""
+    c = at.jacobian.shape[-1]
+    for _ in range(STEPS):
+        try:
+            value = off(at)
+            if np.max(np.abs(value), initial=0.0) <= settled:
+                return at
+            columns = [
+                (
+                    off(_moved(mechanism, at, PROBE * np.eye(c)[i]))
+                    - off(_moved(mechanism, at, -PROBE * np.eye(c)[i]))
+                )
+                / (2.0 * PROBE)
+                for i in moved
+            ]
+            step = np.zeros(c)
+            step[moved] = -np.linalg.solve(np.array(columns).T, value)
+            if not np.max(np.abs(step)) < LARGEST_STEP:
+                return None
+            at = _moved(mechanism, at, step)
+        except (EquilibriumError, np.linalg.LinAlgError):
+            return None
+    return None
+
+
+def _moved(mechanism: Mechanism, at: Posture, step: Floats) -> Posture:
+    """The posture after a step (c,) of the independent coordinates."""
+    angles = moved_posture(mechanism, at.angles, step)
+    if angles is None:
+        raise EquilibriumError("under this load the device would leave its workspace; choose a smaller load")
+    mech, c = pack(mechanism), len(step)
+    mass, jacobian, angular = np.empty((1, c, c)), np.empty((1, 3, c)), np.empty((1, 3, c))
+    position, turn = np.empty(3), np.empty((3, 3))
+    _describe(mech, angles, mass, jacobian, angular, position, turn)
+    return replace(
+        at,
+        angles=angles,
+        position=position,
+        mass_matrix=mass[0],
+        jacobian=jacobian[0],
+        angular_jacobian=angular[0],
+        rotation=None if at.rotation is None else turn,
+    )
+
+
+@compiled
+def _describe(
+    mech: MechanismArrays,
+    angles: Floats,
+    mass: Floats,
+    jacobian: Floats,
+    angular: Floats,
+    position: Floats,
+    turn: Floats,
+) -> None:
+    """Mass matrix, Jacobians, and place of the handle at joint coordinates (n,)."""
+    work = working_memory(mech)
+    place_links(mech, 0, angles, work)
+    equations(mech, 0, work)
+    passive_rates(mech, 0, work)
+    unit_motions(mech, work)
+    mass_matrix(mech, 0, work, mass, 0)
+    handle_jacobian(mech, 0, work, jacobian, angular, 0)
+    position[0], position[1], position[2] = link_point(
+        work.rotation, work.origin, mech.handle_link, mech.handle, 0, 0
+    )
+    turn[:] = work.rotation[mech.handle_link] @ mech.handle_rotation[0]
