@@ -18,6 +18,7 @@ COULOMB: Final = 0
 BRISTLES: Final = 1
 SPRING: Final = 2
 VARYING: Final = 3
+SAMPLED: Final = 4  # a force of the computer beside the wall's, which stands in the memory
 
 
 @compiled_inline
@@ -43,6 +44,8 @@ def element_force(
         return bristle_force(memory[e, 0], law, v0, v1, mobility, h)[0]
     if kind == SPRING:
         return bent_spring_force(numbers[d, e, 0], numbers[d, e, 1], q0, q1, shift)
+    if kind == SAMPLED:
+        return float(memory[e, 0])
     if kind == VARYING:
         return varying_force(memory[e, 0], memory[e, 1], memory[e, 2], q0, q1, shift, h)
     return 0.0

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SPRING
+from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING
 from zwidth.contact.engine_arrays import (
     ACTUATOR,
     BRAKES,
@@ -123,6 +123,8 @@ def enter_substep(
             entries[FRICTION] += work
         elif kind == SPRING:
             entries[SPRINGS] += work
+        elif kind == SAMPLED:
+            entries[ACTUATOR] += work
         elif devices.numbers[d, e, 0] == BRAKE:
             entries[BRAKES] += work
         else:

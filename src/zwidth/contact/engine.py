@@ -25,7 +25,7 @@ from zwidth.contact.computer import (
     send,
     signals_of,
 )
-from zwidth.contact.elements import COULOMB, VARYING
+from zwidth.contact.elements import COULOMB, SAMPLED, VARYING
 from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_substep, new_ledger
 from zwidth.contact.engine_arrays import (
     FORCE,
@@ -143,6 +143,33 @@ def advance_substeps(
 
 
 @compiled_inline
+def sample_forces(devices: PlantArrays, d: int, computer: Computer, added: Signals, states: Floats) -> None:
+    """At a sample: the commands of the forces that the computer adds under load, on their way from now on."""
+    for e in range(devices.kind.shape[1]):
+        if devices.kind[d, e] == SAMPLED:
+            signal = 0.0
+            for k in range(devices.size[d]):
+                signal += devices.reading[d, e, k] * states[k]
+            if devices.numbers[d, e, 0] != 0.0:
+                signal = filter_force(computer, added, e, signal)
+            send(added, e, signal)
+
+
+@compiled_inline
+def step_sampled_forces(
+    devices: PlantArrays, d: int, computer: Computer, added: Signals, new: int, h: float, memory: Floats
+) -> None:
+    """Over a substep: what those that have arrived are worth on the average, behind the actuator's lag; into memory
+    (E, 4): the mean, and the force at the substep's end."""
+    for e in range(devices.kind.shape[1]):
+        if devices.kind[d, e] == SAMPLED:
+            wanted, lag, now = arrived_command(computer, added, e, new), devices.numbers[d, e, 1], memory[e, 1]
+            fade = np.exp(-h / lag) if lag > 0.0 else 0.0
+            memory[e, 0] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
+            memory[e, 1] = wanted + (now - wanted) * fade
+
+
+@compiled_inline
 def advance_interval(
     devices: PlantArrays,
     members: RunArrays,
@@ -155,6 +182,7 @@ def advance_interval(
     signals: Signals,
     feedback: FeedbackArrays,
     memory: FeedbackMemory,
+    added: Signals,
     book: Ledger,
     varies: bool,
 ) -> None:
@@ -185,6 +213,7 @@ def advance_interval(
         stride = 1 if varies else max(count, 1)
         for k in range(0, count, stride):
             if varies:
+                step_sampled_forces(devices, d, computer, added, devices.new[d, part], h, state.memory)
                 step_brakes_and_reflexes(devices, d, members.reflex, m, begun + k * h, h, period, state.memory)
             advance_substeps(
                 devices, d, part, k, k + stride, begun, command, members, m, state, trail, first, book
@@ -220,7 +249,8 @@ def run_member(
     for part in range(3):
         controls = controls or feedback.acts[d, part] != 0
     for element in range(devices.kind.shape[1]):
-        varies = varies or devices.kind[d, element] == VARYING
+        varies = varies or devices.kind[d, element] in (VARYING, SAMPLED)
+    added = signals_of(computer, devices.kind.shape[1], devices.kind.shape[1])
     book, started = new_ledger(devices, booked), energy_of(devices, d, states)
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
@@ -263,9 +293,10 @@ def run_member(
         if not abs(truth - wall) <= members.bound[m]:
             break
         if varies:
+            sample_forces(devices, d, computer, added, states)
             sample_brakes_and_reflexes(devices, d, reflex, time, T, controlled_force, states, own.memory)
         advance_interval(
-            devices, members, m, time, j, records, own, computer, signals, feedback, kept, book, varies
+            devices, members, m, time, j, records, own, computer, signals, feedback, kept, added, book, varies
         )
 
 

@@ -39,6 +39,7 @@ class PlantArrays(NamedTuple):
     size        (D,)            coordinates n: velocities stand n places after them
     kind        (D, E)          of each element;   numbers (D, E, 5)
     along       (D, E, n)       motion each works on
+    reading     (D, E, n)       what the computer reads for a sampled force
     sensor      (D, n)          what is read, as it is
     handle      (D, n)          where the hand is;   push (D, n)  where its push acts
     channel     (D, C, n)       motions that are counted;   step, weight, noise (D, C)
@@ -58,6 +59,7 @@ class PlantArrays(NamedTuple):
     kind: Ints
     numbers: Floats
     along: Floats
+    reading: Floats
     sensor: Floats
     handle: Floats
     push: Floats

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SPRING, VARYING
+from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING, VARYING
 from zwidth.contact.engine_arrays import LATER, NOTHING_LOCAL, SAMPLE, PlantArrays
 from zwidth.contact.hand import ARM, BRAKE, GRASP, Hand
 from zwidth.contact.linear_substep import LinearDynamics, Substep, dynamics, substep
@@ -52,6 +52,9 @@ class HeldDevice:
             self.elements.append((VARYING, (ARM,), self.push))
             if not operator.rigid_grasp:
                 self.elements.append((VARYING, (GRASP,), self.handle - self.push))
+        lag = loop.controller.actuator_time_constant
+        for force in self.modal_plant.sampled_forces:
+            self.elements.append((SAMPLED, (float(force.filtered), lag), force.along))
 
     def modal(self, coordinates: Floats) -> Floats:
         """Coordinates, or velocities, of the given plant as those of its modes."""
@@ -79,21 +82,9 @@ def in_modes(plant: Plant, squared: Floats, shapes: Floats) -> Plant:
     A motion without stiffness then has none. In other coordinates rounding would leave it a little of the stiffest
     spring, which a minute of free motion turns into digits.
     """
-    return replace(
-        plant,
-        mass=np.eye(plant.size),
-        damping=shapes.T @ plant.damping @ shapes,
-        stiffness=np.diag(squared),
-        actuator=plant.actuator @ shapes,
-        sensor=plant.sensor @ shapes,
-        handle=None if plant.handle is None else plant.handle @ shapes,
-        names=(),
-        lagged_dampers=tuple(
-            replace(damper, along=damper.along @ shapes) for damper in plant.lagged_dampers if damper.damping > 0.0
-        ),
-        nonlinear=plant.nonlinear.project(shapes),
-        hand_force=None if plant.hand_force is None else plant.hand_force @ shapes,
-    )
+    moved = plant.on_motions(shapes)
+    active = tuple(damper for damper in moved.lagged_dampers if damper.damping > 0.0)
+    return replace(moved, mass=np.eye(plant.size), stiffness=np.diag(squared), lagged_dampers=active)
 
 
 def _own_elements(plant: Plant) -> list[Element]:
@@ -135,6 +126,7 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
         kind=np.full((D, E), NOTHING),
         numbers=np.zeros((D, E, 5)),
         along=np.zeros((D, E, n)),
+        reading=np.zeros((D, E, n)),
         sensor=np.zeros((D, n)),
         handle=np.zeros((D, n)),
         push=np.zeros((D, n)),
@@ -234,6 +226,12 @@ def _fill_motions(arrays: PlantArrays, d: int, held_device: HeldDevice) -> None:
     for e, (kind, numbers, along) in enumerate(held_device.elements):
         arrays.kind[d, e], arrays.along[d, e, :n] = kind, along
         arrays.numbers[d, e, : len(numbers)] = numbers
+    # the computer's own forces are the last of the elements
+    forces = held_device.modal_plant.sampled_forces
+    for force, e in zip(
+        forces, range(len(held_device.elements) - len(forces), len(held_device.elements)), strict=True
+    ):
+        arrays.reading[d, e, :n] = force.reading
     for c, counter in enumerate(held_device.counters):
         arrays.channel[d, c, :n] = counter.along
         arrays.step[d, c], arrays.weight[d, c], arrays.noise[d, c] = counter.step, counter.weight, counter.noise

@@ -28,7 +28,7 @@ class LinearDynamics:
     inputs     (N, F)  b: the command first, then forces along the given motions
     size       n, coordinates, then n velocities
     energy     (N, N)  kinetic and elastic energy is s . energy s / 2
-    loss       (N, N)  what dampers take out per second is s . loss s
+    loss       (N, N)  what dampers, and circulatory forces, take out per second is s . loss s
     drive      (N,)    the velocity at the actuator
     force      (N,)    the actuator's force from the states; zeros without lag, where it is the command itself
     """
@@ -58,6 +58,9 @@ def dynamics(plant: Plant, lag: float, motions: Floats) -> LinearDynamics:
     A[x, v] = np.eye(n)
     A[v, x], A[v, v] = -solved[:, :n], -solved[:, n : 2 * n]
     energy[x, x], energy[v, v], loss[v, v] = plant.stiffness, plant.mass, plant.damping
+    if plant.circulatory is not None:
+        A[v, x] -= np.linalg.solve(plant.mass, plant.circulatory)
+        loss[v, x], loss[x, v] = 0.5 * plant.circulatory, 0.5 * plant.circulatory.T
     for i, damper in enumerate(dampers):
         at = 2 * n + i
         A[v, at] = -np.linalg.solve(plant.mass, damper.along)
