@@ -62,6 +62,7 @@ def with_friction(mechanism, coulomb=0.0, model="coulomb", **others):
         "stribeck_velocity": np.nan,
         "hardening": 0.0,
         "backward_stiffness": np.nan,
+        "preload": 0.0,
         "brake_damping": 0.0,
         "brake_time_constant": 0.0,
         "encoder_noise": 0.0,

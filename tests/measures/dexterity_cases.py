@@ -36,7 +36,7 @@ def coulomb_friction(coulomb):
     """Drives with Coulomb friction [N m] at the motors and nothing else that is not linear."""
     none, nothing = np.zeros(len(coulomb)), np.full(len(coulomb), np.nan)
     return DriveNonlinearity(
-        np.asarray(coulomb, float), "coulomb", nothing, np.inf, 0.0, np.nan, none, nothing, none, none, none
+        np.asarray(coulomb, float), "coulomb", nothing, np.inf, 0.0, np.nan, none, nothing, none, none, none, none
     )
 
 

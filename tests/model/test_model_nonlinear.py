@@ -32,6 +32,7 @@ def random_drive_nonlinearity(rng, d, model="lugre"):
         bristle_stiffness=30.0,
         bristle_damping=0.02,
         stribeck_velocity=0.5,
+        preload=np.zeros(d),
         hardening=rng.uniform(0.1, 5.0, d),
         backward_stiffness=rng.uniform(0.2, 2.0, d),
         brake_damping=rng.uniform(1e-5, 1e-3, d),

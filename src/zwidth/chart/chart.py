@@ -57,7 +57,28 @@ class StabilityChart(Chart):
         own = super().document()
         if self.loop.plant.apart is not None:
             own["sideways_motions"] = [motion.document() for motion in self.loop.sideways_motions]
+        point = self.operating_point
+        if point is not None and point.load is not None:
+            amplitude = point.equilibrium.one_sided_amplitude(self.stiffness_max)
+            own["equilibrium"] = point.equilibrium.document(point.drives.names) | {
+                "one_sided_amplitude_m": amplitude
+            }
+            other = self.other_branch
+            own["other_branch"] = None if other is None else other.numbers()
         return own
+
+    @cached_property
+    def other_branch(self) -> StabilityChart | None:
+        """The chart on the other branch of springs that are bent to just where their stiffness changes; None where
+        there are none such. That both charts have a wall does not prove that the device, which switches between the
+        two, renders it."""
+        other = None if self.operating_point is None else self.operating_point.other_branch
+        return None if other is None else stability_chart(other.loop, self.radius, decay=False).about(other)
+
+    def numbers(self) -> dict[str, Any]:
+        """The numbers read off the chart by their keys, without its edge."""
+        own = super().document()
+        return {key: value for key, value in own.items() if key not in ("regions", "boundary")}
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
         """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast, by eigenvalues, whatever the regions say."""

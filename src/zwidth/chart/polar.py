@@ -21,6 +21,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import check_several_directions
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.argument_checks import check_choice, require
+from zwidth.model.load import LoadError
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import DirectionError, ModelError
@@ -149,7 +150,8 @@ def largest_stiffness_by_direction(
     that leaves the motions of the handle, the range of its Jacobian, has none: only its projection onto them could
     be rendered, and the factor 1/cos^2 would make its stiffness arbitrarily large.
 
-    point       a single posture of a mechanism, whatever its own direction
+    point       a single posture of a mechanism, whatever its own direction. Under load the hand pushes as hard along
+                each direction, and a direction and its opposite differ
     directions  (k, 3)  of any length but zero
     progress    called with "directions", those that are done, and all of them
     Raises      ValueError  for a direction without length, and what `OperatingPoint.plant_of_directions` raises
@@ -167,7 +169,7 @@ def largest_stiffness_by_direction(
     units = given / length
     plant = _plants(point)
     motions = _motions(point.jacobian)
-    keys = [_direction_key(unit) for unit in units]
+    keys = [_direction_key(unit, point.load is not None) for unit in units]
     first = {key: n for n, key in reversed(list(enumerate(keys)))}  # one of each pair
     off = np.linalg.norm(units - units @ motions.T @ motions, axis=1) > OUT_OF_MOTION_TOLERANCE
     wanted = [n for n in first.values() if not off[n]]
@@ -208,9 +210,11 @@ def _together(point: OperatingPoint, units: Floats) -> list[tuple[float, float, 
     return found
 
 
-def _direction_key(unit: Floats) -> tuple[float, ...]:
-    """A key that is the same for a direction and its opposite."""
+def _direction_key(unit: Floats, one_way: bool) -> tuple[float, ...]:
+    """A key that is the same for a direction and its opposite, unless these differ."""
     rounded = np.round(unit, 13) + 0.0
+    if one_way:
+        return tuple(rounded.tolist())
     lead = next(x for x in rounded if x != 0.0)
     return tuple((rounded * np.sign(lead) + 0.0).tolist())
 
@@ -226,7 +230,10 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
 
     Directions share the full model's matrices and differ in their actuator.
     """
-    check_several_directions(point.mechanism, point.operator, point.encoders, point.load)
+    if point.load is not None:
+        pushed = replace(point, load=point.load.along_every_direction)
+        return lambda unit: pushed.towards(unit).plant
+    check_several_directions(point.mechanism, point.operator, point.encoders, None)
     if point.model != "full":
         return lambda unit: point.towards(unit).plant
     axes = _motions(point.jacobian)
@@ -244,7 +251,7 @@ def _stiffest(
         peak = largest_stiffness(loop)
     except (DirectionError, UnmovedError):
         return none, none, none, OUT_OF_MOTION
-    except ModelError as error:
+    except (ModelError, LoadError) as error:
         return none, none, none, str(error)
     except ChartError as error:
         return none, none, none, f"undecided: {error}"

@@ -74,7 +74,7 @@ class Traits:
 
 def traits(loop: Loop) -> Traits:
     """Compute the `Traits` of a loop."""
-    plant = loop.plant
+    plant = loop.plant.without_load or loop.plant  # of a load no published condition knows
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     push, read = shapes.T @ plant.actuator, shapes.T @ plant.sensor
     moved_modes = _moved_modes(squared, push, read)

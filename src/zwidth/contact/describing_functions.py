@@ -151,23 +151,30 @@ def saturation_gain(amplitude: float, limit: float) -> float:
     return float(2.0 / np.pi * (np.arcsin(s) + s * np.sqrt(1.0 - s * s)))
 
 
-def bent_spring(amplitude: ArrayLike, cubic: ArrayLike = 0.0, backward_excess: ArrayLike = 0.0) -> Floats:
+def bent_spring(
+    amplitude: ArrayLike, cubic: ArrayLike = 0.0, backward_excess: ArrayLike = 0.0, kink: ArrayLike = 0.0
+) -> Floats:
     """Stiffness that a bent spring has beyond its linear one, for a vibration about 0 [N/m].
 
-        N = (3/4) cubic A^2 + backward_excess/2
+        N = (3/4) cubic A^2 + backward_excess/pi (arccos c - c sqrt(1 - c^2)),    c = min(-kink/A, 1)
 
     amplitude        (...)  A of its deflection [m]
     cubic            (...)  [N/m^3]
-    backward_excess  (...)  what it is stiffer by for negative deflections [N/m]; they also push the mean, what is
-                            left out
+    backward_excess  (...)  what it is stiffer by for deflections below the kink [N/m]; they also push the mean,
+                            what is left out
+    kink             (...)  not positive [m]
 
     >>> float(bent_spring(0.1, cubic=400.0))
     3.0
     """
-    return _each(bent_spring_gain, amplitude, cubic, backward_excess)
+    return _each(bent_spring_gain, amplitude, cubic, backward_excess, kink)
 
 
 @compiled_lean
-def bent_spring_gain(amplitude: float, cubic: float, backward_excess: float) -> float:
+def bent_spring_gain(amplitude: float, cubic: float, backward_excess: float, kink: float) -> float:
     """`bent_spring` of one spring."""
-    return 0.75 * cubic * amplitude * amplitude + 0.5 * backward_excess
+    share = 0.5
+    if kink < 0.0:
+        c = min(-kink / amplitude, 1.0)
+        share = (np.arccos(c) - c * np.sqrt(1.0 - c * c)) / np.pi
+    return float(0.75 * cubic * amplitude * amplitude + share * backward_excess)

@@ -36,14 +36,15 @@ def element_force(
     mobility: float,
     h: float,
 ) -> float:
-    """Mean force of element e over a substep of length h [s], with its numbers (D, E, 5) and memory (E, 4)."""
+    """Mean force of element e over a substep of length h [s], with its numbers (D, E, 6) and memory (E, 4)."""
     if kind == COULOMB:
         return coulomb_force(numbers[d, e, 0], v0, v1, mobility)
     if kind == BRISTLES:
         law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
         return bristle_force(memory[e, 0], law, v0, v1, mobility, h)[0]
     if kind == SPRING:
-        return bent_spring_force(numbers[d, e, 0], numbers[d, e, 1], q0, q1, shift)
+        law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
+        return bent_spring_force(law, numbers[d, e, 5], q0, q1, shift)
     if kind == SAMPLED:
         return float(memory[e, 0])
     if kind == VARYING:
@@ -61,17 +62,24 @@ def bristles_bend(
 
 
 @compiled_lean
-def bent_spring_force(cubic: float, excess: float, q0: float, q1: float, shift: float) -> float:
+def bent_spring_force(
+    law: tuple[float, float, float, float, float], kink: float, q0: float, q1: float, shift: float
+) -> float:
     """-(V(q1) - V(q0))/(q1 - q0) with q1 moved by the force itself: the spring gives back what it took.
 
-        V(q) = cubic q^4/4 + excess min(q, 0)^2/2
+        V(q) = U(a + q) - F q - k q^2/2,    U(d) = cubic d^4/4 + excess min(d - kink, 0)^2/2
+
+    law  cubic, excess, the offset a at which it is bent already, and U's slope F and its tangent k there, which are
+         in the equilibrium and in the linear plant
 
     By Newton's method on f = F(q1 + shift f), the difference quotient written out so that q1 = q0 is no case.
     """
+    cubic, excess, offset, held, tangent = law
     f = 0.0
     for _ in range(25):
         end = q1 + shift * f
-        mean, slope = _quotient(cubic, excess, q0, end)
+        mean, slope = _quotient(cubic, excess, kink, offset + q0, offset + end)
+        mean, slope = mean - held - 0.5 * tangent * (q0 + end), slope - 0.5 * tangent
         step = (f + mean) / (1.0 + shift * slope)
         f -= step
         if abs(step) <= 1e-15 * (abs(f) + abs(mean)):
@@ -80,10 +88,11 @@ def bent_spring_force(cubic: float, excess: float, q0: float, q1: float, shift: 
 
 
 @compiled_lean
-def _quotient(cubic: float, excess: float, q0: float, q1: float) -> tuple[float, float]:
+def _quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) -> tuple[float, float]:
     """(V(q1) - V(q0))/(q1 - q0), and about its slope in q1."""
     mean = 0.25 * cubic * (q1 * q1 + q0 * q0) * (q1 + q0)
     slope = 0.25 * cubic * (3.0 * q1 * q1 + 2.0 * q1 * q0 + q0 * q0)
+    q0, q1 = q0 - kink, q1 - kink
     if q0 <= 0.0 and q1 <= 0.0:
         return mean + 0.5 * excess * (q0 + q1), slope + 0.5 * excess
     if q0 < 0.0 or q1 < 0.0:

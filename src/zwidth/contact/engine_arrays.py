@@ -37,7 +37,7 @@ class PlantArrays(NamedTuple):
     loss, work  (D, P, M, M)    quadratic forms of the ledger, M = N + F; size 0 without one
     energy      (D, N, N)
     size        (D,)            coordinates n: velocities stand n places after them
-    kind        (D, E)          of each element;   numbers (D, E, 5)
+    kind        (D, E)          of each element;   numbers (D, E, 6)
     along       (D, E, n)       motion each works on
     reading     (D, E, n)       what the computer reads for a sampled force
     sensor      (D, n)          what is read, as it is

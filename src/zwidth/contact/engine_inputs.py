@@ -20,7 +20,7 @@ from zwidth.loop.controller import split_delay
 from zwidth.loop.fixed_feedback import acts
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import least_deforming_motion, undamped_modes
-from zwidth.model.nonlinear import Counter
+from zwidth.model.nonlinear import Counter, Spring
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 
@@ -95,9 +95,17 @@ def _own_elements(plant: Plant) -> list[Element]:
             elements.append((BRISTLES, bent, dry.along))
         elif bent is None and dry.coulomb > 0.0:
             elements.append((COULOMB, (dry.coulomb,), dry.along))
-    elements += [(SPRING, (spring.cubic, spring.backward_excess), spring.along) for spring in own.springs]
+    elements += [(SPRING, _spring_numbers(spring), spring.along) for spring in own.springs]
     elements += [(VARYING, (BRAKE, brake.damping, brake.time_constant), brake.along) for brake in own.brakes]
     return elements
+
+
+def _spring_numbers(spring: Spring) -> tuple[float, ...]:
+    """A spring as `elements.bent_spring_force` takes it."""
+    cubic, excess, offset = spring.cubic, spring.backward_excess, spring.offset
+    held = cubic * offset**3 + excess * min(offset - spring.kink, 0.0)
+    tangent = 3.0 * cubic * offset**2 + (excess if spring.backward else 0.0)
+    return cubic, excess, offset, held, tangent, spring.kink
 
 
 def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArrays:
@@ -124,7 +132,7 @@ def pack_plants(held_devices: Sequence[HeldDevice], substeps: int) -> PlantArray
         energy=np.zeros((D, N, N)),
         size=np.array([held_device.modal_plant.size for held_device in held_devices]),
         kind=np.full((D, E), NOTHING),
-        numbers=np.zeros((D, E, 5)),
+        numbers=np.zeros((D, E, 6)),
         along=np.zeros((D, E, n)),
         reading=np.zeros((D, E, n)),
         sensor=np.zeros((D, n)),

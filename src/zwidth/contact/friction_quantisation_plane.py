@@ -21,7 +21,7 @@ from zwidth.conditions.diolaiti import dimensionless_friction
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.conditions.traits import traits
 from zwidth.loop.loop import Loop
-from zwidth.loop.unsupported_feedback import refuse_feedback
+from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 
 Floats = NDArray[np.float64]
 
@@ -94,6 +94,7 @@ def device_plane(
     if not np.all((K > 0.0) & np.isfinite(K)):
         raise ValueError(f"wall_stiffness must be positive and finite, got {wall_stiffness!r}")
     refuse_feedback(loop.controller, "the plane of friction and resolution is not known", "leave it out")
+    refuse_load(loop.plant, "the plane of friction and resolution is not known", "leave the load out")
     own, delay = traits(loop), loop.controller.delay
     if np.isnan(own.ground_damping):
         raise ValueError(

@@ -18,7 +18,7 @@ from zwidth.contact.motion_verdict import judge_response
 from zwidth.contact.simulate import LARGEST_MOTION, Run, simulate_batch
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import refuse_feedback
+from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.argument_checks import check_number, require
 from zwidth.model.modes import least_deforming_motion
 from zwidth.progress import Progress
@@ -136,6 +136,7 @@ def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str
         raise ValueError(f"offset must be from -0.5 to 0.5 of an encoder's step, got {offset:g}")
     loop = point.loop
     refuse_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
+    refuse_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
     _ = loop.sections  # refuses plants that no wall moves, or not in time
     parts = tuple(name for name in loop.nonlinear.kinds if name not in NOT_PREDICTED)
     if not parts:

@@ -27,7 +27,7 @@ from zwidth.contact.vibration_kernel import (
 from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
-from zwidth.loop.unsupported_feedback import refuse_feedback
+from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.nonlinear import Counter, Nonlinear
 
 Floats = NDArray[np.float64]
@@ -163,6 +163,7 @@ class EquivalentLoop:
             spring_motions=along[2],
             cubic=np.array([part.cubic for part in parts.springs], dtype=float),
             excess=np.array([part.backward_excess for part in parts.springs], dtype=float),
+            kink=np.array([part.kink for part in parts.springs], dtype=float),
             counter_motions=along[1],
             weight=np.array([part.weight for part in parts.counters], dtype=float),
             step=np.array([part.step for part in parts.counters], dtype=float),
@@ -209,6 +210,7 @@ def equivalent_loop(
     Raises       FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law
     """
     refuse_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
+    refuse_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
     counters = parts.counters
     if any(part.step > 0.0 for part in counters):
         counters = tuple(Counter(part.along, part.step, part.weight) for part in counters)

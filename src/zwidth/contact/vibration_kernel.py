@@ -48,7 +48,7 @@ class LoopArrays(NamedTuple):
     sensor            (n,)
     force_inputs      (N, f + s)  what a force along each friction's and spring's motion adds, times T, scaled
     friction_motions  (f, n), coulomb (f,)         frictions
-    spring_motions    (s, n), cubic, excess (s,)   springs
+    spring_motions    (s, n), cubic, excess, kink (s,)   springs
     counter_motions   (c, n), weight, step (c,)    encoders, none: the sensor;   offset  of the middle, in steps
     filter_*, estimator_*  `FilterStates` of the force filter and of the velocity estimate
     """
@@ -69,6 +69,7 @@ class LoopArrays(NamedTuple):
     spring_motions: Floats
     cubic: Floats
     excess: Floats
+    kink: Floats
     counter_motions: Floats
     weight: Floats
     step: Floats
@@ -119,7 +120,7 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
                 A[i, n + j] -= b * loop.force_inputs[i, p] * loop.friction_motions[p, j] / loop.period
     first = VELOCITIES + f + len(loop.step)
     for s in range(len(loop.cubic)):
-        k = bent_spring_gain(sizes[first + s], loop.cubic[s], loop.excess[s])
+        k = bent_spring_gain(sizes[first + s], loop.cubic[s], loop.excess[s], loop.kink[s])
         for i in range(N):
             for j in range(n):
                 A[i, j] -= k * loop.force_inputs[i, f + s] * loop.spring_motions[s, j]

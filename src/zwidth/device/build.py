@@ -16,7 +16,6 @@ from zwidth.device import build_nonlinear
 from zwidth.device.build_nonlinear import value_or
 from zwidth.device.schema.feedback import FeedforwardSection, ForceSensorSection, LocalSection
 from zwidth.device.schema.friction import FrictionSection
-from zwidth.device.schema.load import LoadSection
 from zwidth.device.schema.loop import EncoderSection, LoopSection
 from zwidth.device.schema.mechanism import (
     DampingSection,
@@ -36,7 +35,6 @@ from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, Li
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
 from zwidth.model.design_axes import stack_numbers
 from zwidth.model.electrical_damping import add_dampers
-from zwidth.model.load import Load
 from zwidth.model.mechanism import Floats
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper, Plant
@@ -159,22 +157,6 @@ def operator(section: OperatorSection) -> Operator:
         arm_damping=section.arm_damping_Ns_per_m,
         grasp_stiffness=None if rigid else section.grasp_stiffness_N_per_m,
         grasp_damping=None if rigid else value_or(section.grasp_damping_Ns_per_m, 0.0),
-    )
-
-
-def load(section: LoadSection) -> Load:
-    """What the device bears."""
-    return Load(
-        force=None if section.force_N is None else np.array(section.force_N),
-        moment=None if section.moment_Nm is None else np.array(section.moment_Nm),
-        push=section.push_N,
-        gravity=None if section.gravity_m_per_s2 is None else np.array(section.gravity_m_per_s2),
-        hand=section.hand,
-        posture_of=section.posture_of,
-        settle=section.settle,
-        surface_radius=value_or(section.surface_radius_m, math.inf),
-        count_sideways=section.count_sideways,
-        branch=section.spring_branch,
     )
 
 

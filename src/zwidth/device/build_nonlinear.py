@@ -112,6 +112,7 @@ def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSe
         stribeck_velocity=value_or(friction.stribeck_velocity_rad_per_s, math.nan),
         hardening=per_drive(drives, "hardening_Nm_per_rad3", 0.0),
         backward_stiffness=per_drive(drives, "backward_stiffness_Nm_per_rad", math.nan),
+        preload=per_drive(drives, "preload_Nm", 0.0),
         brake_damping=per_drive(drives, "brake_damping_max_Nms_per_rad", 0.0),
         brake_time_constant=per_drive(drives, "brake_time_constant_s", 0.0),
         encoder_noise=per_drive(drives, "encoder_noise_rad", 0.0),

@@ -15,7 +15,7 @@ from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
-from zwidth.device.load_choice import document_under
+from zwidth.device.load_choice import document_under, load_of_table
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.posture_arguments import screws
@@ -178,7 +178,7 @@ def build_device(
         else None,
         operator=build.operator(checked.operator) if checked.operator else None,
         operator_name=(checked.operator.name or UNNAMED_OPERATOR) if checked.operator else None,
-        load=build.load(checked.load) if checked.load else None,
+        load=load_of_table(checked.load.model_dump(exclude_none=True)) if checked.load else None,
         encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from math import isfinite
-from typing import Any
+from typing import Any, Final, cast
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.device.faults import fail
@@ -32,11 +32,11 @@ def document_under(
     changes: Tables = {}
     try:
         if load is not None:
-            force = Load(force=load).force
+            force = Load(force=cast(Any, load)).force
             assert force is not None
             changes["moment_Nm" if moment else "force_N"] = force.tolist()
         if gravity is not None:
-            changes["gravity_m_per_s2"] = Load(gravity=gravity).weight.tolist()
+            changes["gravity_m_per_s2"] = Load(gravity=cast(Any, gravity)).weight.tolist()
     except LoadError as error:
         raise fail(label, "load", str(error)) from None
     if not changes:
@@ -48,24 +48,33 @@ def document_under(
     return {**document, "load": kept | changes}
 
 
+NAMES: Final = {
+    "force_N": "force",
+    "moment_Nm": "moment",
+    "push_N": "push",
+    "gravity_m_per_s2": "gravity",
+    "hand": "hand",
+    "posture_of": "posture_of",
+    "settle": "settle",
+    "surface_radius_m": "surface_radius",
+    "count_sideways": "count_sideways",
+    "spring_branch": "branch",
+}
+"""Keys of [load], and the fields of `Load` that they fill."""
+
+
+def load_of_table(table: Tables) -> Load:
+    """A [load] as `Load`. Raises LoadError."""
+    return Load(**{NAMES[key]: value for key, value in table.items()})
+
+
 def table_of_load(load: Load) -> Tables:
     """A load as the [load] of a device file, without what is as by default."""
-    plain, own = Load(), Tables()
-    for key, name in (("force_N", "force"), ("moment_Nm", "moment"), ("gravity_m_per_s2", "gravity")):
-        vector = getattr(load, name)
-        if vector is not None:
-            own[key] = vector.tolist()
-    if load.push is not None:
-        own["push_N"] = load.push
-    for key, name in (
-        ("hand", "hand"),
-        ("posture_of", "posture_of"),
-        ("settle", "settle"),
-        ("count_sideways", "count_sideways"),
-        ("spring_branch", "branch"),
-    ):
-        if getattr(load, name) != getattr(plain, name):
-            own[key] = getattr(load, name)
-    if isfinite(load.surface_radius):
-        own["surface_radius_m"] = load.surface_radius
-    return own
+    plain, table = Load(), Tables()
+    for key, name in NAMES.items():
+        value = getattr(load, name)
+        if isinstance(value, np.ndarray):
+            table[key] = value.tolist()
+        elif value != getattr(plain, name):
+            table[key] = value
+    return table

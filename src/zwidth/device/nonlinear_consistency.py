@@ -191,6 +191,11 @@ def _drive(place: KeyPath, drive: dict[str, Any], T: float) -> KeyMessages:
     for key in ("hardening_Nm_per_rad3", "backward_stiffness_Nm_per_rad"):
         if key in drive and is_number(stiffness) and math.isinf(stiffness):
             yield (*place, key), "needs a flexible transmission; give stiffness_Nm_per_rad, or remove this"
+    if "preload_Nm" in drive and "backward_stiffness_Nm_per_rad" not in drive:
+        yield (
+            (*place, "preload_Nm"),
+            "is where the stiffness changes; give backward_stiffness_Nm_per_rad, or remove this",
+        )
     continuous, limit = drive.get("continuous_torque_Nm"), drive.get("torque_limit_Nm")
     if is_number(continuous) and is_number(limit) and continuous > limit > 0:
         yield (

@@ -183,7 +183,8 @@ def guarantees_of(
         return guarantees
     handle = loop.plant.handle
     if loop.has_fixed_feedback:
-        reason = f"no coupling is known with {', '.join(loop.controller.feedback_names)}"
+        names = [*loop.controller.feedback_names, *(["a load"] if loop.plant.is_loaded else [])]
+        reason = f"no coupling is known with {', '.join(names)}"
         return replace(guarantees, couplings=no_couplings(reason))
     return replace(guarantees, couplings=no_couplings() if handle is None else couplings(loop, handle, wall))
 

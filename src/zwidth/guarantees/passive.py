@@ -85,6 +85,8 @@ def feedback_obstacle(loop: Loop) -> str:
     What a force sensor reads depends on the operator itself, and a local loop samples at another rate: then the
     response of all operators together fills no disk.
     """
+    if loop.plant.is_loaded:
+        return "this is not known under load, where the computer's own force turns with what the operator moves"
     unlike = [part for part in loop.controller.fixed_feedback if not isinstance(part, Feedforward)]
     return f"this is not known with {describe_feedback(unlike[0])}" if unlike else ""
 

@@ -195,15 +195,4 @@ def without_idle_motions(plant: Plant) -> Plant:
 
 def _within(plant: Plant, V: Floats, handle: Floats | None) -> Plant:
     """The plant confined to x = V q, in coordinates q."""
-    return replace(
-        plant,
-        mass=V.T @ plant.mass @ V,
-        damping=V.T @ plant.damping @ V,
-        stiffness=V.T @ plant.stiffness @ V,
-        actuator=V.T @ plant.actuator,
-        sensor=V.T @ plant.sensor,
-        handle=None if handle is None else V.T @ handle,
-        names=(),
-        lagged_dampers=tuple(replace(d, along=V.T @ d.along) for d in plant.lagged_dampers),
-        hand_force=None if plant.hand_force is None else plant.hand_force @ V,
-    )
+    return replace(plant.on_motions(V), handle=None if handle is None else V.T @ handle)

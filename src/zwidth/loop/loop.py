@@ -93,6 +93,7 @@ class Loop:
         names = ", ".join(self.plant.names) or f"{self.plant.size} coordinates"
         computer = self.controller.timing_text
         computer += "".join(f", with {part}" for part in self.controller.feedback_names)
+        computer += ", under load" if self.plant.is_loaded else ""
         return f"Loop of a plant ({names}), {computer}"
 
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> StabilityChart:

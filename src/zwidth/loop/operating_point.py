@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -91,7 +92,9 @@ class OperatingPoint(PosedDevice):
         plants = self.loaded_plants
         if held:
             plants = LoadedPlants(self.attach_operator(plants.loaded), self.attach_operator(plants.unloaded))
-        return plants.loaded if self.load.count_sideways else set_apart(plants)
+        if self.load.count_sideways:
+            return replace(plants.loaded, without_load=plants.unloaded)
+        return set_apart(plants)
 
     @cached_property
     def loaded_plants(self) -> LoadedPlants:
@@ -115,6 +118,15 @@ class OperatingPoint(PosedDevice):
         return plant if self.operator is None or plant.handle is None else attach(plant, self.operator)
 
     @cached_property
+    def other_branch(self) -> OperatingPoint | None:
+        """The same point on the other branch of the springs that under its load are bent to just where their stiffness
+        changes; None where there are none such."""
+        if self.load is None or not self.equilibrium.kinked:
+            return None
+        other: Literal["forward", "backward"] = "forward" if self.load.branch == "backward" else "backward"
+        return replace(self, load=replace(self.load, branch=other))
+
+    @cached_property
     def plant_of_directions(self) -> MultiPlant:
         """The dynamics of all directions that are rendered together, m of them, in one posture.
 
@@ -135,11 +147,15 @@ class OperatingPoint(PosedDevice):
     @cached_property
     def computer(self) -> Controller:
         """The controller at this point: of a feedforward that is given as a share of the device's rigid mass, with
-        that mass [kg]. Raises OperatingPointError where the device has none, or for several points."""
-        if not has_inertia_share(self.controller):
-            return self.controller
+        that mass [kg]; under load with what its constant force leaves of the force limit. Raises OperatingPointError where the device has none, or for several points."""
+        controller = self.controller
+        if self.load is not None and isfinite(controller.force_limit):
+            # of which the wall's constant force takes a part
+            controller = replace(controller, force_limit=controller.force_limit - abs(self.equilibrium.wall_force))
+        if not has_inertia_share(controller):
+            return controller
         self._check_single("computer")
-        return with_inertia_of(self.controller, float(self.effective.rigid_mass))
+        return with_inertia_of(controller, float(self.effective.rigid_mass))
 
     @cached_property
     def loop(self) -> Loop:

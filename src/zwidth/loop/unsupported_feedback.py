@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from zwidth.loop.controller import Controller
+from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 
 
@@ -19,3 +20,9 @@ def refuse_feedback(controller: Controller, what: str, instead: str) -> None:
     names = controller.feedback_names if controller.fixed_feedback or controller.feeds_friction else ()
     if names:
         raise FeedbackError(f"{what} with {' and '.join(names)}; {instead}")
+
+
+def refuse_load(plant: Plant, what: str, instead: str) -> None:
+    """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as before."""
+    if plant.is_loaded:
+        raise FeedbackError(f"{what} under load; {instead}")

@@ -31,7 +31,7 @@ plant with mass hardly follows at these frequencies.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,7 +42,7 @@ from zwidth.loop.factor_response import factor_response
 from zwidth.loop.feedback_response import feedforward_response, sensor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
-from zwidth.loop.unsupported_feedback import refuse_feedback
+from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
@@ -54,6 +54,10 @@ Complex = NDArray[np.complex128]
 FREE = 1e-12
 
 
+UNKNOWN: Final = "the impedance at the handle is not known"
+LEAVE_OUT: Final = "leave the load out"
+
+
 class HandleError(ValueError):
     """The plant has no handle at which an impedance could be felt."""
 
@@ -61,7 +65,7 @@ class HandleError(ValueError):
 def refuse_local_loop(controller: Controller) -> None:
     """Raise FeedbackError for a computer of two rates."""
     two_rates = replace(controller, force_sensor=None, feedforward=None)
-    refuse_feedback(two_rates, "the impedance at the handle is not known", "leave local_loop out")
+    refuse_feedback(two_rates, UNKNOWN, "leave local_loop out")
 
 
 def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
@@ -73,7 +77,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     Returns    (...)  complex [N s/m]
     Raises     HandleError  where the plant has no handle
                ValueError   for a frequency out of range
-               FeedbackError  (loop.unsupported_feedback) with a local loop
+               FeedbackError  (loop.unsupported_feedback) with a local loop, or under load
 
     A mass of 0.1 kg at 1 Hz feels like its wall, of 1000 N/m and 1 N s/m, less its inertia (and the delay of hold
     and backward difference, one sample):
@@ -230,7 +234,8 @@ def free_motion_mass(plant: Plant, controller: Controller | None = None) -> floa
 
 
 def handle_of(plant: Plant) -> Floats:
-    """The plant's handle. Raises HandleError if it has none."""
+    """The plant's handle. Raises HandleError if it has none, FeedbackError under load."""
+    refuse_load(plant, UNKNOWN, LEAVE_OUT)
     if plant.handle is None:
         raise HandleError(
             "the plant has no handle at which a hand could feel it; give `handle`, or use another model"

@@ -96,7 +96,7 @@ def counted_posture(mechanism: Mechanism, angles: Floats, ahead: Floats, ratio: 
         seen = np.linalg.solve(T.T @ T + np.tensordot(away, Z, 1), T.T)
         step = -(seen @ away)
         if not np.max(np.abs(step), initial=0.0) > SETTLED:
-            return CountedPosture(at, motions, drives, seen)
+            return CountedPosture(at, motions, drives, np.asarray(seen, dtype=np.float64))
         moved = moved_posture(mechanism, at, np.append(step, np.zeros(motions.count - k)))
         if moved is None or not np.isfinite(moved).all():
             return None

@@ -15,8 +15,9 @@ difference, a small force across the direction.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class Equilibrium:
     wall_force     f, that the wall pushes with along the direction [N]
     hand_force, hand_moment  (3,)  of the hand on the handle [N], [N m]
     deflections    (d,)  by which the motors are ahead of their joints, at the joint [rad]
-    torques        (d,)  of the motors, at the joint [N m]
+    torques        (d,)  of the motors, at the joint [N m];   ratio (d,) of the transmissions
     compensation   how gravity is compensated
     unbalanced     (c,)  generalised forces that neither hand nor drives balance
     """
@@ -66,6 +67,7 @@ class Equilibrium:
     hand_moment: Floats
     deflections: Floats
     torques: Floats
+    ratio: Floats
     compensation: Compensation
     unbalanced: Floats
 
@@ -77,10 +79,28 @@ class Equilibrium:
         )
         return np.asarray(own - (own @ along) / (along @ along) * along)
 
+    def one_sided_amplitude(self, wall_stiffness: float) -> float:
+        """Amplitude of the reading up to which a vibration stays within a one-sided wall: F/K [m]."""
+        return abs(self.wall_force) / wall_stiffness if wall_stiffness > 0.0 else float("nan")
+
+    def document(self, drives: Sequence[str]) -> dict[str, Any]:
+        """Its numbers by their keys. drives: the drives' names."""
+        ratio = self.ratio
+        return {
+            "wall_force_N": self.wall_force,
+            "hand_force_N": self.hand_force.tolist(),
+            "hand_moment_Nm": self.hand_moment.tolist(),
+            "sideways_force_N": self.sideways_force.tolist(),
+            "position_m": self.motions.handle.position.tolist(),
+            "counted_position_m": self.counted.motions.handle.position.tolist(),
+            "motor_torques_Nm": dict(zip(drives, (self.torques / ratio).tolist(), strict=True)),
+            "deflections_rad": dict(zip(drives, self.deflections.tolist(), strict=True)),
+        }
+
     @property
     def kinked(self) -> tuple[int, ...]:
-        """Drives without torque whose stiffness changes there."""
-        return tuple(int(i) for i in np.flatnonzero(self.springs.kinked & (self.deflections == 0.0)))
+        """Drives that are bent to just where their stiffness changes: without preload, those without torque."""
+        return tuple(int(i) for i in np.flatnonzero(self.springs.at_kink(self.deflections)))
 
 
 def command_of(counted: CountedPosture, screw: Floats, weight: Floats, wall_force: float) -> tuple[Floats, Floats]:
@@ -268,6 +288,7 @@ class Balance:
             hand_moment=wrench[3:],
             deflections=ahead,
             torques=torques,
+            ratio=self.ratio,
             compensation=self.compensation,
             unbalanced=left,
         )

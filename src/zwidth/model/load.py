@@ -137,6 +137,13 @@ class Load:
             )
         return along
 
+    @property
+    def along_every_direction(self) -> Load:
+        """The same load with a push as strong as the hand's force, along whatever direction is rendered."""
+        if self.force is None:
+            return self
+        return replace(self, force=None, push=float(np.linalg.norm(self.force)))
+
     def with_gravity(self, gravity: ArrayLike) -> Load:
         """The same load under another gravity."""
         return replace(self, gravity=np.asarray(gravity, dtype=np.float64))

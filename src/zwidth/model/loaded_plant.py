@@ -24,6 +24,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.model.damping import Damping
+from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.equilibrium import Equilibrium, command_change, lever_arms_of
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.modes import REPEATED, clusters, undamped_modes
@@ -70,9 +71,11 @@ def linearise(
     K = np.zeros((n, n))
     K[:c, :c] = _links_stiffness(equilibrium)
     seen, k = equilibrium.counted, len(mechanism.driven)
-    share = np.linalg.pinv(seen.drives.T[:, :k].T)
+    share = np.asarray(np.linalg.pinv(seen.drives.T[:, :k].T), dtype=np.float64)
     h = lever_arms_of(seen.motions, axis)[:k]
     symmetric, turning = 0.5 * (K + K.T), 0.5 * (K - K.T)
+    backward = equilibrium.load.branch == "backward"
+    parts = nonlinear_of_drives(drives, h @ seen.seen, links, motors, counted, equilibrium.deflections, backward)
     loaded = replace(
         unloaded,
         stiffness=unloaded.stiffness + symmetric,
@@ -80,8 +83,18 @@ def linearise(
         actuator=(share @ h) @ motors,
         sensor=(h @ seen.seen) @ counted,
         sampled_forces=_sampled_forces(equilibrium, share, motors, counted),
+        nonlinear=replace(
+            parts, friction=unloaded.nonlinear.friction, force_limit=_force_left(mechanism, equilibrium, share @ h)
+        ),
     )
     return LoadedPlants(loaded, unloaded)
+
+
+def _force_left(mechanism: Mechanism, equilibrium: Equilibrium, share: Floats) -> float:
+    """By how much the wall's force may change before a motor is at its limit [N]."""
+    drives, used = mechanism.drives, share != 0.0
+    left = drives.transmission * drives.torque_limit - np.abs(equilibrium.torques)
+    return float(np.min(left[used] / np.abs(share[used]), initial=np.inf))
 
 
 def _links_stiffness(equilibrium: Equilibrium) -> Floats:
@@ -137,8 +150,9 @@ def set_apart(plants: LoadedPlants) -> Plant:
     """
     moved, still = moved_motions(plants.unloaded)
     if not still.shape[1]:
-        return plants.loaded
-    return replace(plants.loaded.on_motions(moved), apart=plants.loaded.on_motions(still))
+        return replace(plants.loaded, without_load=plants.unloaded)
+    counted = replace(plants.loaded, without_load=plants.unloaded).on_motions(moved)
+    return replace(counted, apart=plants.loaded.on_motions(still))
 
 
 def moved_motions(plant: Plant) -> tuple[Floats, Floats]:

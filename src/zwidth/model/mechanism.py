@@ -119,6 +119,7 @@ class DriveNonlinearity:
     stribeck_velocity   of lugre [rad/s]
     hardening           (..., d)  k_3 of the transmission's torque k d + k_3 d^3 [N m/rad^3]
     backward_stiffness  (..., d)  its stiffness where the motor lags behind the joint [N m/rad]; nan: the same
+    preload             (..., d)  torque beyond which it has that stiffness [N m]
     brake_damping       (..., d)  largest damping of a programmable brake on the rotor [N m s/rad]
     brake_time_constant (..., d)  [s]
     encoder_noise       (..., d)  standard deviation of the motor's angle before it is counted [rad]
@@ -132,6 +133,7 @@ class DriveNonlinearity:
     stribeck_velocity: float
     hardening: Array1
     backward_stiffness: Array1
+    preload: Array1
     brake_damping: Array1
     brake_time_constant: Array1
     encoder_noise: Array1

@@ -79,15 +79,22 @@ class Counter:
 
 @dataclass(frozen=True)
 class Spring:
-    """Nonlinear part of a spring's force: -along (cubic d^3 + excess min(d, 0)),  d = along . x.
+    """Nonlinear part of a spring's force: -along (cubic d^3 + excess min(d - kink, 0)),  d = along . x.
+
+    Under load it is bent already, by an offset d0, and its tangent there is in the plant's stiffness: then the
+    force is that at d0 + d, less that at d0 and less the tangent's.
 
     cubic            hardening, or softening where negative [N/m^3]
-    backward_excess  how much stiffer it is for d < 0 [N/m]
+    backward_excess  how much stiffer it is for d < kink [N/m];   kink  not positive [m]
+    offset           d0 [m];   backward  whether the tangent at d0 is that of d < kink
     """
 
     along: Floats
     cubic: float = 0.0
     backward_excess: float = 0.0
+    kink: float = 0.0
+    offset: float = 0.0
+    backward: bool = False
 
 
 @dataclass(frozen=True)

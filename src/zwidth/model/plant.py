@@ -71,6 +71,7 @@ class Plant:
                        None: nobody holds it
     sampled_forces     what the computer adds under load
     circulatory (n, n) C, antisymmetric, of forces that turn with what they act on [N/m]; None: none
+    without_load       the same without what the load changes; None: there is no load
     apart              the motions that no wall moves without load, as a plant of their own, if they do not count;
                        None: there are none, or they count
 
@@ -91,6 +92,7 @@ class Plant:
     hand_force: Array2 | None = None
     sampled_forces: tuple[SampledForce, ...] = ()
     circulatory: Array2 | None = None
+    without_load: Plant | None = None
     apart: Plant | None = None
 
     def __post_init__(self) -> None:
@@ -140,6 +142,7 @@ class Plant:
                 replace(force, along=force.along @ Z, reading=force.reading @ Z) for force in self.sampled_forces
             ),
             circulatory=both(self.circulatory),
+            without_load=None if self.without_load is None else self.without_load.on_motions(Z),
             apart=None,
         )
 
@@ -171,6 +174,7 @@ class Plant:
                 for force in self.sampled_forces
             ),
             circulatory=larger(self.circulatory),
+            without_load=None if self.without_load is None else self.without_load.padded(names),
         )
 
     def check_numbers(self) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.output import printable
 from zwidth.show.units import as_written, typed
@@ -18,6 +18,13 @@ AS_GIVEN: Final = "as given"  # a plant that no model reduces; an operator that 
 def operator_text(name: str) -> str:
     """An operator's name; one without a name is the file's own."""
     return "the operator of the file" if name == AS_GIVEN else printable(name)
+
+
+def load_text(table: Mapping[str, Any]) -> str:
+    """A [load] in words."""
+    from zwidth.device.load_choice import load_of_table
+
+    return load_of_table(dict(table)).text
 
 
 def omission_text(left_out: Sequence[str]) -> str:

@@ -66,8 +66,8 @@ def accelerate(system: System, memory: Memory, x: Floats, hand: Floats) -> None:
         if motor[i] != i:
             bent = x[motor[i]] - x[i]
             torque = bent * (spring[i] + cubic[i] * bent * bent)
-            if bent < 0.0:
-                torque += excess[i] * bent
+            if bent < system.kink[i]:
+                torque += excess[i] * (bent - system.kink[i])
             rest[i] += torque
             rest[motor[i]] -= torque
     for i in range(n):

@@ -186,8 +186,8 @@ def record_state(
         if motor[i] != i:
             bent = x[motor[i]] - x[i]
             elastic += 0.5 * spring[i] * bent**2 + 0.25 * system.cubic[i] * bent**4
-            if bent < 0.0:
-                elastic += 0.5 * system.excess[i] * bent**2
+            if bent < system.kink[i]:
+                elastic += 0.5 * system.excess[i] * (bent - system.kink[i]) ** 2
     for i in range(mech.parent.size):
         c = link_point(links.rotation, links.origin, i, mech.center_of_mass, 0, i)
         for k in range(3):

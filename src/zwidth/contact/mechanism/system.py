@@ -33,7 +33,7 @@ class System(NamedTuple):
     mech     the links
     motor    (d,)    coordinate of each motor; i itself where drive i is rigid
     rotor    (d,)    n^2 I [kg m^2];   spring (d,)  n^2 k [N m/rad], 0 where rigid
-    cubic, excess  (d,)  of a bent spring [N m/rad^3], [N m/rad]
+    cubic, excess, kink  (d,)  of a bent spring [N m/rad^3], [N m/rad], [rad]
     damping  (n, n)  B [N m s/rad]
     gravity  (3,)    [m/s^2]
     lag_along (l, n), lag_damping (l,), lag_time (l,), lag_command (l,)  lagged torques; the motor whose command
@@ -47,6 +47,7 @@ class System(NamedTuple):
     spring: Floats
     cubic: Floats
     excess: Floats
+    kink: Floats
     damping: Floats
     gravity: Floats
     lag_along: Floats
@@ -118,10 +119,11 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
     if actuator_lag > 0.0:
         along += list(np.eye(n)[motor])
         strength, lag, command = strength + [0.0] * d, lag + [actuator_lag] * d, command + list(range(d))
-    cubic, excess, friction, kind = np.zeros(d), np.zeros(d), np.zeros((d, 5)), np.zeros(d, np.int64)
+    cubic, excess, kink = np.zeros(d), np.zeros(d), np.zeros(d)
+    friction, kind = np.zeros((d, 5)), np.zeros(d, np.int64)
     for spring in plant.nonlinear.springs:
         i = int(np.flatnonzero(spring.along[motor] > 0.0)[0])
-        cubic[i], excess[i] = spring.cubic, spring.backward_excess
+        cubic[i], excess[i], kink[i] = spring.cubic, spring.backward_excess, spring.kink
     for part in plant.nonlinear.friction:
         i = int(np.flatnonzero(part.along[motor])[0])
         bristles = part.bristles
@@ -136,6 +138,7 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
         spring=np.where(flexible, n2 * np.where(flexible, drives.stiffness, 0.0), 0.0),
         cubic=cubic,
         excess=excess,
+        kink=kink,
         damping=np.ascontiguousarray(plant.damping),
         gravity=gravity.copy(),
         lag_along=np.array(along, dtype=np.float64).reshape(-1, n),

@@ -348,6 +348,13 @@ class DriveSection(Section):
         gt=0,
         default=None,
     )
+    preload_Nm: Torque | None = documented_key(
+        "torque at the motor by which a cable is preloaded: only where the motor pulls the joint back by more does "
+        "the stiffness become backward_stiffness_Nm_per_rad; omitted: it changes at no torque",
+        "N m",
+        gt=0,
+        default=None,
+    )
     brake_damping_max_Nms_per_rad: Damper | None = documented_key(
         "largest damping of a programmable brake on the rotor; omitted: no brake", "N m s/rad", ge=0, default=None
     )

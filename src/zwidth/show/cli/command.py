@@ -92,6 +92,7 @@ class Command:
     linear            does the answer leave out the nonlinear parts?
     may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
     takes_responses   does it answer for a measured response, too?
+    takes_loads       does it answer for a device under load?
     has_device        is it about a device that is read? Not where it writes a new one
     """
 
@@ -106,13 +107,14 @@ class Command:
     linear: ClassVar[bool] = True
     may_be_undecided: ClassVar[bool] = False
     takes_responses: ClassVar[bool] = False
+    takes_loads: ClassVar[bool] = True
     has_device: ClassVar[bool] = True
 
     # --- what a command says of itself ----------------------------------------------------------------
 
     def about(self, command: Callable[..., int]) -> Callable[..., int]:
         """Decorate it with the arguments and options of what it is about, which make its `Question`."""
-        return about_a_device(command)
+        return about_a_device(command, self.takes_loads)
 
     def check(self, case: CommandLine) -> None:
         """Refuse options that do not go together, before anything is loaded. Raises BadInput."""

@@ -57,14 +57,18 @@ def translate_errors(question: Question) -> Iterator[None]:
     from zwidth.loop.estimator import NonlinearError
     from zwidth.loop.point_errors import MissingNumbersError
     from zwidth.loop.sections import HysteresisError, UnmovedError
+    from zwidth.model.equilibrium import EquilibriumError
+    from zwidth.model.load import LoadError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
     from zwidth.model.response import ResponseError
 
     try:
         yield
-    except PostureError as error:
+    except (PostureError, EquilibriumError) as error:
         raise NoAnswer(str(error)) from None
+    except LoadError as error:
+        raise BadInput(f"{question.name}: load: {error}") from None
     except MissingNumbersError as error:
         raise NoAnswer(f"this {error}") from None
     except ChartError as error:

@@ -32,6 +32,7 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
                 where += f" ({amount(facts['projected_m'], 'm')} from the requested position)"
         place = f"{where}, assembly {facts['assembly']}, {place}"
     held = f", held by {operator_text(facts['operator'])}" if facts["operator"] else ""
+    held += "" if device.load is None else f", under {device.load.text}"
     lines = [f"{printable(device.name)}: {place}{held}", computer_text(device.controller)]
     return "\n".join(lines + ([omission(device)] if linear and device.linear_omissions else []))
 

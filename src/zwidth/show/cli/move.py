@@ -31,6 +31,7 @@ class MoveCommand(Command):
     gravity. It starts in the given posture; the hand is a force."""
 
     name = "move"
+    takes_loads = False
     summary = "Simulate the whole mechanism of DEVICE, free or against a surface."
     examples = (
         "zwidth move my-arms.toml --plane 0,0.28,0,-1 --stiffness 2000 --damping 5 --push 0,2",
@@ -87,6 +88,7 @@ class MoveCommand(Command):
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         # nobody holds the handle but by the push
         left_out = [OPERATOR] if case.device.operator is not None else []
+        left_out += ["the load"] if case.device.load is not None else []
         return super().circumstances(case) | {"operator": None, "left_out": left_out}
 
     def compute(self, case: CommandLine) -> MechanismMotion:

@@ -46,12 +46,18 @@ class Question:
     assembly: str | None = None
     model: str | None = None
     operator: str | None = None
+    load: tuple[float, ...] | None = None
+    gravity: tuple[float, ...] | None = None
 
     def device(self) -> Device:
-        """The device, loaded and checked. Raises DeviceError."""
+        """The device, loaded and checked, under its load. Raises DeviceError."""
         from zwidth.device.load import load
 
-        return load(self.name, self.settings, self.operator)
+        device = load(self.name, self.settings, self.operator)
+        if self.load is None and self.gravity is None:
+            return device
+        moment = device.renders_moments(self.direction, self.axis, self.characteristic_length)
+        return device.under(self.load, self.gravity, moment=moment)
 
     def point(self, device: Device) -> OperatingPoint:
         """The device's operating point. Raises what `Device.at` raises."""
@@ -108,11 +114,12 @@ class Question:
 
     def _where(self, device: Device) -> tuple[Floats | None, float | None]:
         """Position of the handle [m], and how far it was projected; as typed, and None, if out of reach."""
+        from zwidth.model.load import LoadError
         from zwidth.model.posture import PostureError
 
         try:
-            posture = device.at(self.at, orientation=self.orientation, assembly=self.assembly).posture
-        except PostureError:
+            posture = self.point(device).posture
+        except (PostureError, LoadError):
             return (None if isinstance(self.at, dict) else device.position(self.at)), None
         assert posture is not None
         return posture.position, float(posture.projected)
@@ -130,6 +137,7 @@ class Question:
             "assembly": self.assembly or device.reference_assembly,
             "model": self.model_of(device),
             "operator": self.operator_of(device),
+            **({} if device.load is None else {"load": device.document["load"]}),
             "sampling_period_s": device.controller.sampling_period,
             "delay_samples": device.controller.delay,
         }
@@ -222,8 +230,26 @@ class DirectionType(Numbers):
         return value if value in EXTREMES else super().convert(value, param, ctx)
 
 
-def about_a_device(command: Callback) -> Callback:
-    """Give a command DEVICE and the options of posture, direction, model and operator, as one `Question`."""
+LOAD_OPTIONS: Final = (
+    click.option(
+        "--load",
+        type=Numbers("FX,FY[,FZ]", (2, 3), "0,-5"),
+        help="Force of the hand on the handle [N], about an axis its moment [N m], under which the device is "
+        "linearised. Default: the [load] of DEVICE.",
+    ),
+    click.option(
+        "--gravity",
+        type=Numbers("GX,GY[,GZ]", (2, 3), "0,0,-9.81"),
+        help="Gravity [m/s²]. Default: the [load] of DEVICE.",
+    ),
+)
+
+
+def about_a_device(command: Callback, loads: bool = True) -> Callback:
+    """Give a command DEVICE and the options of posture, direction, load, model and operator, as one `Question`.
+
+    loads  whether it has the options of a load
+    """
     return _with_device_options(
         command,
         click.option(
@@ -253,6 +279,7 @@ def about_a_device(command: Callback) -> Callback:
             type=Numbers("ROLL,PITCH,YAW", (3,), "0,0,1.57"),
             help="Orientation of the handle [rad], where the drives control it.",
         ),
+        *(LOAD_OPTIONS if loads else ()),
     )
 
 
@@ -283,6 +310,7 @@ def about_a_workspace(command: Callback) -> Callback:
             help="Rendered direction, a vector of any length; worst: in each cell the direction in which the "
             "measure is worst.",
         ),
+        *LOAD_OPTIONS,
     )
 
 
@@ -313,6 +341,8 @@ def _with_device_options(command: Callback, *where: Any) -> Callback:
         ),
     ]
 
+    takes_loads = LOAD_OPTIONS[0] in where
+
     @wraps(command)
     def with_arguments(
         device: str,
@@ -325,10 +355,17 @@ def _with_device_options(command: Callback, *where: Any) -> Callback:
         axis: Any = None,
         characteristic_length: Any = None,
         orientation: Any = None,
+        load: Any = None,
+        gravity: Any = None,
         **more: Any,
     ) -> int:
         screw = axis, characteristic_length, orientation
-        return command(Question(device, settings, at, direction, *screw, assembly, model, operator), **more)
+        question = Question(device, settings, at, direction, *screw, assembly, model, operator)
+        if takes_loads:
+            question = replace(question, load=load, gravity=gravity)
+        else:
+            more["gravity"] = gravity  # the command's own
+        return command(question, **more)
 
     for decorate in reversed(decorators):
         with_arguments = decorate(with_arguments)

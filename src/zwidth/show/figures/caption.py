@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
+from zwidth.device.load_choice import table_of_load
 from zwidth.loop.wall_matrices import WallMatrices
-from zwidth.show.circumstances import AS_GIVEN, computer_text, omission_text, operator_text
+from zwidth.show.circumstances import AS_GIVEN, computer_text, load_text, omission_text, operator_text
 from zwidth.show.figures.style import FAMILY, context, wrapped
 from zwidth.show.output import printable
 from zwidth.show.units import as_written, point, way
@@ -101,6 +102,8 @@ def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]
     facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": at.linear_omissions if linear else ()}
     if at.model != "motor-mass" and at.operator is not None:
         facts["operator"] = at.operator_name or AS_GIVEN
+    if at.load is not None:
+        facts["load"] = table_of_load(at.load)
     if at.posture is not None and at.directions is not None:
         facts["assembly"] = at.posture.assembly
         if not at.shape:
@@ -160,6 +163,8 @@ def _place(facts: Mapping[str, Any]) -> Iterator[str]:
         yield f"{facts['model']} model"
     if facts.get("operator") not in (None, "none"):
         yield f"held by {operator_text(facts['operator'])}"
+    if facts.get("load"):
+        yield f"under {load_text(facts['load'])}"
     yield _environment(facts)
 
 
