@@ -70,8 +70,8 @@ class StabilityChart(Chart):
     @cached_property
     def other_branch(self) -> StabilityChart | None:
         """The chart on the other branch of springs that are bent to just where their stiffness changes; None where
-        there are none such. That both charts have a wall does not prove that the device, which switches between the
-        two, renders it."""
+        there are none such. That both charts have a wall does not prove that the device, which switches between
+        the two, renders it."""
         other = None if self.operating_point is None else self.operating_point.other_branch
         return None if other is None else stability_chart(other.loop, self.radius, decay=False).about(other)
 

@@ -150,8 +150,8 @@ def largest_stiffness_by_direction(
     that leaves the motions of the handle, the range of its Jacobian, has none: only its projection onto them could
     be rendered, and the factor 1/cos^2 would make its stiffness arbitrarily large.
 
-    point       a single posture of a mechanism, whatever its own direction. Under load the hand pushes as hard along
-                each direction, and a direction and its opposite differ
+    point       a single posture of a mechanism, whatever its own direction. Under load the hand pushes as hard
+                along each direction, and a direction and its opposite differ
     directions  (k, 3)  of any length but zero
     progress    called with "directions", those that are done, and all of them
     Raises      ValueError  for a direction without length, and what `OperatingPoint.plant_of_directions` raises

@@ -69,8 +69,8 @@ def bent_spring_force(
 
         V(q) = U(a + q) - F q - k q^2/2,    U(d) = cubic d^4/4 + excess min(d - kink, 0)^2/2
 
-    law  cubic, excess, the offset a at which it is bent already, and U's slope F and its tangent k there, which are
-         in the equilibrium and in the linear plant
+    law  cubic, excess, the offset a at which it is bent already, and U's slope F and its tangent k there, which
+         are in the equilibrium and in the linear plant
 
     By Newton's method on f = F(q1 + shift f), the difference quotient written out so that q1 = q0 is no case.
     """

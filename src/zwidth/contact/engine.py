@@ -159,8 +159,8 @@ def sample_forces(devices: PlantArrays, d: int, computer: Computer, added: Signa
 def step_sampled_forces(
     devices: PlantArrays, d: int, computer: Computer, added: Signals, new: int, h: float, memory: Floats
 ) -> None:
-    """Over a substep: what those that have arrived are worth on the average, behind the actuator's lag; into memory
-    (E, 4): the mean, and the force at the substep's end."""
+    """Over a substep: what those that have arrived are worth on the average, behind the actuator's lag; into
+    memory (E, 4): the mean, and the force at the substep's end."""
     for e in range(devices.kind.shape[1]):
         if devices.kind[d, e] == SAMPLED:
             wanted, lag, now = arrived_command(computer, added, e, new), devices.numbers[d, e, 1], memory[e, 1]

@@ -155,9 +155,9 @@ class Device:
         model       "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a given plant
                     as it is. "motor-mass" holds the link side, and so the operator, fixed: he does nothing to it
         operator    who holds the handle: an Operator, a bundled name or a file, "none"; left out: as the file says
-        load        force of the hand on the handle (2,) or (3,) [N], about an axis its moment [N m], or a `Load`: the
-                    device is linearised about the haptic equilibrium under it, see `docs/equilibrium.md`. Left out:
-                    as the file says
+        load        force of the hand on the handle (2,) or (3,) [N], about an axis its moment [N m], or a `Load`:
+                    the device is linearised about the haptic equilibrium under it, see `docs/equilibrium.md`. Left
+                    out: as the file says
         gravity     (2,) or (3,) [m/s^2], with a load or without; left out: as the file says
         Raises  DeviceError   with what cannot be meant for this device, or a mechanism that cannot be assembled or
                               driven as the file says

@@ -18,8 +18,8 @@ def document_under(
 ) -> Tables:
     """The device's document with another [load].
 
-    load     a `Load`; the hand's force (2,) or (3,), or about an axis its moment, in place of that of the document;
-             None: as the document says
+    load     a `Load`; the hand's force (2,) or (3,), or about an axis its moment, in place of that of the
+             document; None: as the document says
     gravity  (2,) or (3,) in place of the document's; None: as the document says
     Raises   DeviceError  for what is no load
     """

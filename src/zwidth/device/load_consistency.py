@@ -26,8 +26,8 @@ def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
     if is_number(load.get("push_N")) and load["push_N"] == 0:
         yield (
             ("load", "push_N"),
-            "is 0, which leaves a one-sided wall at the edge of contact, where nothing is linear; remove it for the "
-            "chart of the two-sided wall, or give the force with which the hand leans on the wall",
+            "is 0, which leaves a one-sided wall at the edge of contact, where nothing is linear; remove it for "
+            "the chart of the two-sided wall, or give the force with which the hand leans on the wall",
         )
     if load.get("settle") is True and "force_N" not in load:
         yield ("load", "settle"), "needs force_N, under which the device slides to where it is in balance"

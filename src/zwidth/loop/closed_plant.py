@@ -1,7 +1,7 @@
 """The sampled plant with the computer's fixed feedback closed, from the wall's force to the reading.
 
-Fixed are force sensor, feedforward and local loop, and what a load adds: the wall's constant force, which turns with
-the counted posture (`model.plant.SampledForce`).
+Fixed are force sensor, feedforward and local loop, and what a load adds: the wall's constant force, which turns
+with the counted posture (`model.plant.SampledForce`).
 
 All of it is linear, and it repeats itself every sampling period T, at two rates, too. So one period is gone
 through once, in order: readings, estimates and commands at the samples, the plant's exact growth in between. Every

@@ -198,7 +198,8 @@ class Loop:
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
-        """Motions that no wall moves, by name; they are cancelled, or stand apart, and do not count for stability."""
+        """Motions that no wall moves, by name; they are cancelled, or stand apart, and do not count for
+        stability."""
         return self.sections.unobserved + tuple(motion.name for motion in self.sideways_motions)
 
     @cached_property

@@ -86,8 +86,8 @@ class OperatingPoint(PosedDevice):
         )
 
     def _under_load(self, held: bool) -> Plant:
-        """The plant at the haptic equilibrium, with or without the operator; what no wall moves without load stands
-        apart, unless it is to count."""
+        """The plant at the haptic equilibrium, with or without the operator; what no wall moves without load
+        stands apart, unless it is to count."""
         assert self.load is not None
         plants = self.loaded_plants
         if held:
@@ -104,8 +104,8 @@ class OperatingPoint(PosedDevice):
         self.require("dynamics")
         if self.model not in ("full", "rigid"):
             raise ModelError(
-                f"model {self.model!r} has no form under load, where drives of unlike torques are no one spring; use "
-                "'full' or 'rigid'"
+                f"model {self.model!r} has no form under load, where drives of unlike torques are no one spring; "
+                "use 'full' or 'rigid'"
             )
         return linearise(self.loaded_mechanism, self._posture, self.equilibrium, self.damping, self.encoders)
 
@@ -119,8 +119,8 @@ class OperatingPoint(PosedDevice):
 
     @cached_property
     def other_branch(self) -> OperatingPoint | None:
-        """The same point on the other branch of the springs that under its load are bent to just where their stiffness
-        changes; None where there are none such."""
+        """The same point on the other branch of the springs that under its load are bent to just where their
+        stiffness changes; None where there are none such."""
         if self.load is None or not self.equilibrium.kinked:
             return None
         other: Literal["forward", "backward"] = "forward" if self.load.branch == "backward" else "backward"
@@ -147,7 +147,8 @@ class OperatingPoint(PosedDevice):
     @cached_property
     def computer(self) -> Controller:
         """The controller at this point: of a feedforward that is given as a share of the device's rigid mass, with
-        that mass [kg]; under load with what its constant force leaves of the force limit. Raises OperatingPointError where the device has none, or for several points."""
+        that mass [kg]; under load with what its constant force leaves of the force limit. Raises
+        OperatingPointError where the device has none, or for several points."""
         controller = self.controller
         if self.load is not None and isfinite(controller.force_limit):
             # of which the wall's constant force takes a part

@@ -7,8 +7,8 @@ readings belong to the states: the encoder's y, and the force f that a sensor at
 
 where a motion's acceleration is in it. Motions are left out that the force does not move, or that show in neither.
 
-Under load the computer adds forces of its own that it reads off the states (`model.plant.SampledForce`). All motions
-are kept then.
+Under load the computer adds forces of its own that it reads off the states (`model.plant.SampledForce`). All
+motions are kept then.
 """
 
 from __future__ import annotations
@@ -100,9 +100,9 @@ class PlantStates:
         return np.append([x for mode in self.modes for x in mode.force_output], own)
 
     def growth(self, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-        """exp(A t) - 1 (k, k), and the states (k, 1 + r) that unit lagged forces without command leave after a time,
-        and unit commands from rest, of the wall and of each of the r forces beside it; without lag the command is
-        the force."""
+        """exp(A t) - 1 (k, k), and the states (k, 1 + r) that unit lagged forces without command leave after a
+        time, and unit commands from rest, of the wall and of each of the r forces beside it; without lag the
+        command is the force."""
         from scipy.linalg import block_diag
 
         if self.sampled and self.form is not None:
@@ -176,8 +176,8 @@ def _coupled_states(plant: Plant, period: float, force_rows: Floats | None) -> P
 def _loaded_states(
     plant: Plant, period: float, force_rows: Floats | None, force_filter: LowPass | None
 ) -> PlantStates:
-    """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces of
-    lagged dampers. What is neutral without load no longer is, and nothing is left out."""
+    """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
+    of lagged dampers. What is neutral without load no longer is, and nothing is left out."""
     n, T, lags = plant.size, period, plant.lagged_dampers
     squared, V = undamped_modes(plant.mass, plant.stiffness)
     K, B = np.diag(squared), V.T @ plant.damping @ V

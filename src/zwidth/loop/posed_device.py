@@ -263,8 +263,8 @@ class PosedDevice:
 
     @property
     def loaded_mechanism(self) -> Mechanism:
-        """One design's mechanism as it is linearised under load: the ratios of tables looked up at its posture, and
-        all drives rigid in the rigid model. Raises NoMechanismError as `jacobian`, OperatingPointError."""
+        """One design's mechanism as it is linearised under load: the ratios of tables looked up at its posture,
+        and all drives rigid in the rigid model. Raises NoMechanismError as `jacobian`, OperatingPointError."""
         self._check_single("equilibrium")
         posture = self._posture
         assert self.mechanism is not None

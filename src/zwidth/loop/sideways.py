@@ -1,8 +1,8 @@
 """Motions that no wall moves without load: how fast they grow or decay under one.
 
 A free device slides along a wall as it likes, neither pushed nor held: its roots stay at z = 1. Under load it is
-pushed: by the hand's force, whose lever arms change, and by the computer's, which turns with the counts a little late.
-With rigid drives the two cancel but for that delay, and one root of each motion moves by the order of
+pushed: by the hand's force, whose lever arms change, and by the computer's, which turns with the counts a little
+late. With rigid drives the two cancel but for that delay, and one root of each motion moves by the order of
 (1/2 + delay)(w T)^2 from 1; with flexible drives a static part of the order of the load stays.
 """
 
@@ -54,7 +54,8 @@ class SidewaysMotion:
 
 
 def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMotion, ...]:
-    """The motions of a plant under a computer that renders no wall, one for each coordinate, fastest-growing first.
+    """The motions of a plant under a computer that renders no wall, one for each coordinate, fastest-growing
+    first.
 
     Of the two roots of a coordinate that are real, the larger one counts.
     """

@@ -23,6 +23,7 @@ def refuse_feedback(controller: Controller, what: str, instead: str) -> None:
 
 
 def refuse_load(plant: Plant, what: str, instead: str) -> None:
-    """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as before."""
+    """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as
+    before."""
     if plant.is_loaded:
         raise FeedbackError(f"{what} under load; {instead}")

@@ -20,8 +20,8 @@ STEP: Final = 0.2  # turn of a driven joint that is taken at once [rad]
 
 
 def moved_posture(mechanism: Mechanism, angles: Floats, step: Floats) -> Floats | None:
-    """Joint coordinates (n,) after the independent coordinates of one design, drives and then free joints, have moved
-    by a step (c,), in parts of STEP; None where the loops cannot follow.
+    """Joint coordinates (n,) after the independent coordinates of one design, drives and then free joints, have
+    moved by a step (c,), in parts of STEP; None where the loops cannot follow.
 
     angles  (n,) of a posture with closed loops [rad], [m]. Free ball joints are not moved
     """

@@ -8,8 +8,8 @@ and the computer, which asks for the wall's force f along the rendered direction
 
     s = t(p_c) f + compensation(p_c),    T^T t = h,  h = J^T u                      at the posture p_c it counts
 
-Behind rigid drives p_c = p, so that F = -f u without gravity, in every posture. Behind flexible ones p_c is ahead by
-the deflections: the torques J(p_c)^T u f are not those of a force along u at p, and the hand has to supply the
+Behind rigid drives p_c = p, so that F = -f u without gravity, in every posture. Behind flexible ones p_c is ahead
+by the deflections: the torques J(p_c)^T u f are not those of a force along u at p, and the hand has to supply the
 difference, a small force across the direction.
 """
 
@@ -182,8 +182,8 @@ class Balance:
         return rows
 
     def solve(self) -> Equilibrium:
-        """The deflections of the flexible drives and the wall's force; where the whole load at once leads nowhere, it
-        is brought on in steps."""
+        """The deflections of the flexible drives and the wall's force; where the whole load at once leads
+        nowhere, it is brought on in steps."""
         start = np.zeros(len(self.ratio)), 0.0
         found = self._newton(1.0, *start)
         for step in range(1, RAMP + 1) if found is None else ():
@@ -225,8 +225,8 @@ class Balance:
 
     def _not_held(self) -> str:
         return (
-            f"no equilibrium was found under {self.load.text}: the springs of the drives bend further than the device can move; "
-            "is the load too large, or a stiffness too small?"
+            f"no equilibrium was found under {self.load.text}: the springs of the drives bend further than the "
+            "device can move; is the load too large, or a stiffness too small?"
         )
 
     def _compensated(self, counted: CountedPosture) -> Floats:
@@ -314,8 +314,8 @@ class Balance:
         name = self.mechanism.links.names[unknowns[loose[0]]]
         what = "free joint" if loose[0] >= len(self.mechanism.driven) else "joint"
         raise EquilibriumError(
-            f"nothing balances {abs(float(left[loose[0]])):.4g} N m at the {what} {name!r}, neither a drive nor the "
-            "hand at the handle; give the joint a spring, compensate gravity, or ask for another posture"
+            f"nothing balances {abs(float(left[loose[0]])):.4g} N m at the {what} {name!r}, neither a drive nor "
+            "the hand at the handle; give the joint a spring, compensate gravity, or ask for another posture"
         )
 
     def _check_torques(self, torques: Floats) -> None:
@@ -326,8 +326,8 @@ class Balance:
         if len(over):
             i = int(over[np.argmax(wanted[over] / limits[over])])
             raise EquilibriumError(
-                f"under this load drive {self.mechanism.drives.names[i]!r} needs {wanted[i]:.4g} N m at its motor, "
-                f"more than its limit of {limits[i]:.4g} N m; choose a smaller load, or another posture"
+                f"under this load drive {self.mechanism.drives.names[i]!r} needs {wanted[i]:.4g} N m at its "
+                f"motor, more than its limit of {limits[i]:.4g} N m; choose a smaller load, or another posture"
             )
 
     def _check_across(self, found: Equilibrium) -> None:
@@ -339,17 +339,17 @@ class Balance:
         off, needed = np.linalg.norm(across - found.sideways_force), found.sideways_force
         if np.any(np.abs(across) > ALONG * np.linalg.norm(force)) and off > UNBALANCED * np.linalg.norm(force):
             raise LoadError(
-                f"the load {vector_text(force)} has a part {vector_text(across)} across the rendered direction, where the wall "
-                f"does not hold it, and this posture needs {vector_text(needed)}; give the part along the direction "
-                "alone, or ask with settle for the posture in which this load is in balance"
+                f"the load {vector_text(force)} has a part {vector_text(across)} across the rendered direction, "
+                f"where the wall does not hold it, and this posture needs {vector_text(needed)}; give the part "
+                "along the direction alone, or ask with settle for the posture in which this load is in balance"
             )
 
 
 def command_change(
     counted: CountedPosture, screw: Floats, gravity: Floats, compensation: Compensation, wall_force: float
 ) -> Floats:
-    """By how much the torques that the computer asks for change with the drives' coordinates that it counts, (d, d),
-    at a constant force of the wall: its force turns with the counts, and gravity with what is computed of it.
+    """By how much the torques that the computer asks for change with the drives' coordinates that it counts, (d,
+    d), at a constant force of the wall: its force turns with the counts, and gravity with what is computed of it.
 
         tau = T G b,  G = (T^T T)^-1,  b = f h - w(p_c)
 

@@ -27,19 +27,20 @@ class Load:
 
     force         (3,)  of the hand on the handle [N]
     moment        (3,)  of the hand instead, where moments about an axis are rendered [N m]
-    push          instead of either: its part along the rendered direction, whichever that is, of either sign [N]. With
-                  none of the three the wall is at rest, without force, and the hand only holds the device
+    push          instead of either: its part along the rendered direction, whichever that is, of either sign [N].
+                  With none of the three the wall is at rest, without force, and the hand only holds the device
     gravity       (3,)  [m/s^2]
     hand          "dead": the hand's force keeps its direction in space as the device moves; "follower": it turns
                   with the handle's link
     posture_of    whose posture is asked for, that of the "handle" or of the "motors" as the computer counts them
     settle        True: the force is the hand's whole force, and the device slides along the surface to where that
-                  is in balance; False: the posture is kept, and the hand supplies what it needs across the rendered
-                  direction
+                  is in balance; False: the posture is kept, and the hand supplies what it needs across the
+                  rendered direction
     surface_radius  of the surface about the handle [m]: positive for one that is convex towards the hand, negative
                   for a hollow one, inf for a plane
     count_sideways  whether the motions that no wall moves without load count for stability, too
-    branch        of springs whose torque is 0 where their stiffness changes: "forward", the motor ahead, or "backward"
+    branch        of springs whose torque is 0 where their stiffness changes: "forward", the motor ahead, or
+                  "backward"
 
     Raises  LoadError  for a force of 0, numbers that are not finite, a radius of 0, several forces
             ValueError for an unknown word
@@ -76,8 +77,8 @@ class Load:
             raise LoadError(f"push must be a finite number [N], got {self.push!r}")
         if given and not np.any(getattr(self, given[0])):
             raise LoadError(
-                "a load of 0 N leaves a one-sided wall at the edge of contact, where nothing is linear; leave it out "
-                "for the chart of the two-sided wall, or give the force with which the hand leans on the wall"
+                "a load of 0 N leaves a one-sided wall at the edge of contact, where nothing is linear; leave it "
+                "out for the chart of the two-sided wall, or give the force with which the hand leans on the wall"
             )
         check_choice("hand", self.hand, get_args(HandForce))
         check_choice("posture_of", self.posture_of, get_args(PostureOf))
@@ -132,8 +133,8 @@ class Load:
         along = float(given @ way) / float(way @ way)
         if not abs(along) * float(np.linalg.norm(way)) > ALONG * float(np.linalg.norm(given)):
             raise LoadError(
-                f"the load {vector_text(given)} does not push along the rendered direction {vector_text(way)}, where "
-                "the wall would hold it; choose one with a part along the direction"
+                f"the load {vector_text(given)} does not push along the rendered direction {vector_text(way)}, "
+                "where the wall would hold it; choose one with a part along the direction"
             )
         return along
 

@@ -2,15 +2,15 @@
 
 Two halves, since one acts at every instant and the other at samples:
 
-- the links feel the hand's force F, gravity and the torques s of their drives all the time. With second derivatives
-  as in `motions`,
+- the links feel the hand's force F, gravity and the torques s of their drives all the time. With second
+  derivatives as in `motions`,
 
       K += -(F . d2x/dp2 + dw/dp + sum_i s_i d2z_i/dp2)
 
 - the computer turns its force with the motors that it counts: torques change by S dz, S of `command_change`, at
   samples, held and late as everything that it commands. So does the surface's normal, by 1/R per way along it.
 
-Rigid drives without delay let the halves cancel but for what sampling leaves. Either of them alone is another device.
+Rigid drives without delay let the halves cancel but for what sampling leaves. Either alone is another device.
 
 Springs keep the tangent k + 3 k_3 d^2 that they have at their deflection, on the branch on which they are.
 """

@@ -1,9 +1,9 @@
 """The posture that a device takes under load, from the one that is asked for.
 
-The posture asked for is that of the handle, and the load changes nothing of it but where free joints hang. Or it is
-that of the motors as the computer counts them; then the handle gives way by the bending of the drives. Or the device
-settles: it slides along the surface to where the hand's force, as it is given, is in balance. A free joint turns to
-where gravity and its spring leave it.
+The posture asked for is that of the handle, and the load changes nothing of it but where free joints hang. Or it
+is that of the motors as the computer counts them; then the handle gives way by the bending of the drives. Or the
+device settles: it slides along the surface to where the hand's force, as it is given, is in balance. A free joint
+turns to where gravity and its spring leave it.
 """
 
 from __future__ import annotations
@@ -94,7 +94,8 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
 def _behind_motors(
     mechanism: Mechanism, asked: Posture, at: Posture, balance: Callable[[Posture], Balance]
 ) -> Posture:
-    """The links' posture where the motors count the one that is asked for: behind it by the bending of the drives."""
+    """The links' posture where the motors count the one that is asked for: behind it by the bending of the
+    drives."""
     k, c = len(mechanism.driven), Motions(mechanism, asked.angles).count
     for _ in range(STEPS):
         found = balance(at).solve()
@@ -104,8 +105,8 @@ def _behind_motors(
         coordinates = found.motions.mech.to_drive[0, :k, :k] @ away
         at = _moved(mechanism, at, np.append(coordinates, np.zeros(c - k)))
     raise EquilibriumError(
-        "no posture was found whose motors stand where they were asked to: the load bends the drives too far; choose "
-        "a smaller load"
+        "no posture was found whose motors stand where they were asked to: the load bends the drives too far; "
+        "choose a smaller load"
     )
 
 
@@ -132,9 +133,9 @@ def _settled(
     if found is None:
         left = balance(at).solve().hand_force - force
         raise EquilibriumError(
-            f"no posture was found near this one in which the load alone is in balance: here the hand has to supply "
-            f"{float(np.linalg.norm(across.T @ left)):.4g} N more across the direction; leave settle out, which keeps "
-            "the posture and lets the hand supply it"
+            f"no posture was found near this one in which the load alone is in balance: here the hand has to "
+            f"supply {float(np.linalg.norm(across.T @ left)):.4g} N more across the direction; leave settle out, "
+            "which keeps the posture and lets the hand supply it"
         )
     return found
 
@@ -155,14 +156,14 @@ def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balanc
     names = [mechanism.links.names[i].partition("/")[0] for i in mechanism.free]
     if any(mechanism.links.joint[i] >= BALL_X for i in mechanism.free):
         raise EquilibriumError(
-            f"where the free ball joint {names[0]!r} would hang under this load is not searched for; place its centre "
-            "of mass at the joint, or leave gravity out"
+            f"where the free ball joint {names[0]!r} would hang under this load is not searched for; place its "
+            "centre of mass at the joint, or leave gravity out"
         )
     found = _newton(mechanism, at, off, np.arange(k, k + count), SETTLED)
     if found is None:
         raise EquilibriumError(
-            f"no place was found where the free joint {names[0]!r} is in balance under this load; give it a spring, or "
-            "another angle in the assembly"
+            f"no place was found where the free joint {names[0]!r} is in balance under this load; give it a "
+            "spring, or another angle in the assembly"
         )
     return found
 
@@ -174,8 +175,8 @@ def _newton(
     moved: NDArray[np.int64],
     settled: float,
 ) -> Posture | None:
-    """The posture near `at` in which `off` (m,) is 0, as m of the independent coordinates move; None if there is none
-    to be found."""
+    """The posture near `at` in which `off` (m,) is 0, as m of the independent coordinates move; None if there is
+    none to be found."""
     c = at.jacobian.shape[-1]
     for _ in range(STEPS):
         try:

@@ -203,8 +203,8 @@ class Mechanism:
     reference_rotation  (..., 3, 3)  axes of the handle in the base frame at the reference; None: where the
                   assembly has them, which only a mechanism that controls the position alone may leave open
     free          (f,)         links whose joint coordinate nobody drives and no loop determines
-    gravity_compensation       "none"; "computed", by the computer, from the posture that it counts; "counterweight",
-                  by masses or springs that balance the links in every posture
+    gravity_compensation       "none"; "computed", by the computer, from the posture that it counts;
+                  "counterweight", by masses or springs that balance the links in every posture
     """
 
     links: Links

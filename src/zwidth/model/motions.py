@@ -106,7 +106,8 @@ class Motions:
         return self.mech.driven + self.mech.free
 
     def point(self, link: int, local: Floats) -> Motion:
-        """A point (3,) of a link's frame [m], with that frame, in the independent coordinates; link -1: the base."""
+        """A point (3,) of a link's frame [m], with that frame, in the independent coordinates; link -1: the
+        base."""
         arm = local if link < 0 else self.rotation[link] @ local
         return self._links[link].at(arm).in_coordinates(self.rates, self.rates_2)
 

@@ -119,7 +119,8 @@ class Plant:
         return bool(self.sampled_forces) or self.circulatory is not None
 
     def on_motions(self, motions: Floats) -> Plant:
-        """The plant as it moves on some motions alone, the columns of (n, m); their amplitudes are its coordinates."""
+        """The plant as it moves on some motions alone, the columns of (n, m); their amplitudes are its
+        coordinates."""
         Z = np.asarray(motions)
 
         def both(matrix: Floats | None) -> Floats | None:

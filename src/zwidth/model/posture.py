@@ -83,8 +83,8 @@ class Posture:
     assembly          name of the assembly
     position          (..., 3)     handle [m]; where not OK the requested one
     projected         (...)        distance from the requested position [m]; 0 unless it was projected
-    status            (...)        OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT or NO_EQUILIBRIUM; where not OK the numbers below are
-                      nan
+    status            (...)        OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT or NO_EQUILIBRIUM; where not OK the
+                      numbers below are nan
     angles            (..., n)     joint coordinates, 0 for fixed joints [rad], of prismatic joints [m]
     mass_matrix       (..., c, c)  M of the links in the independent coordinates [kg m^2]: the driven joints, then
                                    the free ones

@@ -6,8 +6,8 @@ theta the motor's angle less f(q0), over n(q0), a spring k at the motor gives th
     n(q) k (n(q0) theta - f(q) + f(q0)) = n(q0)^2 k (theta - (q - q0)) + second order
 
 so that every linear answer is that of the constant ratio n(q0). With a torque tau at the motor at rest, as of a
-hand that leans on a wall, the joint has the torque n'(q0) tau (q - q0) besides; `equilibrium` has it, with all else
-that a load changes.
+hand that leans on a wall, the joint has the torque n'(q0) tau (q - q0) besides; `equilibrium` has it, with all
+else that a load changes.
 """
 
 from __future__ import annotations

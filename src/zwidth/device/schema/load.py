@@ -17,8 +17,8 @@ class LoadSection(Section):
         default=None,
     )
     push_N: Number | None = documented_key(
-        "force of the hand along the rendered direction, whichever that is, of either sign; about an axis its moment "
-        "in N m",
+        "force of the hand along the rendered direction, whichever that is, of either sign; about an axis its "
+        "moment in N m",
         "N",
         default=None,
     )
@@ -29,8 +29,8 @@ class LoadSection(Section):
         "gravity, x, y or x, y, z, such as [0, 0, -9.81]; omitted: none", "m/s^2", default=None
     )
     hand: Literal["dead", "follower"] = documented_key(
-        'how the hand\'s force goes with the handle: "dead": it keeps its direction in space; "follower": it turns '
-        "with the handle's link",
+        'how the force of the hand goes with the handle: "dead": it keeps its direction in space; "follower": it '
+        "turns with the handle's link",
         default="dead",
     )
     posture_of: Literal["handle", "motors"] = documented_key(
@@ -44,8 +44,8 @@ class LoadSection(Section):
         default=False,
     )
     surface_radius_m: NumberOrInfinity | None = documented_key(
-        "radius of the surface at the handle, positive if it is convex towards the hand, negative if it is hollow; "
-        "omitted: a plane",
+        "radius of the surface at the handle, positive if it is convex towards the hand, negative if it is "
+        "hollow; omitted: a plane",
         "m",
         default=None,
     )

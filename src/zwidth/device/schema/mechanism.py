@@ -349,8 +349,8 @@ class DriveSection(Section):
         default=None,
     )
     preload_Nm: Torque | None = documented_key(
-        "torque at the motor by which a cable is preloaded: only where the motor pulls the joint back by more does "
-        "the stiffness become backward_stiffness_Nm_per_rad; omitted: it changes at no torque",
+        "torque at the motor by which a cable is preloaded: only where the motor pulls the joint back by more "
+        "does the stiffness become backward_stiffness_Nm_per_rad; omitted: it changes at no torque",
         "N m",
         gt=0,
         default=None,
@@ -426,9 +426,9 @@ class MechanismSection(Section):
         "structural damping, one of the three ways; omitted only where no drive is flexible", default=None
     )
     gravity_compensation: Literal["none", "computed", "counterweight"] = documented_key(
-        'how gravity is compensated under a load with gravity: "none"; "computed", by torques that the computer works '
-        'out from the posture that it counts; "counterweight", by masses or springs that balance the links in every '
-        "posture",
+        'how gravity is compensated under a load with gravity: "none"; "computed", by torques that the computer '
+        'works out from the posture that it counts; "counterweight", by masses or springs that balance the links '
+        "in every posture",
         default="none",
     )
     friction: DriveFrictionSection = documented_key(

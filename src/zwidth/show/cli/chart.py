@@ -155,8 +155,8 @@ def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
         names = ", ".join(point.drives.names[i] for i in found.kinked)
         yield (
             "on the other branch",
-            f"largest stiffness {_stiffest(other)} (of {names}, without torque, whose stiffness changes there; a wall "
-            "stable on both branches is not proven stable for the device that switches between them)",
+            f"largest stiffness {_stiffest(other)} (of {names}, without torque, whose stiffness changes there; a "
+            "wall stable on both branches is not proven stable for the device that switches between them)",
         )
 
 

@@ -72,7 +72,8 @@ class PolarCommand(Command):
         question = case.question
         if case.device.mechanism is None:
             raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; use zwidth chart")
-        question.refuse_unsupported(case.device)
+        if case.device.load is None:  # under load each direction is computed by itself
+            question.refuse_unsupported(case.device)
         return case.point.by_direction(case["plane"], case["count"], progress=case.progress)
 
     def reason(self, case: CommandLine, result: ByDirection) -> str | None:
