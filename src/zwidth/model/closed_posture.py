@@ -10,8 +10,8 @@ from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import apply_step, closure_step, equations, passive_rates
 from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, largest_magnitude
 from zwidth.model.forward_kinematics import WorkingMemory, move_joints, place_links, working_memory
-from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.mechanism_arrays import MechanismArrays, pack
+from zwidth.model.mechanism import Floats
+from zwidth.model.mechanism_arrays import MechanismArrays
 
 NOT_CLOSED: Final = -1.0
 ROUNDING: Final = 1e-14  # turn of a joint below which Newton has nothing more to gain [rad]
@@ -19,15 +19,16 @@ SURE: Final = 1e-7  # turn whose square is rounding: the next iteration would no
 STEP: Final = 0.2  # turn of a driven joint that is taken at once [rad]
 
 
-def moved_posture(mechanism: Mechanism, angles: Floats, step: Floats) -> Floats | None:
+def moved_posture(mech: MechanismArrays, angles: Floats, step: Floats) -> Floats | None:
     """Joint coordinates (n,) after the independent coordinates of one design, drives and then free joints, have
     moved by a step (c,), in parts of STEP; None where the loops cannot follow.
 
+    mech    of one design
     angles  (n,) of a posture with closed loops [rad], [m]. Free ball joints are not moved
     """
     out = np.array(angles, dtype=np.float64)
     parts = 1 + int(min(np.max(np.abs(step), initial=0.0) / STEP, 1e4))
-    return out if _move(pack(mechanism), out, np.array(step, dtype=np.float64) / parts, parts) else None
+    return out if _move(mech, out, np.array(step, dtype=np.float64) / parts, parts) else None
 
 
 @compiled

@@ -77,19 +77,21 @@ class CountedPosture:
     seen: Floats
 
 
-def counted_posture(mechanism: Mechanism, angles: Floats, ahead: Floats, ratio: Floats) -> CountedPosture | None:
+def counted_posture(
+    mechanism: Mechanism, start: Motions, angles: Floats, ahead: Floats, ratio: Floats
+) -> CountedPosture | None:
     """The posture whose drive coordinates are nearest, by least squares, to those that are counted.
 
         T^T (z(p) - z) = 0         dp/dz = (T^T T + sum_i r_i Z_i)^-1 T^T,   r = z(p) - z
 
     With a drive for each coordinate r is 0. Free joints are taken to stand where they do.
 
-    angles   (n,) of the device;   ahead (d,)  by what the counted coordinates are ahead of those of its joints
+    start    motions of the device;   angles (n,)  its joint coordinates
+    ahead    (d,)  by what the counted coordinates are ahead of those of its joints
     Returns  None where the joints cannot be there
     """
-    at, k = angles, len(mechanism.driven)
+    mech, at, motions, k = start.mech, angles, start, len(mechanism.driven)
     for _ in range(STEPS):
-        motions = Motions(mechanism, at)
         drives = DriveMotion.of(mechanism, motions, at, ratio)
         T, Z = drives.T[:, :k], drives.Z[:, :k, :k]
         away = drive_travel(mechanism, angles, at, ratio) - ahead
@@ -97,8 +99,8 @@ def counted_posture(mechanism: Mechanism, angles: Floats, ahead: Floats, ratio: 
         step = -(seen @ away)
         if not np.max(np.abs(step), initial=0.0) > SETTLED:
             return CountedPosture(at, motions, drives, np.asarray(seen, dtype=np.float64))
-        moved = moved_posture(mechanism, at, np.append(step, np.zeros(motions.count - k)))
+        moved = moved_posture(mech, at, np.append(step, np.zeros(motions.count - k)))
         if moved is None or not np.isfinite(moved).all():
             return None
-        at = moved
+        at, motions = moved, Motions(mech, moved)
     return None

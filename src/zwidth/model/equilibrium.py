@@ -25,6 +25,7 @@ from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_postu
 from zwidth.model.drive_springs import DriveSprings
 from zwidth.model.load import ALONG, Load, LoadError, vector_text
 from zwidth.model.mechanism import ORIENTATION, POSITION, Compensation, Floats, Mechanism
+from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
 from zwidth.model.posture import Posture
 
@@ -145,7 +146,7 @@ class Balance:
         self, mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool
     ) -> None:
         self.mechanism, self.angles, self.screw, self.load = mechanism, posture.angles, screw, load
-        self.counts_motors, self.motions = counts_motors, Motions(mechanism, posture.angles)
+        self.counts_motors, self.motions = counts_motors, Motions(pack(mechanism), posture.angles)
         self.ratio = np.asarray(mechanism.drives.transmission)
         self.drives = DriveMotion.of(mechanism, self.motions, posture.angles, self.ratio)
         self.springs = DriveSprings.of(mechanism.drives)
@@ -200,7 +201,11 @@ class Balance:
         ahead = ahead.copy()
         for _ in range(STEPS):
             counted = counted_posture(
-                self.mechanism, self.angles, ahead if self.counts_motors else np.zeros_like(ahead), self.ratio
+                self.mechanism,
+                self.motions,
+                self.angles,
+                ahead if self.counts_motors else np.zeros_like(ahead),
+                self.ratio,
             )
             if counted is None:
                 return None

@@ -100,7 +100,8 @@ def _force_left(mechanism: Mechanism, equilibrium: Equilibrium, share: Floats) -
 def _links_stiffness(equilibrium: Equilibrium) -> Floats:
     """-dQ/dp (c, c) of hand, gravity and drives' torques on the links."""
     handle, drives, load = equilibrium.motions.handle, equilibrium.drives, equilibrium.load
-    force, moment = equilibrium.hand_force, equilibrium.hand_moment
+    felt = 0.0 if load.hand == "neglected" else 1.0
+    force, moment = felt * equilibrium.hand_force, felt * equilibrium.hand_moment
     K = np.tensordot(force, handle.speed_2, 1) + np.tensordot(moment, handle.turning, 1)
     if load.hand == "follower":  # the force turns by W dp with the handle's link
         K = (

@@ -25,7 +25,6 @@ from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.load import Load, LoadError
 from zwidth.model.mechanism import BALL_X, POSITION, Floats, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-from zwidth.model.motions import Motions
 from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
 from zwidth.model.ratio_table import drives_at
 
@@ -96,7 +95,7 @@ def _behind_motors(
 ) -> Posture:
     """The links' posture where the motors count the one that is asked for: behind it by the bending of the
     drives."""
-    k, c = len(mechanism.driven), Motions(mechanism, asked.angles).count
+    k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
         found = balance(at).solve()
         away = asked.angles[mechanism.driven] - found.counted.angles[mechanism.driven]
@@ -203,10 +202,10 @@ def _newton(
 
 def _moved(mechanism: Mechanism, at: Posture, step: Floats) -> Posture:
     """The posture after a step (c,) of the independent coordinates."""
-    angles = moved_posture(mechanism, at.angles, step)
+    mech, c = pack(mechanism), len(step)
+    angles = moved_posture(mech, at.angles, step)
     if angles is None:
         raise EquilibriumError("under this load the device would leave its workspace; choose a smaller load")
-    mech, c = pack(mechanism), len(step)
     mass, jacobian, angular = np.empty((1, c, c)), np.empty((1, 3, c)), np.empty((1, 3, c))
     position, turn = np.empty(3), np.empty((3, 3))
     _describe(mech, angles, mass, jacobian, angular, position, turn)

@@ -30,9 +30,10 @@ import numpy as np
 
 from zwidth.compiled import compiled
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats, Mechanism
-from zwidth.model.mechanism_arrays import MechanismArrays, pack
+from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats
+from zwidth.model.mechanism_arrays import MechanismArrays
 
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # rows of a cross product
 RANK: Final = 1e-10  # share of the largest singular value below which a closure's equation says nothing new
 
 
@@ -89,12 +90,12 @@ class Motions:
     rates     (m, c) B,   rates_2 (m, c, c)  B2
     """
 
-    def __init__(self, mechanism: Mechanism, angles: Floats) -> None:
+    def __init__(self, mech: MechanismArrays, angles: Floats) -> None:
         """Place the links.
 
-        angles  (n,) joint coordinates of a posture with closed loops [rad], [m]
+        mech    of one design;   angles (n,) joint coordinates of a posture with closed loops [rad], [m]
         """
-        self.mech = pack(mechanism)
+        self.mech = mech
         self.unknowns = self.mech.joint
         self.rotation, self._origin, self._axis = _place(self.mech, angles)
         self._links = self._all_links()
@@ -201,13 +202,15 @@ class Motions:
 
 def _cross(forms: Floats, arm: Floats) -> Floats:
     """Linear or quadratic forms (3, ...), crossed with an arm (3,)."""
-    return np.moveaxis(np.cross(np.moveaxis(forms, 0, -1), arm), -1, 0)
+    x, y, z = arm
+    turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    return np.asarray((turn @ forms.reshape(3, -1)).reshape(forms.shape))
 
 
 def _cross_forms(a: Floats, b: Floats) -> Floats:
     """The symmetric quadratic form (3, u, u) of (a u') x (b u')."""
-    product = np.moveaxis(np.cross(a.T[:, None, :], b.T[None, :, :]), -1, 0)
-    return np.asarray(0.5 * (product + np.swapaxes(product, 1, 2)))
+    product = a[NEXT, :, None] * b[LAST, None, :] - a[LAST, :, None] * b[NEXT, None, :]
+    return np.asarray(0.5 * (product + product.transpose(0, 2, 1)))
 
 
 def _place(mech: MechanismArrays, angles: Floats) -> tuple[Floats, Floats, Floats]:

@@ -28,9 +28,9 @@ class LoadSection(Section):
     gravity_m_per_s2: Position | None = documented_key(
         "gravity, x, y or x, y, z, such as [0, 0, -9.81]; omitted: none", "m/s^2", default=None
     )
-    hand: Literal["dead", "follower"] = documented_key(
+    hand: Literal["dead", "follower", "neglected"] = documented_key(
         'how the force of the hand goes with the handle: "dead": it keeps its direction in space; "follower": it '
-        "turns with the handle's link",
+        'turns with the handle\'s link; "neglected": how its lever arms change is left out, as in the thesis',
         default="dead",
     )
     posture_of: Literal["handle", "motors"] = documented_key(
