@@ -146,7 +146,7 @@ class ContactSimulation(Result):
     @property
     def loop(self) -> Loop:
         """The device without its operator, who is in `hand`."""
-        return self.point.without_operator.loop
+        return self.point.contact_loop
 
     @property
     def force_limit(self) -> float:

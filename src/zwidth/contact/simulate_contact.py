@@ -141,7 +141,7 @@ def simulate_contact(
         start_position = wall_position + (-DEPTH if touched.surface else DEPTH)
     _distance_from_path(point, wall_position, "wall_position")
     off_path = _distance_from_path(point, start_position, "start_position")
-    loop = point.without_operator.loop
+    loop = point.contact_loop
     growth = predicted_growth(point.loop, touched, values)
     run = Run(
         loop,

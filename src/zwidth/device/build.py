@@ -157,6 +157,7 @@ def operator(section: OperatorSection) -> Operator:
         arm_damping=section.arm_damping_Ns_per_m,
         grasp_stiffness=None if rigid else section.grasp_stiffness_N_per_m,
         grasp_damping=None if rigid else value_or(section.grasp_damping_Ns_per_m, 0.0),
+        directions=section.directions,
     )
 
 

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
 from zwidth.device import build_nonlinear
+from zwidth.device.arm_consistency import HELD
 from zwidth.device.build import in_space, roll_pitch_yaw
 from zwidth.device.build_nonlinear import value_or
 from zwidth.device.legs import Member, members, of_copies
+from zwidth.device.schema.arm import ArmSection
 from zwidth.device.schema.mechanism import (
     AssemblySection,
     DriveSection,
+    HandleSection,
     LinkSection,
     LoopClosure,
     MechanismSection,
+    ReferenceSection,
 )
+from zwidth.model.arm import Arm
 from zwidth.model.design_axes import join_designs, stack_numbers
 from zwidth.model.mechanism import (
     AXIS,
@@ -92,6 +97,27 @@ def mechanism(section: MechanismSection) -> Mechanism:
         reference_rotation=roll_pitch_yaw(reference.orientation_rad or (0.0, 0.0, 0.0)),
         free=_free(tree, loops),
         gravity_compensation=section.gravity_compensation,
+    )
+
+
+def arm(section: ArmSection) -> Arm:
+    """The operator's arm: links and joints as of a mechanism that nobody drives."""
+    hand, place = section.hand, ReferenceSection.model_construct(position_m=(0.0, 0.0, 0.0), orientation_rad=None)
+    chain = MechanismSection.model_construct(
+        links=section.links,
+        handle=HandleSection.model_construct(
+            link=hand.link, point_m=hand.point_m, orientation_rad=(0.0, 0.0, 0.0)
+        ),
+        assemblies={HELD: section.posture},
+        reference=place,
+    )
+    made = mechanism(chain)
+    joints = tuple(int(i) for i in np.flatnonzero(np.asarray(made.links.joint) != FIXED))
+    return Arm(
+        mechanism=replace(made, free=joints),
+        shoulder=None if section.shoulder_m is None else np.array(section.shoulder_m),
+        grasp_stiffness=None if section.grasp == "rigid" else section.grasp_stiffness_N_per_m,
+        grasp_damping=section.grasp_damping_Ns_per_m or 0.0,
     )
 
 

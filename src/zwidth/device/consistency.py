@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
+from zwidth.device.arm_consistency import arm_inconsistencies
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
 from zwidth.device.feedback_consistency import feedback_inconsistencies
 from zwidth.device.legs import spread_tables, written_path
@@ -69,6 +70,7 @@ def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyM
     yield from electrical_inconsistencies(document)
     yield from operator_inconsistencies(document)
     yield from load_inconsistencies(document)
+    yield from arm_inconsistencies(document, (_tree, _assemblies, _joint_keys))
     yield from _sampling(document)
     mechanism = table(document, "mechanism")
     if mechanism:

@@ -241,7 +241,7 @@ def design_batch(
     checked, cleaned = check(document, label)
     leaves = dict(leaf for steps, numbers in columns.items() for leaf in _leaves(steps, numbers))
     valid = certainly_valid(document, leaves, count)
-    if "load" in document:  # each design then has a balance of its own
+    if {"load", "arm"} & document.keys():  # each design then has a balance, or an arm, of its own
         valid = np.zeros(count, dtype=np.bool_)
     with_arrays: Any = checked
     for steps, numbers in columns.items():

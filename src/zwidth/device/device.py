@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from zwidth.loop.wall_matrices import WallMatrices
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
+    from zwidth.model.arm import Arm
     from zwidth.model.damping import Damping
     from zwidth.model.load import Load
     from zwidth.model.operator import Operator
@@ -56,6 +57,7 @@ class Device:
                         plant
     reference_assembly  assembly meant where none is given; None for a plant
     operator            the arm and grasp at the handle; None: nobody
+    arm                 his arm as a chain of bodies, in place of an operator's numbers; None: there is none
     operator_name       what he is called; None: nobody
     load                what the device bears while it renders; None: nothing
     encoders            what a mechanism's encoders read: "motor" or "link"
@@ -77,6 +79,7 @@ class Device:
     reference_assembly: str | None
     operator: Operator | None
     operator_name: str | None
+    arm: Arm | None
     load: Load | None
     encoders: Encoders
     document: dict[str, Any]
@@ -220,6 +223,7 @@ class Device:
             encoders=self.encoders,
             operator=self.operator,
             operator_name=self.operator_name,
+            arm=self.arm,
             friction_known=self.friction_known,
             resolution_known=self.resolution_known,
             name=self.name,

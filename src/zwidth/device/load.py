@@ -20,10 +20,12 @@ from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.posture_arguments import screws
 from zwidth.device.read import bundled, read
+from zwidth.device.schema.arm import ArmSection
 from zwidth.device.schema.device_file import DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
+from zwidth.model.arm import Arm
 from zwidth.model.load import Load
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
@@ -159,7 +161,7 @@ def build_device(
     """
     section, controller = checked.mechanism, build.controller(checked.loop)
     mechanism = _mechanism(section, surplus) if section else None
-    reference = section.reference if section else None
+    reference, held = section.reference if section else None, checked.operator or checked.arm
     return Device(
         name=checked.name,
         description=checked.description,
@@ -177,7 +179,8 @@ def build_device(
         if reference and section
         else None,
         operator=build.operator(checked.operator) if checked.operator else None,
-        operator_name=(checked.operator.name or UNNAMED_OPERATOR) if checked.operator else None,
+        operator_name=(held.name or UNNAMED_OPERATOR) if held else None,
+        arm=_arm(checked.arm) if checked.arm else None,
         load=load_of_table(checked.load.model_dump(exclude_none=True)) if checked.load else None,
         encoders="motor" if checked.loop.encoder.at in (None, "motor") else "link",
         document=document,
@@ -190,6 +193,12 @@ def _reference_direction(reference: ReferenceSection) -> Floats:
         return build.in_space(reference.direction or ())
     direction = None if reference.direction is None else build.in_space(reference.direction)
     return screws("", direction, reference.axis, reference.characteristic_length_m)
+
+
+def _arm(section: ArmSection) -> Arm:
+    from zwidth.device.build_mechanism import arm  # compiled code, as of a mechanism
+
+    return arm(section)
 
 
 def _mechanism(section: MechanismSection, surplus: tuple[int, ...] | None) -> Mechanism:

@@ -39,12 +39,25 @@ def document_held_by(
         return document
     if isinstance(operator, Operator):
         return with_operator(document, table_of_operator(operator))
-    return with_operator(document, None if operator == NOBODY else operator_table(operator))
+    if operator == NOBODY:
+        return with_operator(document, None)
+    arm = _arm_of(operator)
+    return (
+        with_operator(document, operator_table(operator)) if arm is None else with_operator(document, None) | arm
+    )
+
+
+def _arm_of(name_or_path: str | os.PathLike[str]) -> dict[str, Any] | None:
+    """The [arm] of a file that has one, to be checked with the device; None of any other."""
+    whole, label = read(name_or_path, OPERATORS)
+    if not isinstance(whole.get("arm"), dict):
+        return None
+    return {"arm": {"name": label, **whole["arm"]}}
 
 
 def with_operator(document: dict[str, Any], table: dict[str, Any] | None) -> dict[str, Any]:
     """A device's document with this [operator]; None: with nobody."""
-    without = {key: value for key, value in document.items() if key != "operator"}
+    without = {key: value for key, value in document.items() if key not in ("operator", "arm")}
     return without if table is None else without | {"operator": table}
 
 
@@ -54,7 +67,7 @@ def table_of_operator(operator: Operator) -> dict[str, Any]:
         "arm_mass_kg": operator.arm_mass,
         "arm_stiffness_N_per_m": operator.arm_stiffness,
         "arm_damping_Ns_per_m": operator.arm_damping,
-    }
+    } | ({} if operator.directions == "rendered" else {"directions": operator.directions})
     if operator.grasp_stiffness is None:
         return table | {"grasp": "rigid"}
     return table | {

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth import _verbs
@@ -20,7 +21,9 @@ from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.point_errors import OperatingPointError, check_several_directions
 from zwidth.loop.point_text import point_text
 from zwidth.loop.posed_device import NO_MODEL, PosedDevice
+from zwidth.model.arm import attach_arm
 from zwidth.model.loaded_plant import LoadedPlants, linearise, set_apart
+from zwidth.model.mechanism import Floats
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
@@ -46,6 +49,9 @@ if TYPE_CHECKING:
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
     from zwidth.study.validity import Validity
+
+
+MOVES: Final = 1e-9  # share of the handle's motions that is none
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,7 +96,12 @@ class OperatingPoint(PosedDevice):
         stands apart, unless it is to count."""
         assert self.load is not None
         plants = self.loaded_plants
-        if held:
+        if held and self.arm is not None:
+            force = self.equilibrium.hand_force
+            plants = LoadedPlants(
+                self._attach_arm(plants.loaded, force), self._attach_arm(plants.unloaded, np.zeros(3))
+            )
+        elif held:
             plants = LoadedPlants(self.attach_operator(plants.loaded), self.attach_operator(plants.unloaded))
         if self.load.count_sideways:
             return replace(plants.loaded, without_load=plants.unloaded)
@@ -115,7 +126,42 @@ class OperatingPoint(PosedDevice):
         Returns  the plant itself where there is no operator, or no handle: a model that holds the link side fixed
                  holds the operator, too
         """
-        return plant if self.operator is None or plant.handle is None else attach(plant, self.operator)
+        if self.arm is not None:
+            return self._attach_arm(plant, np.zeros(3))
+        if self.operator is None or plant.handle is None:
+            return plant
+        return attach(plant, self.operator, self._motions_across(plant))
+
+    def _attach_arm(self, plant: Plant, force: Floats) -> Plant:
+        """A full plant with the arm at its handle, which pushes with a force (3,). Raises ModelError for a reduced
+        model, ArmError where the arm cannot hold the handle."""
+        if self.model != "full":
+            raise ModelError(
+                f"an arm that is a chain of bodies holds the full model alone, not {self.model!r}; leave the "
+                f"model out"
+            )
+        assert self.arm is not None
+        rows = np.zeros((3, plant.size))
+        rows[:, : self.jacobian.shape[-1]] = self.jacobian
+        gravity = np.zeros(3) if self.load is None else self.load.weight
+        return attach_arm(plant, self.arm, rows, self._posture.position, force, gravity)
+
+    def _motions_across(self, plant: Plant) -> Floats:
+        """Motions (k, n) of the handle across the rendered direction, of an operator who holds it in every
+        direction in which the full model's handle moves; none of any other."""
+        none = np.zeros((0, plant.size))
+        if self.operator is None or self.operator.directions != "all" or self.mechanism is None:
+            return none
+        if self.model != "full" or self.turns or self.direction_count > 1:
+            return none
+        u = self.direction[:3] / np.linalg.norm(self.direction[:3])
+        across = np.linalg.svd(np.eye(3) - np.outer(u, u))[2][:2] @ self.jacobian
+        left, size, _ = np.linalg.svd(across, full_matrices=False)
+        kept = size > MOVES * np.linalg.norm(self.jacobian)
+        rows = np.zeros((int(kept.sum()), plant.size))
+        # orthonormal directions in which the handle moves at all
+        rows[:, : self.jacobian.shape[-1]] = left.T[kept] @ across
+        return rows
 
     @cached_property
     def other_branch(self) -> OperatingPoint | None:
@@ -163,6 +209,12 @@ class OperatingPoint(PosedDevice):
         """The plant under the sampled wall law. Raises what `plant` and `computer` raise."""
         self.require("dynamics", "sampling")
         return Loop(self.plant, self.computer)
+
+    @cached_property
+    def contact_loop(self) -> Loop:
+        """The loop of a simulated contact: an operator is simulated apart, an arm of bodies is in the plant.
+        Raises what `loop` raises."""
+        return self.loop if self.operator is None else replace(self, operator=None, operator_name=None).loop
 
     @cached_property
     def loop_of_directions(self) -> MultiLoop:

@@ -49,7 +49,7 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
     """
     point.require("dynamics", "sampling")
     model = point.model or "full"
-    if point.response is not None or point.controller.fixed_feedback or point.load is not None:
+    if point.response is not None or point.controller.fixed_feedback or point.load is not None or _alone(point):
         return None
     if point.mechanism is None and (model != "full" or not point.shape):
         return None
@@ -78,6 +78,12 @@ def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = Tr
     rows = np.flatnonzero(modes.coupled)
     own = period[rows] if len(period) > 1 else period
     return modes.pairs.with_rows(rows, coupled_pairs(modes.rows(rows), None, own))
+
+
+def _alone(point: OperatingPoint) -> bool:
+    """Whether who holds the device holds it in more than the rendered direction."""
+    across = point.operator is not None and point.operator.directions == "all" and point.mechanism is not None
+    return point.arm is not None or (across and (point.model or "full") == "full")
 
 
 def _known_together(mechanism: Mechanism, model: Model) -> bool:

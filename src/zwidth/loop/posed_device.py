@@ -15,6 +15,7 @@ from zwidth.loop.point_errors import MissingNumbersError, NoMechanismError, Oper
 from zwidth.loop.point_text import points_text
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
+from zwidth.model.arm import Arm
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.drive_side import DriveSide, drive_side
@@ -59,6 +60,7 @@ class PosedDevice:
     damping             of the mechanism's flexible modes
     encoders            what a mechanism's encoders read: "motor" or "link"
     operator            the arm and grasp at the handle; None: nobody
+    arm                 his arm as a chain of bodies, in place of `operator`; None: there is none
     operator_name       the operator's name in results; None: nobody
     friction_known, resolution_known   whether the dry friction, and the encoders' step, are given, 0 included
     name                the device's name in results and figures
@@ -81,6 +83,7 @@ class PosedDevice:
     encoders: Encoders = "motor"
     operator: Operator | None = None
     operator_name: str | None = None
+    arm: Arm | None = None
     friction_known: bool = True
     resolution_known: bool = True
     name: str = ""
@@ -187,7 +190,9 @@ class PosedDevice:
     @cached_property
     def without_operator(self) -> Self:
         """The plant without an operator."""
-        return self if self.operator is None else replace(self, operator=None, operator_name=None)
+        if self.operator is None and self.arm is None:
+            return self
+        return replace(self, operator=None, operator_name=None, arm=None)
 
     # --- the mechanism there --------------------------------------------------------------------------
 

@@ -31,8 +31,8 @@ class Load:
                   With none of the three the wall is at rest, without force, and the hand only holds the device
     gravity       (3,)  [m/s^2]
     hand          "dead": the hand's force keeps its direction in space as the device moves; "follower": it turns
-                  with the handle's link; "neglected": that it turns against the links as these move is left out, as in
-                  thesis 2.1, which is another device
+                  with the handle's link; "neglected": that it turns against the links as these move is left out,
+                  as in thesis 2.1, which is another device
     posture_of    whose posture is asked for, that of the "handle" or of the "motors" as the computer counts them
     settle        True: the force is the hand's whole force, and the device slides along the surface to where that
                   is in balance; False: the posture is kept, and the hand supplies what it needs across the

@@ -122,6 +122,15 @@ class Motions:
         u = int(self.mech.column[link])
         return self.rates[u], self.rates_2[u]
 
+    def mass_matrix(self) -> Floats:
+        """Mass matrix (c, c) of the links in the independent coordinates."""
+        M = np.zeros((self.count, self.count))
+        for link in self.mech.bodies:
+            centre, R = self.point(link, self.mech.center_of_mass[0, link]), self.rotation[link]
+            M += self.mech.mass[0, link] * centre.speed.T @ centre.speed
+            M += centre.spin.T @ (R @ self.mech.inertia[0, link] @ R.T) @ centre.spin
+        return M
+
     def weight(self, gravity: Floats) -> tuple[Floats, Floats]:
         """Generalised forces (c,) of gravity (3,) [m/s^2] on the links, and their derivative (c, c)."""
         force, derivative = np.zeros(self.count), np.zeros((self.count, self.count))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from zwidth.model.argument_checks import check_number, require
+from zwidth.model.argument_checks import check_choice, check_number, require
 from zwidth.model.design_axes import Number, stack_numbers
 from zwidth.model.plant import Floats, Plant
 
@@ -25,6 +26,8 @@ class Operator:
     arm_mass, arm_stiffness, arm_damping  m_a [kg], k_a [N/m], b_a [N s/m], not negative
     grasp_stiffness, grasp_damping        k_g [N/m], b_g [N s/m]; None: the grasp is rigid, and mass, spring and
                                           damper act on the handle itself (Hulin, Preusche and Hirzinger 2006)
+    directions  "rendered": along the rendered direction alone; "all": the same in every direction in which the
+                handle of a mechanism's full model moves, each by itself
     """
 
     arm_mass: Number
@@ -32,8 +35,10 @@ class Operator:
     arm_damping: Number
     grasp_stiffness: Number | None = None
     grasp_damping: Number | None = None
+    directions: Literal["rendered", "all"] = "rendered"
 
     def __post_init__(self) -> None:
+        check_choice("directions", self.directions, ("rendered", "all"))
         units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
         for part, unit in units.items():
             check_number(f"arm_{part}", getattr(self, f"arm_{part}"), unit, least=0.0)
@@ -48,9 +53,10 @@ class Operator:
         return self.grasp_stiffness is None
 
 
-def attach(plant: Plant, operator: Operator) -> Plant:
+def attach(plant: Plant, operator: Operator, across: Floats | None = None) -> Plant:
     """The plant with an operator at its handle.
 
+    across   (k, n)  other motions of the handle by which he holds it in the same way; None: none
     Returns  Plant; an elastic grasp adds the arm as the last coordinate, a rigid one adds none
     Raises   OperatorError  for a plant without a handle, or an elastic grasp of an arm without mass
 
@@ -61,6 +67,27 @@ def attach(plant: Plant, operator: Operator) -> Plant:
     """
     require("plant", plant, Plant)
     require("operator", operator, Operator)
+    held = _held(plant, operator)
+    for motion in () if across is None else across:
+        row = np.append(motion, np.zeros(held.size - plant.size))
+        beside = _held(replace(held, handle=row), operator)
+        # what a force sensor at the handle reads is the force along the rendered direction
+        own = [
+            np.append(part, np.zeros((*part.shape[:-1], beside.size - held.size)), axis=-1) for part in _hand(held)
+        ]
+        held = replace(beside, handle=own[0], hand_force=own[1])
+    return held
+
+
+def _hand(plant: Plant) -> tuple[Floats, Floats]:
+    """Handle and hand force of a plant that is held."""
+    assert plant.handle is not None
+    assert plant.hand_force is not None
+    return plant.handle, plant.hand_force
+
+
+def _held(plant: Plant, operator: Operator) -> Plant:
+    """The plant with an operator who holds it along one motion, `plant.handle`."""
     h = plant.handle
     if h is None:
         raise OperatorError("an operator needs a handle to hold; give the plant's `handle`, or leave him out")

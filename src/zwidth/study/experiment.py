@@ -79,7 +79,7 @@ def measure_boundary(
     """
     require("point", point, OperatingPoint)
     plan = plan or Plan()
-    loop = point.without_operator.loop
+    loop = point.contact_loop
     operator = None if loop.plant.handle is None else point.operator
     journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
     result = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))

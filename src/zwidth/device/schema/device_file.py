@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, ConfigDict
 
+from zwidth.device.schema.arm import ArmSection
 from zwidth.device.schema.friction import FrictionSection
 from zwidth.device.schema.load import LoadSection
 from zwidth.device.schema.loop import LoopSection
@@ -58,6 +59,9 @@ class DeviceFile(Section):
     friction: FrictionSection | None = documented_key("dry friction of a [plant]; omitted: none", default=None)
     load: LoadSection | None = documented_key(
         "what the device bears while it renders; omitted: nothing", default=None
+    )
+    arm: ArmSection | None = documented_key(
+        "the operator's arm as a chain of bodies, in place of [operator]", default=None
     )
     operator: OperatorSection | None = documented_key(
         "the arm and grasp at the handle; omitted: nobody", default=None

@@ -28,6 +28,11 @@ class OperatorSection(Section):
     grasp_damping_Ns_per_m: Damper | None = documented_key(
         "damping of the grasp, beside its stiffness; omitted: none", "N s/m", ge=0, default=None
     )
+    directions: Literal["rendered", "all"] = documented_key(
+        'in which he holds the handle: "rendered" alone, or "all" in which the handle of a mechanism moves, alike '
+        "and each by itself",
+        default="rendered",
+    )
     grasp: Literal["rigid"] | None = documented_key(
         '"rigid": mass, spring and damper of the arm act on the handle itself', default=None
     )

@@ -1,0 +1,136 @@
+"""The operator's arm as a chain of bodies that holds the handle (thesis 2.1): joints with muscles, and a grasp.
+
+The arm's joints have springs and dampers about the posture in which it holds the handle, as muscles have that hold
+a set-point. With M, B, K of its joints, J (3, a) of its hand, and F the force of the hand on the handle, the arm
+feels -F, whose lever arms change as it moves:
+
+    M q'' + B q' + (K + F . d2x/dq2 - dw/dq) q = -J^T df
+
+A rigid grasp lets hand and handle move together, J_h x' = J q', and turn as they like; what joints the arm has
+beyond that move by themselves. An elastic grasp is a spring and a damper between the two, the same in all
+directions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from zwidth.model.closed_posture import moved_posture
+from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.motions import Motions
+from zwidth.model.operator import OperatorError
+from zwidth.model.plant import Plant
+
+STEPS: Final = 100  # of the search for the arm's posture
+LARGEST_STEP: Final = 0.2  # of a joint at once [rad], [m]
+REACHED: Final = 1e-12  # m
+STRETCHED: Final = 1e-6  # share of the hand's largest motion below which the arm cannot move it along
+
+
+class ArmError(OperatorError):
+    """An arm that cannot hold the handle."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A chain of bodies.
+
+    mechanism   its links, joints and hand, the handle of this mechanism; all joints are free, and its assembly
+                "held" is the posture in which it holds the handle
+    shoulder    (3,)  place of its base in the device's base frame [m]; None: where the assembly's angles have the
+                hand at the handle, wherever that is
+    grasp_stiffness, grasp_damping  [N/m], [N s/m]; None: the grasp is rigid
+    """
+
+    mechanism: Mechanism
+    shoulder: Floats | None = None
+    grasp_stiffness: float | None = None
+    grasp_damping: float = 0.0
+
+
+def attach_arm(plant: Plant, arm: Arm, handle: Floats, place: Floats, force: Floats, gravity: Floats) -> Plant:
+    """The plant of a device with an arm at its handle.
+
+    handle   (3, n)  motion of the handle per coordinate of the plant
+    place    (3,)    of the handle [m]
+    force    (3,)    of the hand on the handle [N], 0 without load;   gravity (3,) on the arm [m/s^2]
+    Returns  Plant, the arm's joints among its last coordinates
+    Raises   ArmError  where the arm cannot reach the handle, or cannot move with it
+    """
+    motions = Motions(pack(arm.mechanism), _posture(arm, place))
+    hand, links, joints = motions.handle, arm.mechanism.links, motions.unknowns
+    none = np.zeros(len(links.names))
+    springs, dampers = (
+        np.diag((none if each is None else np.asarray(each))[joints])
+        for each in (links.joint_stiffness, links.joint_damping)
+    )
+    own = springs + np.tensordot(force, hand.speed_2, 1) - motions.weight(gravity)[1]
+    names = tuple(f"arm {links.names[joint]}" for joint in joints)
+    both = plant.padded(names)
+    at = slice(plant.size, None)
+    both.mass[at, at], both.damping[at, at], both.stiffness[at, at] = motions.mass_matrix(), dampers, own
+    slip = np.hstack([-handle, hand.speed])
+    if arm.grasp_stiffness is not None:
+        grasp = slip.T @ slip
+        return replace(
+            both,
+            damping=both.damping + arm.grasp_damping * grasp,
+            stiffness=both.stiffness + arm.grasp_stiffness * grasp,
+        )
+    return replace(both.on_motions(_together(handle, hand.speed)), names=(*plant.names, *_kept(names, hand.speed)))
+
+
+def _together(handle: Floats, hand: Floats) -> Floats:
+    """The motions (n + a, n + a - 3 or more) in which hand and handle move together: the device's coordinates,
+    and the
+    arm's own."""
+    left, size, right = np.linalg.svd(hand)
+    rank = int(np.count_nonzero(size > STRETCHED * size[0])) if len(size) else 0
+    lost = handle.T @ left[:, rank:]
+    if np.max(np.abs(lost), initial=0.0) > STRETCHED * np.max(np.abs(handle), initial=0.0):
+        raise ArmError(
+            "the arm cannot move its hand in every direction in which the handle moves; is it stretched, or does "
+            "it need another joint? Bend it in its posture, or give it an elastic grasp"
+        )
+    n, a = handle.shape[1], hand.shape[1]
+    follow = np.linalg.pinv(hand, rcond=STRETCHED) @ handle
+    alone = right[rank:].T
+    return np.block([[np.eye(n), np.zeros((n, a - rank))], [follow, alone]])
+
+
+def _kept(names: tuple[str, ...], hand: Floats) -> tuple[str, ...]:
+    """Names of the motions that the arm has beside those of the handle."""
+    size = np.linalg.svd(hand, compute_uv=False)
+    rank = int(np.count_nonzero(size > STRETCHED * size[0])) if len(size) else 0
+    return tuple(f"arm {i + 1}" for i in range(len(names) - rank))
+
+
+def _posture(arm: Arm, place: Floats) -> Floats:
+    """Joint coordinates of the arm with its hand at a place, from those of its assembly by least motion."""
+    angles = np.array(arm.mechanism.assemblies["held"], dtype=np.float64)
+    if arm.shoulder is None:
+        return angles
+    mech = pack(arm.mechanism)
+    goal = place - arm.shoulder
+    for _ in range(STEPS):
+        hand = Motions(mech, angles).handle
+        away = goal - hand.position
+        if np.max(np.abs(away)) <= REACHED:
+            return angles
+        step = np.linalg.pinv(hand.speed, rcond=STRETCHED) @ away
+        step *= min(1.0, LARGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
+        moved = moved_posture(mech, angles, step)
+        if moved is None or not np.max(np.abs(step)) > 0.0:
+            break
+        angles = moved
+    left = float(np.linalg.norm(goal - Motions(mech, angles).handle.position))
+    if left <= 1e-9:
+        return angles
+    raise ArmError(
+        f"the arm does not reach the handle from its shoulder: {left:.4g} m are left; move shoulder_m, or give "
+        "the posture in which it holds the handle"
+    )
