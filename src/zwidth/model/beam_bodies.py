@@ -42,7 +42,7 @@ from zwidth.model.flexible_body import FlexibleBody, Floats
 SAME_PLACE = 1e-9
 # A static deflection of which modes and other deflections leave less than this share says nothing new
 DEPENDENT = 1e-7
-# Finite elements: second-order terms of cubics are polynomials of degree 6, which 4 points integrate exactly
+# Finite elements: the mass of cubics has degree 6 and their second-order terms 5; 4 points are exact up to 7
 ELEMENT_ORDER = 4
 # Assumed modes: two panels to each half wave of the highest mode, exact to rounding with 10 points
 MODE_ORDER = 10
@@ -138,7 +138,8 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
     The tip turns by 3/(2 L) of its deflection, as under a force there. The lump is what a massless spring needs
     for the energy of the moving beam: 33/140 of the mass across, 1/3 of it along, 1/3 of the inertia of twist. The
     cantilever's first frequency comes out 1.47 % high. The rest stays with the base, such that the straight beam's
-    whole mass, centre of mass and inertia are exact; what couples base and deflection is the lump alone.
+    whole mass, centre of mass and inertia are exact. What couples base and deflection is the lump alone: mass and
+    first moments of the elastic coordinates, first_moment_2 too, are those of the lump at the tip.
 
     stations  (S,) [m]; between base and tip they move as the statically loaded beam does
     Raises    ValueError  for a station off the beam

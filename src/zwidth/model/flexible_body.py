@@ -101,8 +101,9 @@ def clamped_frequencies(body: FlexibleBody) -> Floats:
 
     if not len(body.stiffness):
         return np.zeros(0)
-    squared = eigh(body.stiffness, body.mass[6:, 6:], eigvals_only=True)
-    return np.asarray(np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi))
+    # of 1/w^2, in which the low ones are the largest: they are wanted, and would be lost in the highest's rounding
+    inverse = eigh(body.mass[6:, 6:], body.stiffness, eigvals_only=True)
+    return np.asarray(inverse[::-1] ** -0.5 / (2.0 * np.pi))
 
 
 def highest_frequency(body: FlexibleBody) -> float:
@@ -111,8 +112,13 @@ def highest_frequency(body: FlexibleBody) -> float:
     A time step h resolves the body's modes where this is well below 1/(2 h); otherwise fewer modes will do, or the
     step has to be shorter. With the base free to move the highest frequency is somewhat higher.
     """
-    frequencies = clamped_frequencies(body)
-    return float(frequencies[-1]) if len(frequencies) else 0.0
+    from scipy.linalg import eigh
+
+    e = len(body.stiffness)
+    if not e:
+        return 0.0
+    squared = eigh(body.stiffness, body.mass[6:, 6:], eigvals_only=True, subset_by_index=(e - 1, e - 1))
+    return float(np.sqrt(squared[0]) / (2.0 * np.pi))
 
 
 def symmetric(matrices: Floats) -> Floats:
