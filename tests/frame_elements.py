@@ -16,8 +16,8 @@ two points a joint: `hinge` (about an axis), `ball` (about any), `slider` (along
 points that are apart. A joint to GROUND holds a point; `clamp` is a weld to GROUND.
 
 A beam is anything with the numbers EI_y, EI_z, GJ, EA, mass_per_length and torsional_inertia_per_length; how long
-it is, its points say. Its x runs from the first point to the second. Its y is `y_axis`, less what of it is along x;
-EI_z bends in the plane of x and y.
+it is, its points say. Its x runs from the first point to the second. Its y is `y_axis`, less what of it is along
+x; EI_z bends in the plane of x and y.
 
 Coordinates of a point: displacement (3) and rotation vector (3), in global axes.
 """
@@ -179,7 +179,8 @@ def natural_modes(frame: Frame, axial_forces=None) -> tuple[np.ndarray, np.ndarr
     shift = rough[rough > 1e-12 * rough[-1]][0] + max(0.0, -2.0 * rough[0])
     inverse, shapes = eigh(M, K + shift * M)
     squared = 1.0 / inverse[::-1] - shift
-    return np.where(np.abs(squared) < 1e-9 * shift, 0.0, squared), T @ shapes[:, ::-1]
+    rounding = max(1e-9 * shift, 1e-13 * rough[-1])  # of a free motion's zero
+    return np.where(np.abs(squared) < rounding, 0.0, squared), T @ shapes[:, ::-1]
 
 
 def natural_frequencies(frame: Frame, count: int, axial_forces=None) -> np.ndarray:

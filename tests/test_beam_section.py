@@ -91,22 +91,22 @@ def test_a_width_is_along_y_and_a_height_along_z():
     [(1.0, 0.141), (1.5, 0.196), (2.0, 0.229), (2.5, 0.249), (3.0, 0.263), (4.0, 0.281), (10.0, 0.312)],
 )
 def test_torsion_of_a_rectangle(sides, printed):
-    J = rectangle(sides, 1.0).torsion_constant / sides
-    assert J == pytest.approx(printed, abs=5.1e-4)
+    ours = rectangle(sides, 1.0).torsion_constant / sides
+    assert ours == pytest.approx(printed, abs=5.1e-4)
 
     def term(k):
         n = 2 * int(k) + 1
         return mpmath.tanh(n * mpmath.pi * sides / 2) / n**5
 
     series = (1 - 192 / (mpmath.pi**5 * sides) * mpmath.nsum(term, [0, mpmath.inf])) / 3
-    assert J == pytest.approx(float(series), rel=1e-13)
+    assert ours == pytest.approx(float(series), rel=1e-13)
 
 
 def test_torsion_of_a_very_flat_rectangle():
     """A strip has J = a b^3 / 3 (1 - 0.63025 b / a), and no overflow."""
     with np.errstate(all="raise"):
-        J = rectangle(1.0, 1e-4).torsion_constant
-    assert J == pytest.approx(1e-12 / 3.0 * (1.0 - 0.63024846e-4), rel=1e-12)
+        flat = rectangle(1.0, 1e-4).torsion_constant
+    assert flat == pytest.approx(1e-12 / 3.0 * (1.0 - 0.63024846e-4), rel=1e-12)
 
 
 def test_torsion_by_a_stress_function():
@@ -147,7 +147,7 @@ def test_beams_of_sections_and_materials():
 
 
 def test_typical_materials_are_possible_ones():
-    """Poisson's ratio E / (2 G) - 1 of what is alike in all directions is between that of steel and of plastics."""
+    """Poisson's ratio E / (2 G) - 1 of what is alike in all directions is that of metals and plastics."""
     for name, material in TYPICAL_MATERIALS.items():
         if name != "carbon-fibre-tube":
             assert 0.25 < material.youngs_modulus / (2.0 * material.shear_modulus) - 1.0 < 0.42, name
@@ -175,7 +175,7 @@ def with_number(place, value):
         (lambda: tube(0.01, 0.0), "wall must be a finite number greater than 0"),
         (
             lambda: tube(0.01, 0.006),
-            r"wall must be at most half of outer_diameter, 0.005 \[m\], got 0.006; write round_rod\(0.01\) for a solid",
+            r"wall must be at most half of outer_diameter, 0.005 \[m\], got 0.006; write round_rod\(0.01\)",
         ),
         (
             lambda: rectangular_tube(0.02, 0.01, 0.0051),
