@@ -88,7 +88,9 @@ def body_of_shapes(
     D2, O2 = (np.reshape([pair[i] for pair in seconds], (len(stations), 3, e, e)) for i in (0, 1))
     to_tip = beam.mass_per_length * weights * (L - places)
     first_moment_2, _ = second_order(shapes, to_tip, 0.5 * to_tip * (L - places))
-    return FlexibleBody(mass, K, stations, at_stations.displacement, at_stations.rotation, D2, O2, first_moment_2)
+    moving = (stations > 0.0)[:, None, None]  # exact zeros at the base, where modes leave rounding
+    displacement, rotation = moving * at_stations.displacement, moving * at_stations.rotation
+    return FlexibleBody(mass, K, stations, displacement, rotation, D2, O2, first_moment_2)
 
 
 def second_order(shapes: Shapes, once: Floats, twice: Floats) -> tuple[Floats, Floats]:
