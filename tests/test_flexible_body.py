@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import jv
 
 from tests.rods import assert_moves_as_a_rod, middles
+from zwidth.model import beam_bodies
 from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
 from zwidth.model.beam_integrals import Shapes, body_of_shapes, gauss_panels
 from zwidth.model.beam_section import BeamProperties
@@ -274,6 +275,18 @@ def test_modes_of_a_high_number_keep_their_digits():
     assert found[9:] == pytest.approx(
         roots[9:] ** 2 * np.sqrt(beam.EI_z / beam.mass_per_length) / (2 * np.pi * L**2), rel=1e-9
     )
+
+
+@pytest.mark.parametrize("boundary", beam_bodies.BOUNDARIES)
+def test_more_points_change_no_integral(boundary, monkeypatch):
+    beam = random_beam(np.random.default_rng(31))
+    bodies = []
+    for order in (beam_bodies.MODE_ORDER, 20):
+        monkeypatch.setattr(beam_bodies, "MODE_ORDER", order)
+        bodies.append(assumed_modes(beam, STATIONS, 6, boundary))
+    for field in fields(FlexibleBody):
+        one, other = (getattr(body, field.name) for body in bodies)
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9 * np.max(np.abs(other))), field.name
 
 
 BEAM = BeamProperties(L, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)

@@ -44,8 +44,8 @@ SAME_PLACE = 1e-9
 DEPENDENT = 1e-7
 # Finite elements: the mass of cubics has degree 6 and their second-order terms 5; 4 points are exact up to 7
 ELEMENT_ORDER = 4
-# Assumed modes: two panels to each half wave of the highest mode, exact to rounding with 10 points
-MODE_ORDER = 10
+# Assumed modes: two panels to each half wave of the highest mode, exact to rounding with 8 points
+MODE_ORDER = 8
 # Of the mass, and of the inertia of twist, that a massless beam with a lump at the tip has there: integrals of the
 # squared static deflection under a load at the tip, s^2 (3 L - s) / (2 L^3) and s/L
 BENDING_LUMP = 33.0 / 140.0
