@@ -116,7 +116,8 @@ class Frame:
 
     def _join(self, one: int, other: int, rows: np.ndarray) -> None:
         if other != GROUND:
-            assert np.allclose(self.points[one], self.points[other]), "a joint is between points at one place"
+            apart = np.linalg.norm(self.points[one] - self.points[other])
+            assert apart < 1e-9, f"a joint is between points at one place, not {apart} m apart"
         self.constraints.append((one, rows, other, rows))
 
     # --- matrices, of all 6 N coordinates ---------------------------------------------------------------
@@ -168,19 +169,29 @@ class Frame:
 def natural_modes(frame: Frame, axial_forces=None) -> tuple[np.ndarray, np.ndarray]:
     """Squared angular frequencies (n,), ascending [1/s^2], and the modes of all coordinates (6 N, n).
 
+    A motion that has stiffness and no mass has inf; one with neither is refused by the solver.
+
     axial_forces  of each member, tension positive [N]; None: none
     """
     T = frame.motions()
     K = frame.stiffness() + (0.0 if axial_forces is None else frame.geometric_stiffness(axial_forces))
     K, M = T.T @ K @ T, T.T @ frame.mass() @ T
-    rough = eigh(K, M, eigvals_only=True)
+    rough, _ = _modes(M, K, np.trace(K) / np.trace(M))
+    highest = rough[np.isfinite(rough)][-1]
     # Low frequencies are many powers of ten below the highest, and lost in its rounding. In 1/(w^2 + shift) they
     # are the largest; the shift is as large as the first elastic ones, and takes what is negative above 0.
-    shift = rough[rough > 1e-12 * rough[-1]][0] + max(0.0, -2.0 * rough[0])
+    shift = rough[rough > 1e-12 * highest][0] + max(0.0, -2.0 * rough[0])
+    squared, shapes = _modes(M, K, shift)
+    rounding = max(1e-9 * shift, 1e-13 * highest)  # of a free motion's zero
+    return np.where(np.abs(squared) < rounding, 0.0, squared), T @ shapes
+
+
+def _modes(M, K, shift) -> tuple[np.ndarray, np.ndarray]:
+    """Squared frequencies, ascending, inf for a motion without mass, and modes, by 1/(w^2 + shift)."""
     inverse, shapes = eigh(M, K + shift * M)
-    squared = 1.0 / inverse[::-1] - shift
-    rounding = max(1e-9 * shift, 1e-13 * rough[-1])  # of a free motion's zero
-    return np.where(np.abs(squared) < rounding, 0.0, squared), T @ shapes[:, ::-1]
+    inverse, shapes = inverse[::-1], shapes[:, ::-1]
+    massless = inverse < 1e-14 * inverse[0]
+    return np.where(massless, np.inf, 1.0 / np.where(massless, 1.0, inverse) - shift), shapes
 
 
 def natural_frequencies(frame: Frame, count: int, axial_forces=None) -> np.ndarray:

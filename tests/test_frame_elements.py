@@ -187,6 +187,21 @@ def test_a_slider_on_a_spring():
     )
 
 
+def test_a_point_without_mass_follows():
+    """A beam on two springs in a row, with nothing between them, is one on a spring of half the stiffness."""
+    found = []
+    for between in (True, False):
+        frame, along = straight(6)
+        at = frame.point(frame.points[along[0]])
+        frame.hinge(along[0], at, TURN[:, 2], stiffness=8.0 if between else 4.0)
+        if between:
+            frame.hinge(at, GROUND, TURN[:, 2], stiffness=8.0)
+        else:
+            frame.clamp(at)
+        found.append(natural_frequencies(frame, 4))
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+
+
 EULER = {(CLAMPED, CLAMPED): 4.0, (CLAMPED, "free"): 0.25, ("pinned", "pinned"): 1.0}
 
 
