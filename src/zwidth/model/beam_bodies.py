@@ -1,0 +1,266 @@
+"""A beam as a flexible body in three ways: finite elements, assumed modes, and a lump at the tip.
+
+All give the same body once they have converged. Finite elements and assumed modes bend, stretch and twist under
+loads at the base and at the stations exactly as the beam does, however few modes there are; modes only add inertia
+along the beam. The lump has four coordinates and is for short light links, and to compare with the literature.
+
+Euler-Bernoulli's beam: no shear, and no inertia of cross sections that tilt. Both lower frequencies by some
+(n h / L)^2 of the n-th mode for a beam of height h, which for slender links is below what is known of them.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import ceil
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from zwidth.model.argument_checks import check_choice, describe_value
+from zwidth.model.beam_integrals import (
+    Shapes,
+    body_of_shapes,
+    elastic_matrices,
+    gauss_panels,
+    rod_inertia,
+)
+from zwidth.model.beam_section import BeamProperties
+from zwidth.model.beam_shapes import (
+    BOUNDARIES,
+    assembled,
+    bar_deflections,
+    bar_modes,
+    bending_deflections,
+    bending_modes,
+    hermite_bending,
+    quadratic_bar,
+)
+from zwidth.model.flexible_body import FlexibleBody, Floats
+
+# Stations are one, and a station is at the base or the tip, within this share of the length
+SAME_PLACE = 1e-9
+# A static deflection of which modes and other deflections leave less than this share says nothing new
+DEPENDENT = 1e-7
+# Finite elements: the mass of cubics has degree 6 and their second-order terms 5; 4 points are exact up to 7
+ELEMENT_ORDER = 4
+# Assumed modes: two panels to each half wave of the highest mode, exact to rounding with 8 points
+MODE_ORDER = 8
+# Of the mass, and of the inertia of twist, that a massless beam with a lump at the tip has there: integrals of the
+# squared static deflection under a load at the tip, s^2 (3 L - s) / (2 L^3) and s/L
+BENDING_LUMP = 33.0 / 140.0
+BAR_LUMP = 1.0 / 3.0
+
+
+def finite_elements(
+    beam: BeamProperties, stations: ArrayLike, elements: int, modes: int | None = None
+) -> FlexibleBody:
+    """The beam by elements, cubic for bending and quadratic for stretch and twist, reduced by Craig and Bampton.
+
+        eps = (displacement and rotation of each station, 3 + 3, then the amplitudes of `modes` modes)
+
+    The modes are the lowest of the beam with its base and all stations held (Craig and Bampton 1968). Frequencies
+    converge from above, with h^4 of the elements' length h.
+
+    stations  (S,) [m]; a node is put at each. Stations at the base have no coordinates, nor has one that is there
+              twice any more. Without a station at the tip, the tip's motion is among the modes
+    elements  at least that many, and at least one between stations
+    modes     0: static condensation (Guyan 1965); None: no reduction, eps = (displacement and rotation of each
+              station, then of each other node from the base on, then of each element how far its middle is along
+              and how far it is twisted, beyond the mean of its ends)
+    Raises    ValueError  for a station off the beam, fewer than one element, or more modes than there are
+    """
+    at = _stations(beam, stations)
+    _check_count("elements", elements, 1)
+    loaded = _loaded(at)
+    nodes = _divided(np.union1d(loaded, [0.0, beam.length]), beam.length / elements)
+    n, panels = len(nodes) - 1, gauss_panels(nodes, ELEMENT_ORDER)
+    held = np.searchsorted(nodes, loaded) - 1  # of the stations, by the nodes' order without the base
+    order = _node_order(n, held)
+
+    def all_shapes(places: Floats) -> Shapes:
+        bending, bar = hermite_bending(places, nodes), quadratic_bar(places, nodes)
+        downwards = bending * np.repeat([1.0, -1.0], n)  # the rotation about y is minus the slope of z
+        return Shapes(*(field[..., order] for field in assembled(bending, downwards, bar, bar)))
+
+    if modes is None:
+        return body_of_shapes(beam, all_shapes, panels, at)
+    _check_count("modes", modes, 0)
+    M, K = elastic_matrices(beam, all_shapes(panels.places), panels.weights)
+    T = _craig_bampton(M, K, 6 * len(held), modes)
+    return body_of_shapes(beam, lambda places: all_shapes(places).reduced(T), panels, at)
+
+
+def assumed_modes(
+    beam: BeamProperties, stations: ArrayLike, modes: int, boundary: str = "clamped"
+) -> FlexibleBody:
+    """The beam by vibration modes of itself, completed by what they lack of its static deflections.
+
+    Static deflections are those of the clamped beam under a force and a torque, in every direction, at each
+    station, and at the tip where the modes hold it: with them the body deflects exactly under such loads, and
+    frequencies converge from above, with the 4th power of the number of modes or faster. Coordinates are
+    orthogonal in K and scaled to a mass of 1 each.
+
+    stations  (S,) [m]
+    modes     number of modes in each of the two bending planes, of stretch and of twist
+    boundary  which modes: "clamped" with a free tip, for a beam on a hub; "clamped-pinned"; "pinned", half waves
+              between pins at both ends. The converged results are the same
+    Raises    ValueError  for a station off the beam, another boundary or fewer than 0 modes
+    """
+    at = _stations(beam, stations)
+    _check_count("modes", modes, 0)
+    check_choice("boundary", boundary, BOUNDARIES)
+    L = beam.length
+    loaded = _loaded(at) if boundary == "clamped" else np.union1d(_loaded(at), [L])
+    edges = _divided(np.union1d(loaded, [0.0, L]), L / (2.0 * modes + 2.0))
+    panels = gauss_panels(edges, MODE_ORDER)
+
+    def bending(places: Floats) -> Floats:
+        modal = bending_modes(places, L, modes, boundary)
+        return np.concatenate([modal, bending_deflections(places, loaded)], axis=2)
+
+    def bar(places: Floats) -> Floats:
+        return np.concatenate([bar_modes(places, L, modes, boundary), bar_deflections(places, loaded)], axis=2)
+
+    B = _orthonormal(bending(panels.places)[2], panels.weights)
+    A = _orthonormal(bar(panels.places)[1], panels.weights)
+
+    def shapes(places: Floats) -> Shapes:
+        bent, stretched = bending(places) @ B, bar(places) @ A
+        return assembled(bent, bent, stretched, stretched)
+
+    return body_of_shapes(beam, shapes, panels, at).scaled()
+
+
+def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
+    """The beam as massless springs to a lump at its tip, as thesis eq. 2.22 and 2.23 have it, in both planes.
+
+        K = diag(EA/L, 3 EI_z/L^3, 3 EI_y/L^3, GJ/L)       of eps = (displacement of the tip (3), its twist)
+
+    The tip turns by 3/(2 L) of its deflection, as under a force there. The lump is what a massless spring needs
+    for the energy of the moving beam: 33/140 of the mass across, 1/3 of it along, 1/3 of the inertia of twist. The
+    cantilever's first frequency comes out 1.47 % high. The rest stays with the base, such that the straight beam's
+    whole mass, centre of mass and inertia are exact. What couples base and deflection is the lump alone: mass and
+    first moments of the elastic coordinates, first_moment_2 too, are those of the lump at the tip.
+
+    stations  (S,) [m]; between base and tip they move as the statically loaded beam does
+    Raises    ValueError  for a station off the beam
+    """
+    at, L = _stations(beam, stations), beam.length
+    loads = np.array([L])
+
+    def shapes(places: Floats) -> Shapes:
+        bent = bending_deflections(places, loads)[..., :1] * (3.0 / L**3)
+        stretched = bar_deflections(places, loads) / L
+        by_family = assembled(bent, bent, stretched, stretched)
+        return Shapes(*(field[..., [2, 0, 1, 3]] for field in by_family))
+
+    panels = gauss_panels(np.union1d(_loaded(at), [0.0, L]), ELEMENT_ORDER)
+    tip = body_of_shapes(beam, shapes, panels, np.append(at, L))
+    m, I = beam.mass_per_length * L, beam.torsional_inertia_per_length * L
+    lump = m * np.array([BAR_LUMP, BENDING_LUMP, BENDING_LUMP])
+    coupling = np.zeros((6, 4))
+    coupling[:3, :3] = np.diag(lump)
+    coupling[3, 3], coupling[4, 2], coupling[5, 1] = BAR_LUMP * I, -L * lump[2], L * lump[1]
+    mass = np.block([[rod_inertia(beam), coupling], [coupling.T, np.diag([*lump, BAR_LUMP * I])]])
+    return FlexibleBody(
+        mass,
+        np.diag(np.diag(tip.stiffness)),
+        at,
+        tip.displacement[:-1],
+        tip.rotation[:-1],
+        tip.displacement_2[:-1],
+        tip.rotation_2[:-1],
+        lump[:, None, None] * tip.displacement_2[-1],
+    )
+
+
+def _craig_bampton(M: Floats, K: Floats, interface: int, modes: int) -> Floats:
+    """T (e, interface + modes): the first coordinates held one after the other, then the modes with all held."""
+    from scipy.linalg import eigh, solve
+
+    e, inner = len(K), slice(interface, None)
+    if modes > e - interface:
+        raise ValueError(
+            f"modes must be at most {e - interface}, all that the beam's elements have, got {modes}; "
+            "give more elements, or None for everything"
+        )
+    T = np.zeros((e, interface + modes))
+    T[:interface, :interface] = np.eye(interface)
+    if e > interface:
+        T[inner, :interface] = -solve(K[inner, inner], K[inner, :interface], assume_a="pos")
+    if modes:
+        _, T[inner, interface:] = eigh(K[inner, inner], M[inner, inner], subset_by_index=(0, modes - 1))
+    return T
+
+
+def _node_order(n: int, held: np.ndarray) -> list[int]:
+    """Places of the node-wise coordinates among the families' ones: held nodes, other nodes, middles of elements.
+
+    Families: y and its slope, z and rotation, along and its bubble, twist and its bubble, n of each.
+    """
+    y, slope_y, z, turn_y, along, bubble, twist, bubble_twist = (n * i for i in range(8))
+    others = [i for i in range(n) if i not in held]
+    of_nodes = [first + i for i in [*held.tolist(), *others] for first in (along, y, z, twist, turn_y, slope_y)]
+    return of_nodes + [first + i for i in range(n) for first in (bubble, bubble_twist)]
+
+
+def _orthonormal(strain: Floats, weights: Floats) -> Floats:
+    """Combinations T (k, n) of strains (q, k) that are orthonormal in energy: modes as they are, and of each
+    further column what those before lack. A column of which they lack next to nothing is left out."""
+    root = np.sqrt(weights)[:, None] * strain
+    length = np.linalg.norm(root, axis=0)
+    rows, basis = root / length, np.zeros((len(root), 0))
+    T = np.zeros((root.shape[1], 0))
+    for j in range(root.shape[1]):
+        rest, combination = rows[:, j], np.eye(root.shape[1])[j] / length
+        for _ in range(2):  # Gram and Schmidt's projection leaves rounding, which a second one takes
+            share = basis.T @ rest
+            rest, combination = rest - basis @ share, combination - T @ share
+        size = float(np.linalg.norm(rest))
+        if size > DEPENDENT:
+            basis, T = np.column_stack([basis, rest / size]), np.column_stack([T, combination / size])
+    return T
+
+
+def _divided(edges: Floats, longest: float) -> Floats:
+    """Ascending edges with further ones between them, evenly, so that none is farther than `longest` from the
+    next."""
+    parts = [
+        np.linspace(start, end, ceil((end - start) / longest * (1.0 - SAME_PLACE)), endpoint=False)
+        for start, end in pairwise(edges.tolist())
+    ]
+    return np.concatenate([*parts, edges[-1:]])
+
+
+def _stations(beam: BeamProperties, stations: ArrayLike) -> Floats:
+    """Stations (S,), those next to the base, the tip or one before them moved there."""
+    try:
+        at = np.array(stations, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"stations must be numbers [m], got {describe_value(stations)}") from None
+    if at.ndim != 1:
+        raise ValueError(f"stations must be a list of numbers [m], got the shape {at.shape}")
+    L = beam.length
+    for place in at:
+        if not -SAME_PLACE * L <= place <= (1.0 + SAME_PLACE) * L:
+            raise ValueError(
+                f"stations must lie on the beam, from 0 at its base to its length {L:.10g} [m], got {place:.10g}"
+            )
+    known = [0.0, L]
+    for i, place in enumerate(at):
+        nearest = min(known, key=lambda other: abs(other - place))
+        at[i] = nearest if abs(nearest - place) <= SAME_PLACE * L else place
+        known.append(float(at[i]))
+    return at
+
+
+def _loaded(stations: Floats) -> Floats:
+    """The places of stations that the base does not hold, each once, ascending."""
+    return np.unique(stations[stations > 0.0])
+
+
+def _check_count(name: str, value: object, least: int) -> None:
+    """Raise ValueError unless the value is a whole number, and not too small."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise ValueError(f"{name} must be a whole number, at least {least}, got {describe_value(value)}")
