@@ -26,10 +26,12 @@ import numpy as np
 
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations, passive_rates
+from zwidth.model.drive_motion import DriveMotion
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.inertia import unit_motions
 from zwidth.model.mechanism import FIXED, Drives, Floats, Ints, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
+from zwidth.model.motions import Motions
 from zwidth.model.posture import Posture
 
 
@@ -78,7 +80,11 @@ def is_plain(mechanism: Mechanism) -> bool:
     drives, links = mechanism.drives, mechanism.links
     own = links.joint_stiffness, links.joint_damping, links.joint_coulomb
     return not (
-        mechanism.free or drives.surplus or drives.motor_link is not None or any(x is not None for x in own)
+        mechanism.flexible
+        or mechanism.free
+        or drives.surplus
+        or drives.motor_link is not None
+        or any(x is not None for x in own)
     )
 
 
@@ -112,6 +118,39 @@ def drive_side(mechanism: Mechanism, posture: Posture) -> DriveSide:
             *shape, -1
         ),
         driven=mech.driven,
+    )
+
+
+def drive_side_of_motions(mechanism: Mechanism, motions: Motions, angles: Floats) -> DriveSide:
+    """The drives' side of one posture with flexible links, in the coordinates of its motions, those of the joints and
+    then the elastic ones. Dampers of the flexible links are among those of the joints, and springs, too.
+
+    mechanism  with the ratios of the posture;   angles (n,)
+    """
+    drives, links = mechanism.drives, mechanism.links
+    T = DriveMotion.of(mechanism, motions, angles, np.asarray(drives.transmission)).T
+    none = np.zeros(len(links.names))
+    spring, damper, level = (
+        none if each is None else np.asarray(each)
+        for each in (links.joint_stiffness, links.joint_damping, links.joint_coulomb)
+    )
+    moving = [int(link) for link in motions.unknowns]
+    rates = np.array([motions.joint(link)[0] for link in moving]).reshape(len(moving), motions.count)
+    rubbing = [i for i, link in enumerate(moving) if level[link] > 0.0]
+    S = None
+    if drives.motor_link is not None and drives.motor_axis is not None:
+        S = np.zeros((len(drives.names), motions.count))
+        for i, link in enumerate(drives.motor_link):
+            if link >= 0:
+                S[i] = (motions.rotation[link] @ drives.motor_axis[i]) @ motions.point(int(link), np.zeros(3)).spin
+    return DriveSide(
+        motion=T,
+        spin=S,
+        stiffness=rates.T @ (spring[moving, None] * rates) + motions.elastic_stiffness(),
+        damping=rates.T @ (damper[moving, None] * rates) + motions.elastic_damping(),
+        rubbing=rates[rubbing],
+        coulomb=level[[moving[i] for i in rubbing]],
+        driven=len(mechanism.driven),
     )
 
 

@@ -111,14 +111,8 @@ def command_of(counted: CountedPosture, screw: Floats, weight: Floats, wall_forc
     """
     k = counted.seen.shape[0]
     share = np.linalg.pinv(counted.drives.T[:, :k].T)
-    unit = share @ lever_arms_of(counted.motions, screw)[:k]
+    unit = share @ counted.motions.handle_along(screw)[:k]
     return wall_force * unit - share @ weight[:k], unit
-
-
-def lever_arms_of(motions: Motions, screw: Floats) -> Floats:
-    """h (c,) = J^T u + W^T w of a screw (6,)."""
-    handle = motions.handle
-    return np.asarray(screw[:3] @ handle.speed + screw[3:] @ handle.spin)
 
 
 def solve_equilibrium(
@@ -363,7 +357,7 @@ def command_change(
     k = counted.seen.shape[0]
     T, Z = counted.drives.T[:, :k], counted.drives.Z[:, :k, :k]
     motions, handle = counted.motions, counted.motions.handle
-    b = wall_force * lever_arms_of(motions, screw)[:k]
+    b = wall_force * motions.handle_along(screw)[:k]
     change = wall_force * (np.tensordot(screw[:3], handle.speed_2, 1) + np.tensordot(screw[3:], handle.turning, 1))
     change = change[:k, :k]
     if compensation == "computed":

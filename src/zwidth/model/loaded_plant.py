@@ -25,7 +25,7 @@ import numpy as np
 
 from zwidth.model.damping import Damping
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
-from zwidth.model.equilibrium import Equilibrium, command_change, lever_arms_of
+from zwidth.model.equilibrium import Equilibrium, command_change
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.modes import REPEATED, clusters, undamped_modes
 from zwidth.model.plant import Plant, SampledForce
@@ -72,7 +72,7 @@ def linearise(
     K[:c, :c] = _links_stiffness(equilibrium)
     seen, k = equilibrium.counted, len(mechanism.driven)
     share = np.asarray(np.linalg.pinv(seen.drives.T[:, :k].T), dtype=np.float64)
-    h = lever_arms_of(seen.motions, axis)[:k]
+    h = seen.motions.handle_along(axis)[:k]
     symmetric, turning = 0.5 * (K + K.T), 0.5 * (K - K.T)
     backward = equilibrium.load.branch == "backward"
     parts = nonlinear_of_drives(drives, h @ seen.seen, links, motors, counted, equilibrium.deflections, backward)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.model.design_axes import Array1, Array2, Array3, design_shape
+from zwidth.model.flexible_link import FlexibleLink
 from zwidth.model.nonlinear import FrictionModel
 from zwidth.model.ratio_table import RatioTable
 
@@ -203,6 +204,7 @@ class Mechanism:
     reference_rotation  (..., 3, 3)  axes of the handle in the base frame at the reference; None: where the
                   assembly has them, which only a mechanism that controls the position alone may leave open
     free          (f,)         links whose joint coordinate nobody drives and no loop determines
+    flexible      links that bend, in place of rigid ones
     gravity_compensation       "none"; "computed", by the computer, from the posture that it counts;
                   "counterweight", by masses or springs that balance the links in every posture
     """
@@ -219,6 +221,7 @@ class Mechanism:
     controls: int = POSITION
     reference_rotation: Array2 | None = None
     free: tuple[int, ...] = ()
+    flexible: tuple[FlexibleLink, ...] = ()
     gravity_compensation: Compensation = "none"
 
     @cached_property

@@ -16,12 +16,16 @@ The last term is what the links' constraint forces do as they turn: f . J B2 = -
 closures' multipliers lambda, A^T lambda = J^T f on the joints that nobody drives. Left out, a loop under load
 has the stiffness of another mechanism.
 
+Flexible links (`flexible_link`) have elastic coordinates among the joint coordinates; theirs are the last. They hang
+on closures, too: with N the elastic motions that leave drives and closures alone, u' = B (p', xi'), B = [B_rigid, N].
+
 The three rates of a ball joint are one angular velocity, and no rates of coordinates; about a posture they are
 those of the turn from there, whose vector has no second-order terms of its own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -29,6 +33,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.compiled import compiled
+from zwidth.model.flexible_link import FlexibleLink
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
@@ -87,35 +92,79 @@ class Motions:
 
     mech      the mechanism's arrays
     unknowns  (m,)   the link that each joint coordinate moves: passive ones, then driven, then free
-    rates     (m, c) B,   rates_2 (m, c, c)  B2
+    elastic   places of each flexible link's coordinates among the e elastic ones
+    rates     (m + e, c) B,   rates_2 (m + e, c, c)  B2
     """
 
-    def __init__(self, mech: MechanismArrays, angles: Floats) -> None:
-        """Place the links.
+    def __init__(self, mech: MechanismArrays, angles: Floats, flexible: Sequence[FlexibleLink] = ()) -> None:
+        """Place the links, undeformed.
 
-        mech    of one design;   angles (n,) joint coordinates of a posture with closed loops [rad], [m]
+        mech      of one design;   angles (n,) joint coordinates of a posture with closed loops [rad], [m]
+        flexible  its flexible links, which are rigid where they are left out
         """
-        self.mech = mech
-        self.unknowns = self.mech.joint
+        self.mech, self.flexible = mech, {each.link: each for each in flexible}
+        self.unknowns, self.elastic, end = mech.joint, dict[int, slice](), 0
+        for link, each in self.flexible.items():
+            self.elastic[link] = slice(end, end + each.size)
+            end += each.size
+        self.elastic_count = end
         self.rotation, self._origin, self._axis = _place(self.mech, angles)
         self._links = self._all_links()
         self.rates, self.rates_2 = self._independent()
 
     @property
-    def count(self) -> int:
-        """Number c of independent coordinates."""
+    def joint_count(self) -> int:
+        """Number of independent joint coordinates: drives and free joints."""
         return self.mech.driven + self.mech.free
 
+    @property
+    def count(self) -> int:
+        """Number c of independent coordinates, those of joints first."""
+        return int(self.rates.shape[1])
+
     def point(self, link: int, local: Floats) -> Motion:
-        """A point (3,) of a link's frame [m], with that frame, in the independent coordinates; link -1: the
+        """A point (3,) of a link's frame [m], with what it is fixed to, in the independent coordinates; link -1: the
         base."""
-        arm = local if link < 0 else self.rotation[link] @ local
-        return self._links[link].at(arm).in_coordinates(self.rates, self.rates_2)
+        return self._at(self._links, link, local).in_coordinates(self.rates, self.rates_2)
+
+    def _at(self, links: Mapping[int, Motion], link: int, local: Floats) -> Motion:
+        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to its nearest station."""
+        if link < 0:
+            return links[-1].at(local)
+        R, own = self.rotation[link], links[link]
+        if link not in self.flexible:
+            return own.at(R @ local)
+        beam, columns = self.flexible[link], self._columns(link)
+        k = beam.station_of(local)
+        straight = own.at(R[:, 0] * beam.body.stations[k])
+        bent, turned = (np.zeros_like(own.speed) for _ in range(2))
+        bent[:, columns], turned[:, columns] = R @ beam.body.displacement[k], R @ beam.body.rotation[k]
+        bent_2, turned_2 = 2.0 * _cross_forms(own.spin, bent), _cross_forms(own.spin, turned)
+        at = (slice(None), columns, columns)
+        bent_2[at] += np.tensordot(R, beam.body.displacement_2[k], 1)
+        turned_2[at] += np.tensordot(R, beam.body.rotation_2[k], 1)
+        station = Motion(
+            straight.position,
+            straight.speed + bent,
+            straight.spin + turned,
+            straight.speed_2 + bent_2,
+            straight.spin_2 + turned_2,
+        )
+        return station.at(R @ local - R[:, 0] * beam.body.stations[k])
+
+    def _columns(self, link: int) -> slice:
+        """Where a flexible link's coordinates stand among all coordinates."""
+        own, m = self.elastic[link], len(self.unknowns)
+        return slice(m + own.start, m + own.stop)
 
     @cached_property
     def handle(self) -> Motion:
         """The handle's point, with its link's frame."""
         return self.point(self.mech.handle_link, self.mech.handle[0, 0])
+
+    def handle_along(self, screw: Floats) -> Floats:
+        """h (c,): motion of the handle along a screw (6,) per unit rate of each coordinate, J^T u + W^T w."""
+        return np.asarray(screw[:3] @ self.handle.speed + screw[3:] @ self.handle.spin)
 
     def joint(self, link: int) -> tuple[Floats, Floats]:
         """Rate (c,) of a link's joint coordinate, and its second derivative (c, c)."""
@@ -126,23 +175,80 @@ class Motions:
         """Mass matrix (c, c) of the links in the independent coordinates."""
         M = np.zeros((self.count, self.count))
         for link in self.mech.bodies:
-            centre, R = self.point(link, self.mech.center_of_mass[0, link]), self.rotation[link]
-            M += self.mech.mass[0, link] * centre.speed.T @ centre.speed
-            M += centre.spin.T @ (R @ self.mech.inertia[0, link] @ R.T) @ centre.spin
-        return M
+            R, beam = self.rotation[link], self.flexible.get(int(link))
+            mass, place, inertia = self._rigid_body(int(link))
+            centre = self.point(link, place)
+            M += mass * centre.speed.T @ centre.speed + centre.spin.T @ (R @ inertia @ R.T) @ centre.spin
+            if beam is not None:
+                base = self._links[link]
+                moved = np.vstack([R.T @ base.speed, R.T @ base.spin, self._elastic_rows(int(link))]) @ self.rates
+                M += moved.T @ beam.body.mass @ moved
+        return np.asarray(0.5 * (M + M.T))
+
+    def elastic_stiffness(self) -> Floats:
+        """Stiffness (c, c) of the flexible links."""
+        K = np.zeros((self.count, self.count))
+        for link, beam in self.flexible.items():
+            bent = self._elastic_rows(link) @ self.rates
+            K += bent.T @ beam.body.stiffness @ bent
+        return np.asarray(0.5 * (K + K.T))
+
+    def elastic_damping(self) -> Floats:
+        """Damping (c, c) of the flexible links themselves."""
+        B = np.zeros((self.count, self.count))
+        for link, beam in self.flexible.items():
+            bent = self._elastic_rows(link) @ self.rates
+            B += beam.damping_time * bent.T @ beam.body.stiffness @ bent
+        return np.asarray(0.5 * (B + B.T))
+
+    def _elastic_rows(self, link: int) -> Floats:
+        """(e_i, m + e)  a flexible link's coordinates among all coordinates."""
+        return np.eye(len(self.unknowns) + self.elastic_count)[self._columns(link)]
+
+    def _rigid_body(self, link: int) -> tuple[float, Floats, Floats]:
+        """Mass, centre and inertia of what of a link is rigid: all of it, or what a beam carries."""
+        beam = self.flexible.get(link)
+        if beam is None:
+            mech = self.mech
+            return float(mech.mass[0, link]), mech.center_of_mass[0, link], mech.inertia[0, link]
+        return beam.carried_mass, beam.carried_center, beam.carried_inertia
 
     def weight(self, gravity: Floats) -> tuple[Floats, Floats]:
         """Generalised forces (c,) of gravity (3,) [m/s^2] on the links, and their derivative (c, c)."""
         force, derivative = np.zeros(self.count), np.zeros((self.count, self.count))
         for link in self.mech.bodies if np.any(gravity) else ():
-            centre, pull = self.point(link, self.mech.center_of_mass[0, link]), self.mech.mass[0, link] * gravity
-            force += pull @ centre.speed
-            derivative += np.tensordot(pull, centre.speed_2, 1)
+            mass, place, _ = self._rigid_body(int(link))
+            first, second = mass * self.point(link, place).speed, mass * self.point(link, place).speed_2
+            if (beam := self.flexible.get(int(link))) is not None:
+                own, own_2 = self._first_moment(int(link), beam)
+                first, second = first + own, second + own_2
+            force += gravity @ first
+            derivative += np.tensordot(gravity, second, 1)
         return force, derivative
+
+    def _first_moment(self, link: int, beam: FlexibleLink) -> tuple[Floats, Floats]:
+        """First (3, c) and second derivative (3, c, c) of a beam's mass times the place of its centre."""
+        base, R, columns = self._links[link], self.rotation[link], self._columns(link)
+        M = beam.body.mass
+        # the mass matrix's rows of velocity: m of the speed, m c of the spin, and the elastic coordinates
+        mass = M[0, 0]
+        straight = base.at(R @ np.array([M[1, 5], 0.0, 0.0]) / mass)
+        bent = np.zeros_like(base.speed)
+        bent[:, columns] = R @ M[:3, 6:]
+        bent_2 = 2.0 * _cross_forms(base.spin, bent)
+        bent_2[:, columns, columns] += np.tensordot(R, beam.body.first_moment_2, 1)
+        whole = Motion(
+            straight.position,
+            mass * straight.speed + bent,
+            base.spin,
+            mass * straight.speed_2 + bent_2,
+            base.spin_2,
+        ).in_coordinates(self.rates, self.rates_2)
+        return whole.speed, whole.speed_2
 
     def _all_links(self) -> dict[int, Motion]:
         """Each link's frame in all joint coordinates, parents first; the base as -1."""
-        mech, m = self.mech, len(self.mech.joint)
+        mech, m = self.mech, len(self.mech.joint) + self.elastic_count
         still = Motion(
             np.zeros(3), *(np.zeros((3, m)) for _ in range(2)), *(np.zeros((3, m, m)) for _ in range(2))
         )
@@ -150,7 +256,7 @@ class Motions:
         for i in range(mech.parent.size):
             p, u, z = int(mech.parent[i]), int(mech.column[i]), self._axis[i]
             carrier = links[int(mech.carrier[i])]
-            moved = links[p].at(self._origin[i] - links[p].position)
+            moved = self._at(links, p, self._local(p, self._origin[i]))
             own = np.zeros(m)
             if u >= 0:
                 own[u] = 1.0
@@ -165,20 +271,46 @@ class Motions:
                 )
         return links
 
+    def _local(self, link: int, place: Floats) -> Floats:
+        """A place (3,) of the base's frame in that of a link."""
+        return place if link < 0 else self.rotation[link].T @ (place - self._origin[link])
+
     def _independent(self) -> tuple[Floats, Floats]:
-        """B and B2 of the joints by those of the drives and free joints, on which they hang by the closures."""
-        mech, c = self.mech, self.count
+        """B and B2 of all coordinates by the drives, free joints and elastic motions, on which they hang by the
+        closures."""
+        mech, c, e = self.mech, self.joint_count, self.elastic_count
         m = len(mech.joint)
         passive = m - c
-        B, B2 = np.zeros((m, c)), np.zeros((m, c, c))
-        B[passive:] = mech.to_joint[0]
-        if passive:
-            A, A2 = self._closures()
-            unit = mech.unit[0, :passive]
-            inverse = unit[:, None] * np.linalg.pinv(A[:, :passive] * unit, rcond=RANK)
-            B[:passive] = -inverse @ (A[:, passive:] @ B[passive:])
-            B2[:passive] = -np.tensordot(inverse, B.T @ A2 @ B, 1)
+        B = np.zeros((m + e, c + e))
+        B[passive:m, :c], B[m:, c:] = mech.to_joint[0], np.eye(e)
+        if not mech.a.size:
+            return B, np.zeros((m + e, c + e, c + e))
+        A, A2 = self._closures()
+        unit = mech.unit[0, :passive]
+        inverse = unit[:, None] * np.linalg.pinv(A[:, :passive] * unit, rcond=RANK)
+        B[:passive, :c] = -inverse @ (A[:, passive:m] @ B[passive:m, :c])
+        # what the closures determine: the passive joints, and together with them the links' deformations
+        hanging = np.concatenate([np.arange(passive), np.arange(m, m + e)]).astype(np.int64)
+        if e:
+            scale = np.concatenate([unit, self._elastic_scale()])
+            rows = A[:, hanging] * scale
+            _, size, right = np.linalg.svd(rows)
+            rank = int(np.count_nonzero(size > RANK * size[0]))
+            B = np.hstack([B[:, :c], np.zeros((m + e, len(hanging) - rank))])
+            B[hanging, c:] = scale[:, None] * right[rank:].T
+            inverse = scale[:, None] * np.linalg.pinv(rows, rcond=RANK)
+        B2 = np.zeros((m + e, B.shape[1], B.shape[1]))
+        B2[hanging] = -np.tensordot(inverse, B.T @ A2 @ B, 1)
         return B, B2
+
+    def _elastic_scale(self) -> Floats:
+        """(e,)  of each elastic coordinate, which moves the stations by the mechanism's size at most."""
+        size, out = float(self.mech.size[0]), np.ones(self.elastic_count)
+        for link, beam in self.flexible.items():
+            moved = np.abs(beam.body.displacement).max(axis=(0, 1), initial=0.0)
+            moved = np.maximum(moved, size * np.abs(beam.body.rotation).max(axis=(0, 1), initial=0.0))
+            out[self.elastic[link]] = size / np.where(moved > 0.0, moved, size)
+        return out
 
     def _closures(self) -> tuple[Floats, Floats]:
         """A (r, m) and A2 (r, m, m) of A u'' + u'^T A2 u' = 0; rows of rotations times the mechanism's size."""
@@ -187,7 +319,7 @@ class Motions:
         for k in range(mech.a.size):
             a, b = int(mech.a[k]), int(mech.b[k])
             first, second = (
-                self._links[link].at(local if link < 0 else self.rotation[link] @ local)
+                self._at(self._links, link, local)
                 for link, local in ((a, mech.point_a[0, k]), (b, mech.point_b[0, k]))
             )
             rows.append(first.speed - second.speed)

@@ -22,12 +22,14 @@ from numpy.typing import ArrayLike
 from zwidth.model.argument_checks import require
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
-from zwidth.model.drive_side import DriveSide, drive_side, is_plain
+from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.electrical_damping import add_dampers, project_dampers, winding_dampers
 from zwidth.model.mechanism import Drives, Floats, Ints, Mechanism
+from zwidth.model.mechanism_arrays import pack
 from zwidth.model.modes import undamped_modes
 from zwidth.model.motion_projection import project_onto_motions
+from zwidth.model.motions import Motions
 from zwidth.model.nonlinear import Friction, Nonlinear
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
@@ -76,9 +78,14 @@ def reduce_mechanism(
         raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
     _check_model(model)
     mechanism, u = at_postures(mechanism, posture), screw(direction)
-    h, side = lever_arms(posture, u), drive_side(mechanism, posture)
+    mass, h, side = posture.mass_matrix, lever_arms(posture, u), None
+    if mechanism.flexible:
+        moving = Motions(pack(mechanism), posture.angles, mechanism.flexible)
+        mass, h = moving.mass_matrix(), moving.handle_along(u)
+        side = drive_side_of_motions(mechanism, moving, posture.angles)
+    side = side or drive_side(mechanism, posture)
     check_moves_along(posture, side, h, u)
-    full, electrical = _full(mechanism, posture.mass_matrix, h, side, damping, encoders)
+    full, electrical = _full(mechanism, mass, h, side, damping, encoders)
     if model == "full":
         return add_dampers(full, electrical)
     if not is_plain(mechanism):  # the shares of its drives and joints are read off the matrices
@@ -212,6 +219,7 @@ def _full(
         B = B + _padded(side.damping, f)
     names = [f"{drives.names[i]} link" for i in range(d) if i not in drives.surplus]
     names += [f"{mechanism.links.names[i]} joint" for i in mechanism.free]
+    names += [f"bending {i + 1}" for i in range(c - len(names))]
     names += [f"{drives.names[i]} motor" for i in flexible]
     parts = nonlinear_of_drives(drives, t, links, motors, encoded)
     rubbing = tuple(
