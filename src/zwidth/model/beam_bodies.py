@@ -57,7 +57,7 @@ def finite_elements(
 ) -> FlexibleBody:
     """The beam by elements, cubic for bending and quadratic for stretch and twist, reduced by Craig and Bampton.
 
-        eps = (displacement and rotation of each station, 3 + 3, then the amplitudes of `modes` modes)
+        eps = (displacement and rotation of each station from the base on, 3 + 3, then amplitudes of `modes` modes)
 
     The modes are the lowest of the beam with its base and all stations held (Craig and Bampton 1968). Frequencies
     converge from above, with h^4 of the elements' length h.

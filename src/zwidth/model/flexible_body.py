@@ -43,8 +43,8 @@ class FlexibleBody:
     displacement_2   (S, 3, e, e)  D2, symmetric in the last two [m]
     rotation_2       (S, 3, e, e)  O2, symmetric in the last two [rad]. At eps = 0 and a base at rest the angular
                                    acceleration is Psi eps'' + eps'^T O2 eps'
-    first_moment_2   (3, e, e)     integral of mass per length times D2 [kg m]; with it the beam's first moment of
-                                   mass is L^2/2 m e_x + M[:3, 6:] eps + 1/2 eps^T this eps
+    first_moment_2   (3, e, e)     integral of mass per length times D2 [kg m]; the beam's mass times the place of
+                                   its centre is that of the straight beam + M[:3, 6:] eps + 1/2 eps^T this eps
     """
 
     mass: Floats
