@@ -12,6 +12,7 @@ import numpy as np
 from zwidth.device import build_nonlinear
 from zwidth.device.arm_consistency import HELD
 from zwidth.device.build import in_space, roll_pitch_yaw
+from zwidth.device.build_beams import own_body, with_beams
 from zwidth.device.build_nonlinear import value_or
 from zwidth.device.legs import Member, members, of_copies
 from zwidth.device.schema.arm import ArmSection
@@ -83,7 +84,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
     tables = {drive.joint: _ratio_table(drive) for drive in drives if drive.ratio_table is not None}
     handle, workspace, reference = section.handle, section.workspace, section.reference
     bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
-    return Mechanism(
+    made = Mechanism(
         links=_links(tree, tables),
         closures=_closures(loops, tree),
         drives=_drives(drives, section, tree, tables),
@@ -98,6 +99,18 @@ def mechanism(section: MechanismSection) -> Mechanism:
         free=_free(tree, loops),
         gravity_compensation=section.gravity_compensation,
     )
+    beams = {tree.last[member.entry.name]: member.entry for member in tree.members if member.entry.beam}
+    return with_beams(made, beams, _known_axes(beams)) if beams else made
+
+
+def _known_axes(links: Mapping[int, LinkSection]) -> dict[int, Floats]:
+    """Of each link whose inertia is one number, its joint's axis, about which alone it is known."""
+    single = {index: link for index, link in links.items() if isinstance(link.inertia_kg_m2, tuple)}
+    return {
+        index: _unit(link.axis)
+        for index, link in single.items()
+        if np.shape(stack_numbers(link.inertia_kg_m2))[-1] == 1
+    }
 
 
 def arm(section: ArmSection) -> Arm:
@@ -200,6 +213,8 @@ def _entries(member: Member, tree: Tree, table: RatioTable | None) -> list[tuple
         place = (origin, rotation) if k == 0 else (none, np.eye(3))
         mass = math.nan if link.mass_kg is None else link.mass_kg
         own = mass, in_space(link.center_of_mass_m), _inertia(link, axis), tip
+        if link.beam is not None and link.mass_kg is None:
+            own = (*own_body(link.beam, link.length_m), tip)
         limits = link.limits_rad or link.limits_m or ends
         rows.append(
             (name, parent, kind, *place, axis, *(own if body else (0.0, none, np.zeros((3, 3)), none)), limits)

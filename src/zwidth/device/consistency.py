@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema
 from zwidth.device.arm_consistency import arm_inconsistencies
+from zwidth.device.beam_consistency import beam_inconsistencies
 from zwidth.device.faults import KeyPath, comma_list, plural, quote, suggestion
 from zwidth.device.feedback_consistency import feedback_inconsistencies
 from zwidth.device.legs import spread_tables, written_path
@@ -80,6 +81,7 @@ def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyM
             yield from ratio_inconsistencies(mechanism)
             yield from _assemblies(mechanism)
         yield from _joint_keys(mechanism)
+        yield from beam_inconsistencies(mechanism)
         yield from _loop_keys(mechanism)
         yield from _place_of_handle(mechanism)
         yield from _workspace(mechanism)

@@ -19,8 +19,10 @@ from zwidth.device.compiled_mechanism_check import masses_moved
 from zwidth.device.design_checks import Marks, certainly_valid
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath
+from zwidth.device.legs import members
 from zwidth.device.load import build_device, check
 from zwidth.device.schema.value_types import Section
+from zwidth.device.toml_access import table
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import PROJECTION_TOLERANCE
 from zwidth.model.design_axes import change_designs, design_shape
@@ -241,7 +243,7 @@ def design_batch(
     checked, cleaned = check(document, label)
     leaves = dict(leaf for steps, numbers in columns.items() for leaf in _leaves(steps, numbers))
     valid = certainly_valid(document, leaves, count)
-    if {"load", "arm"} & document.keys():  # each design then has a balance, or an arm, of its own
+    if _built_alone(document):
         valid = np.zeros(count, dtype=np.bool_)
     with_arrays: Any = checked
     for steps, numbers in columns.items():
@@ -253,6 +255,12 @@ def design_batch(
     surplus = device.mechanism.drives.surplus if device.mechanism is not None else ()
     parts = build_device(with_arrays, cleaned, label, surplus) if valid.any() else device
     return DesignBatch(device, parts, count), valid
+
+
+def _built_alone(document: dict[str, Any]) -> bool:
+    """Whether each design has a balance, an arm or beams of its own, which are computed one by one."""
+    bends = any("beam" in member.entry for member in members(table(document, "mechanism"), "links"))
+    return bends or bool({"load", "arm"} & document.keys())
 
 
 def _leaves(steps: KeyPath, numbers: NDArray[np.float64]) -> Iterator[tuple[KeyPath, NDArray[np.float64]]]:

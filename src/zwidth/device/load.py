@@ -26,6 +26,7 @@ from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
 from zwidth.model.arm import Arm
+from zwidth.model.flexible_link import BeamError
 from zwidth.model.load import Load
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
@@ -160,7 +161,7 @@ def build_device(
     surplus  its drives beyond the mechanism's freedom; None: to be found, of one design
     """
     section, controller = checked.mechanism, build.controller(checked.loop)
-    mechanism = _mechanism(section, surplus) if section else None
+    mechanism = _mechanism(section, label, surplus) if section else None
     reference, held = section.reference if section else None, checked.operator or checked.arm
     return Device(
         name=checked.name,
@@ -201,11 +202,14 @@ def _arm(section: ArmSection) -> Arm:
     return arm(section)
 
 
-def _mechanism(section: MechanismSection, surplus: tuple[int, ...] | None) -> Mechanism:
+def _mechanism(section: MechanismSection, label: str, surplus: tuple[int, ...] | None) -> Mechanism:
     from zwidth.device.build_mechanism import mechanism  # compiled code, which a plant does without
     from zwidth.device.mechanism_check import surplus_drives
 
-    made = mechanism(section)
+    try:
+        made = mechanism(section)
+    except BeamError as error:
+        raise fail(label, f"mechanism.links.{error.link}.{error.key}", str(error)) from None
     beyond = surplus_drives(made) if surplus is None else surplus
     return replace(made, drives=replace(made.drives, surplus=beyond)) if beyond else made
 

@@ -52,7 +52,9 @@ def _left_out(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
 
 
 def _gives(entry: dict[str, Any], key: str) -> bool:
-    """Whether a link or drive has the number of a key; a ratio also as a table."""
+    """Whether a link or drive has the number of a key; a ratio also as a table, a mass also as that of a beam."""
+    if key in LINKS and "beam" in entry and not any(own in entry for own in LINKS):
+        return True
     return key in entry or (key == "transmission_ratio" and "ratio_table" in entry)
 
 

@@ -21,7 +21,7 @@ from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.plant_rows import plant_rows
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections, sampled_sections
-from zwidth.loop.sideways import SidewaysMotion, sideways_motions
+from zwidth.loop.sideways import SidewaysMotion, held_motions, sideways_motions
 from zwidth.model.argument_checks import require
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
@@ -200,7 +200,8 @@ class Loop:
     def unobserved_modes(self) -> tuple[str, ...]:
         """Motions that no wall moves, by name; they are cancelled, or stand apart, and do not count for
         stability."""
-        return self.sections.unobserved + tuple(motion.name for motion in self.sideways_motions)
+        apart = () if self.plant.apart is None else held_motions(self.plant.apart)
+        return self.sections.unobserved + tuple(motion.name for motion in self.sideways_motions) + apart
 
     @cached_property
     def state_space(self) -> StateSpace:

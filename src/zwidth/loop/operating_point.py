@@ -142,7 +142,8 @@ class OperatingPoint(PosedDevice):
             )
         assert self.arm is not None
         rows = np.zeros((3, plant.size))
-        rows[:, : self.jacobian.shape[-1]] = self.jacobian
+        handle = self.handle_rows
+        rows[:, : handle.shape[1]] = handle
         gravity = np.zeros(3) if self.load is None else self.load.weight
         return attach_arm(plant, self.arm, rows, self._posture.position, force, gravity)
 
@@ -155,12 +156,13 @@ class OperatingPoint(PosedDevice):
         if self.model != "full" or self.turns or self.direction_count > 1:
             return none
         u = self.direction[:3] / np.linalg.norm(self.direction[:3])
-        across = np.linalg.svd(np.eye(3) - np.outer(u, u))[2][:2] @ self.jacobian
+        handle = self.handle_rows
+        across = np.linalg.svd(np.eye(3) - np.outer(u, u))[2][:2] @ handle
         left, size, _ = np.linalg.svd(across, full_matrices=False)
-        kept = size > MOVES * np.linalg.norm(self.jacobian)
+        kept = size > MOVES * np.linalg.norm(handle)
         rows = np.zeros((int(kept.sum()), plant.size))
         # orthonormal directions in which the handle moves at all
-        rows[:, : self.jacobian.shape[-1]] = left.T[kept] @ across
+        rows[:, : handle.shape[1]] = left.T[kept] @ across
         return rows
 
     @cached_property

@@ -16,7 +16,9 @@ import numpy as np
 
 from zwidth.loop.closed_plant import close_plant
 from zwidth.loop.controller import Controller
-from zwidth.model.plant import Plant
+from zwidth.loop.motion_names import motion_name
+from zwidth.model.modes import undamped_modes
+from zwidth.model.plant import Floats, Plant
 
 NEUTRAL: Final = 1e-12  # |z| - 1 that is rounding
 
@@ -54,10 +56,11 @@ class SidewaysMotion:
 
 
 def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMotion, ...]:
-    """The motions of a plant under a computer that renders no wall, one for each coordinate, fastest-growing
-    first.
+    """The motions that stand apart under a computer that renders no wall, fastest-growing first: as many as are
+    free without load, and all that grow.
 
-    Of the two roots of a coordinate that are real, the larger one counts.
+    plant  the motions that stand apart, with what they are without load. Of the two roots of a coordinate that are
+           real, the larger one counts
     """
     form, _ = close_plant(plant, controller.wall_alone)
     d = np.linalg.eigvals(form.growth)
@@ -73,4 +76,22 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
         pair = complex_root and not pair
         if not complex_root or pair:
             motions.append(SidewaysMotion(rate, frequency if complex_root else 0.0))
-    return tuple(motions[: plant.size])
+    free = 0 if plant.without_load is None else len(_squared(plant.without_load)[0])
+    return tuple(motion for i, motion in enumerate(motions[: plant.size]) if i < free or motion.growth_rate > 0.0)
+
+
+def held_motions(plant: Plant) -> tuple[str, ...]:
+    """Names of the motions that stand apart and are held by springs, as they are without load."""
+    if plant.without_load is None:
+        return ()
+    squared, decay = _squared(plant.without_load)[1:]
+    return tuple(motion_name(float(w2), float(a)) for w2, a in zip(squared, decay, strict=True))
+
+
+def _squared(plant: Plant) -> tuple[Floats, Floats, Floats]:
+    """Squared frequencies of the free motions of a plant, and of the others with how they decay, dampers that
+    couple them left out [1/s^2], [1/s]."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    decay = 0.5 * np.einsum("ik,ij,jk->k", shapes, plant.damping, shapes)
+    free = squared == 0.0
+    return squared[free], squared[~free], decay[~free]

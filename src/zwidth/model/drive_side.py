@@ -122,8 +122,8 @@ def drive_side(mechanism: Mechanism, posture: Posture) -> DriveSide:
 
 
 def drive_side_of_motions(mechanism: Mechanism, motions: Motions, angles: Floats) -> DriveSide:
-    """The drives' side of one posture with flexible links, in the coordinates of its motions, those of the joints and
-    then the elastic ones. Dampers of the flexible links are among those of the joints, and springs, too.
+    """The drives' side of one posture with flexible links, in the coordinates of its motions, those of the joints
+    and then the elastic ones. Dampers of the flexible links are among those of the joints, and springs, too.
 
     mechanism  with the ratios of the posture;   angles (n,)
     """

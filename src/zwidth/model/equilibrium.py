@@ -32,6 +32,7 @@ from zwidth.model.posture import Posture
 STEPS: Final = 50  # of Newton's method
 RAMP: Final = 16  # steps in which a load is brought on, where it cannot be at once
 LARGEST_STEP: Final = 1.0  # of a deflection [rad], [m]
+BENT: Final = 1e-12  # change of the links' bending, in shares of it, below which it is found
 SETTLED: Final = 1e-12  # share of the torques by which the balance may be off
 UNBALANCED: Final = 1e-7  # share of the torques that counts as a joint that nothing balances
 
@@ -51,6 +52,7 @@ class Equilibrium:
     springs        of the drives
     wall_force     f, that the wall pushes with along the direction [N]
     hand_force, hand_moment  (3,)  of the hand on the handle [N], [N m]
+    bending        (x,)  elastic coordinates of the flexible links
     deflections    (d,)  by which the motors are ahead of their joints, at the joint [rad]
     torques        (d,)  of the motors, at the joint [N m];   ratio (d,) of the transmissions
     compensation   how gravity is compensated
@@ -66,11 +68,19 @@ class Equilibrium:
     wall_force: float
     hand_force: Floats
     hand_moment: Floats
+    bending: Floats
     deflections: Floats
     torques: Floats
     ratio: Floats
     compensation: Compensation
     unbalanced: Floats
+
+    @property
+    def handle_place(self) -> Floats:
+        """Where the handle is (3,), flexible links bent [m]."""
+        handle, x = self.motions.handle, self.bending
+        n = self.motions.joint_count
+        return np.asarray(handle.position + handle.speed[:, n:] @ x + 0.5 * (handle.speed_2[:, n:, n:] @ x) @ x)
 
     @property
     def sideways_force(self) -> Floats:
@@ -92,7 +102,7 @@ class Equilibrium:
             "hand_force_N": self.hand_force.tolist(),
             "hand_moment_Nm": self.hand_moment.tolist(),
             "sideways_force_N": self.sideways_force.tolist(),
-            "position_m": self.motions.handle.position.tolist(),
+            "position_m": self.handle_place.tolist(),
             "counted_position_m": self.counted.motions.handle.position.tolist(),
             "motor_torques_Nm": dict(zip(drives, (self.torques / ratio).tolist(), strict=True)),
             "deflections_rad": dict(zip(drives, self.deflections.tolist(), strict=True)),
@@ -140,38 +150,56 @@ class Balance:
         self, mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool
     ) -> None:
         self.mechanism, self.angles, self.screw, self.load = mechanism, posture.angles, screw, load
-        self.counts_motors, self.motions = counts_motors, Motions(pack(mechanism), posture.angles)
+        self.counts_motors = counts_motors
+        self.motions = Motions(pack(mechanism), posture.angles, mechanism.flexible)
+        self.rigid = Motions(self.motions.mech, posture.angles) if mechanism.flexible else self.motions
         self.ratio = np.asarray(mechanism.drives.transmission)
         self.drives = DriveMotion.of(mechanism, self.motions, posture.angles, self.ratio)
         self.springs = DriveSprings.of(mechanism.drives)
         self.flexible = self.springs.flexible
         self.compensation = mechanism.gravity_compensation
         self.gravity = np.zeros(3) if self.compensation == "counterweight" else load.weight
-        self.weight = self.motions.weight(self.gravity)[0]
+        self.weight, self.weight_change = self.motions.weight(self.gravity)
         self.free_springs = self._free_springs(mechanism.assemblies[posture.assembly])
         self.along = screw[:3] if np.any(screw[:3]) else screw[3:]
-        self.to_wrench = self._wrench_of_torques()
         self.normal = load.along(screw)
+        self.elastic = self.motions.elastic_stiffness()[self.joints :, self.joints :]
+        self._bend(np.zeros(len(self.elastic)), 1.0)
+
+    @property
+    def joints(self) -> int:
+        """Number of independent joint coordinates; elastic ones follow them."""
+        return self.motions.joint_count
+
+    def _bend(self, bending: Floats, share: float) -> None:
+        """Take what acts on the joints as it is with the flexible links bent by elastic coordinates (x,)."""
+        n, handle = self.joints, self.motions.handle
+        self.bending = bending
+        self.speed = handle.speed[:, :n] + handle.speed_2[:, :n, n:] @ bending
+        self.spin = handle.spin[:, :n] + handle.turning[:, :n, n:] @ bending
+        self.pull = share * (self.weight[:n] + self.weight_change[:n, n:] @ bending)
+        self.motion = self.drives.T[:, :n] + self.drives.Z[:, :n, n:] @ bending
+        self.to_wrench = self._wrench_of_torques()
 
     def _free_springs(self, rest: Floats) -> Floats:
         """Torques (c,) of the free joints' own springs."""
-        torques, stiffness = np.zeros(self.motions.count), self.mechanism.links.joint_stiffness
+        torques, stiffness = np.zeros(self.joints), self.mechanism.links.joint_stiffness
         for i, link in enumerate(self.mechanism.free if stiffness is not None else ()):
             assert stiffness is not None
             torques[len(self.mechanism.driven) + i] = -stiffness[link] * (self.angles[link] - rest[link])
         return torques
 
     def _wrench_of_torques(self) -> Floats:
-        """(6, c): the hand's force and moment that balance generalised forces (c,), the least that do."""
-        handle, c = self.motions.handle, self.motions.count
-        rows = np.zeros((6, c))
-        if self.mechanism.controls != ORIENTATION and np.any(handle.speed):
-            rows[:3] = np.linalg.pinv(handle.speed.T)
+        """(6, n): the hand's force and moment that balance generalised forces on the joints (n,), the least that
+        do."""
+        rows = np.zeros((6, self.joints))
+        if self.mechanism.controls != ORIENTATION and np.any(self.speed):
+            rows[:3] = np.linalg.pinv(self.speed.T)
         if self.mechanism.controls == ORIENTATION:
-            rows[3:] = np.linalg.pinv(handle.spin.T)
+            rows[3:] = np.linalg.pinv(self.spin.T)
         elif self.mechanism.controls != POSITION:
             size = float(self.motions.mech.size[0])
-            both = np.concatenate([handle.speed, size * handle.spin])
+            both = np.concatenate([self.speed, size * self.spin])
             rows = np.linalg.pinv(both.T)
             rows[3:] *= size
         return rows
@@ -193,10 +221,11 @@ class Balance:
     def _newton(self, share: float, ahead: Floats, f: float) -> Equilibrium | None:
         """The equilibrium under a share of load and gravity, from deflections and a wall's force near it."""
         ahead = ahead.copy()
+        self._bend(self.bending, share)
         for _ in range(STEPS):
             counted = counted_posture(
                 self.mechanism,
-                self.motions,
+                self.rigid,
                 self.angles,
                 ahead if self.counts_motors else np.zeros_like(ahead),
                 self.ratio,
@@ -210,7 +239,14 @@ class Balance:
             off, jacobian = self._equations(share, ahead, counted, torques, unit, s, f)
             size = float(np.max(np.abs(s), initial=0.0))
             if np.max(np.abs(off), initial=0.0) <= SETTLED * max(size, abs(f)):
-                return self._result(share, ahead, counted, torques, s, f)
+                found = self._result(ahead, counted, torques, s, f)
+                bending = self._bending_under(share, found, s)
+                if np.max(np.abs(bending - self.bending), initial=0.0) <= BENT * np.max(
+                    np.abs(bending), initial=0.0
+                ):
+                    return found
+                self._bend(bending, share)
+                continue
             with np.errstate(all="ignore"):
                 try:
                     step = np.linalg.solve(jacobian, off)
@@ -230,7 +266,7 @@ class Balance:
 
     def _compensated(self, counted: CountedPosture) -> Floats:
         if self.compensation != "computed":
-            return np.zeros(self.motions.count)
+            return np.zeros(self.joints)
         return counted.motions.weight(self.gravity)[0]
 
     def _equations(
@@ -258,23 +294,45 @@ class Balance:
         along[:3] = self.along if np.any(self.screw[:3]) else 0.0
         along[3:] = 0.0 if np.any(self.screw[:3]) else self.along
         row = -(along @ self.to_wrench) / float(self.along @ self.along)
-        by_spring = row @ self.drives.T.T
+        by_spring = row @ self.motion.T
         s_by_ahead, s_by_force = by_ahead.copy(), unit.copy()
         s_by_ahead[F], s_by_force[F] = tangent[F], 0.0
-        off = np.append(off, row @ self._borne(share, s) - share * self.normal)
+        off = np.append(off, row @ self._borne(s) - share * self.normal)
         column = np.append(-unit[F], by_spring @ s_by_force)
         return off, np.column_stack([np.vstack([jacobian, by_spring @ s_by_ahead]), column])
 
-    def _borne(self, share: float, s: Floats) -> Floats:
-        """Generalised forces (c,) on the links but for the hand's."""
-        return np.asarray(share * self.weight + self.free_springs + self.drives.T.T @ s)
+    def _borne(self, s: Floats) -> Floats:
+        """Generalised forces (n,) on the joints but for the hand's."""
+        return np.asarray(self.pull + self.free_springs + self.motion.T @ s)
 
-    def _result(
-        self, share: float, ahead: Floats, counted: CountedPosture, torques: Floats, s: Floats, f: float
-    ) -> Equilibrium:
-        borne = self._borne(share, s)
-        wrench, handle = -(self.to_wrench @ borne), self.motions.handle
-        left = borne + wrench[:3] @ handle.speed + wrench[3:] @ handle.spin
+    def _bending_under(self, share: float, found: Equilibrium, s: Floats) -> Floats:
+        """Elastic coordinates (x,) of the flexible links under the forces of an equilibrium.
+
+        Raises  EquilibriumError  where the load buckles them
+        """
+        n, handle = self.joints, self.motions.handle
+        if not len(self.elastic):
+            return np.zeros(0)
+        force, moment = found.hand_force, found.hand_moment
+        pushed = force @ handle.speed + moment @ handle.spin + share * self.weight + s @ self.drives.T
+        softened = np.tensordot(force, handle.speed_2, 1) + np.tensordot(moment, handle.turning, 1)
+        softened = softened + share * self.weight_change + np.tensordot(s, self.drives.Z, 1)
+        own = softened[n:, n:]
+        own = 0.5 * (own + own.T)
+        root = np.linalg.cholesky(self.elastic)
+        half = np.linalg.solve(root, own)
+        most = float(np.max(np.linalg.eigvalsh(np.linalg.solve(root, half.T))))
+        if not most < 1.0:
+            raise EquilibriumError(
+                f"the links buckle under {self.load.text}: they bear {share / most:.4g} of it; choose a smaller "
+                "load, or stiffer links"
+            )
+        return np.asarray(np.linalg.solve(self.elastic - own, pushed[n:]))
+
+    def _result(self, ahead: Floats, counted: CountedPosture, torques: Floats, s: Floats, f: float) -> Equilibrium:
+        borne = self._borne(s)
+        wrench = -(self.to_wrench @ borne)
+        left = borne + wrench[:3] @ self.speed + wrench[3:] @ self.spin
         return Equilibrium(
             load=self.load,
             screw=self.screw,
@@ -286,6 +344,7 @@ class Balance:
             hand_force=wrench[:3],
             hand_moment=wrench[3:],
             deflections=ahead,
+            bending=self.bending,
             torques=torques,
             ratio=self.ratio,
             compensation=self.compensation,
@@ -300,10 +359,10 @@ class Balance:
 
     def _check_balance(self, found: Equilibrium) -> None:
         """Raise EquilibriumError where the hand cannot balance a coordinate."""
-        left, count = found.unbalanced, self.motions.count
+        left, count = found.unbalanced, self.joints
         scale = max(
             float(np.max(np.abs(self.weight), initial=0.0)),
-            float(np.max(np.abs(self.drives.T.T) @ np.abs(found.torques), initial=0.0)),
+            float(np.max(np.abs(self.motion.T) @ np.abs(found.torques), initial=0.0)),
             float(np.max(np.abs(self.free_springs), initial=0.0)),
         )
         loose = np.flatnonzero(np.abs(left) > UNBALANCED * scale)

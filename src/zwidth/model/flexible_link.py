@@ -1,7 +1,7 @@
 """A link that bends: a beam along its x axis, and what the beam carries.
 
-The link's mass, centre of mass and inertia are those of the whole, as of a rigid link. Of these the beam has what its
-mass per length makes; the rest is a rigid body that the beam carries at its nearest station.
+The link's mass, centre of mass and inertia are those of the whole, as of a rigid link. Of these the beam has what
+its mass per length makes; the rest is a rigid body that the beam carries at its nearest station.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Method = Literal["assumed-modes", "finite-elements", "lumped"]
 class BeamError(ValueError):
     """A beam that its link cannot be.
 
-    key  of the link's table that is wrong: "beam", "mass_kg" or "inertia_kg_m2"
+    link  its name;   key  of its table that is wrong: "mass_kg" or "inertia_kg_m2"
     """
 
-    def __init__(self, key: str, message: str) -> None:
-        self.key = key
+    def __init__(self, link: str, key: str, message: str) -> None:
+        self.link, self.key = link, key
         super().__init__(message)
 
 

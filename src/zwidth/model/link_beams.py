@@ -28,8 +28,8 @@ def flexible_link(
 ) -> FlexibleLink:
     """The flexible link that takes the place of a rigid one.
 
-    Assumed modes follow the joints: those of a beam clamped at its base where the link is driven or fixed, those of a
-    beam between pins where its joint is passive. Converged results do not depend on that.
+    Assumed modes follow the joints: those of a beam clamped at its base where the link is driven or fixed, those
+    of a beam between pins where its joint is passive. Converged results do not depend on that.
 
     link      index of the link, whose tip is the beam's
     modes     of assumed modes in each plane, of twist and of stretch; of finite elements those kept beside the
@@ -44,6 +44,7 @@ def flexible_link(
     left = float(mass) - m
     if left < -POSSIBLE * m:
         raise BeamError(
+            links.names[link],
             "mass_kg",
             f"is {float(mass):.6g} kg, and the beam alone weighs {m:.6g} kg; give the mass of the whole link, or "
             "another section or material",
@@ -59,9 +60,10 @@ def flexible_link(
     least = float(np.min(np.linalg.eigvalsh(rest)))
     if least < -POSSIBLE * float(np.max(own)):
         raise BeamError(
+            links.names[link],
             "inertia_kg_m2",
-            f"leaves {least:.4g} kg m^2 for what the beam carries, whose own moment is {float(np.max(own)):.4g} kg m^2 "
-            "about its centre; give the inertia of the whole link, or another section or material",
+            f"leaves {least:.4g} kg m^2 for what the beam carries, whose own moment is {float(np.max(own)):.4g} "
+            "kg m^2 about its centre; give the inertia of the whole link, or another section or material",
         )
     stations = np.unique([min(max(x, 0.0), L) for x in _fixed_places(mechanism, link, carried if left else None)])
     body = _body(mechanism, link, beam, method, modes, elements, stations)

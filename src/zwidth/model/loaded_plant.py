@@ -152,8 +152,8 @@ def set_apart(plants: LoadedPlants) -> Plant:
     moved, still = moved_motions(plants.unloaded)
     if not still.shape[1]:
         return replace(plants.loaded, without_load=plants.unloaded)
-    counted = replace(plants.loaded, without_load=plants.unloaded).on_motions(moved)
-    return replace(counted, apart=plants.loaded.on_motions(still))
+    both = replace(plants.loaded, without_load=plants.unloaded)
+    return replace(both.on_motions(moved), apart=both.on_motions(still))
 
 
 def moved_motions(plant: Plant) -> tuple[Floats, Floats]:

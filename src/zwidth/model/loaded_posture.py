@@ -81,6 +81,8 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
             at = _hung(mechanism, at, balance)
         if load.posture_of == "motors":
             at = _behind_motors(mechanism, posture, at, balance)
+        elif mechanism.flexible:
+            at = _ahead_of_bending(mechanism, posture, at, balance)
         if load.settle:
             at = _settled(mechanism, at, screw, load, balance)
         if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
@@ -107,6 +109,23 @@ def _behind_motors(
         "no posture was found whose motors stand where they were asked to: the load bends the drives too far; "
         "choose a smaller load"
     )
+
+
+def _ahead_of_bending(
+    mechanism: Mechanism, asked: Posture, at: Posture, balance: Callable[[Posture], Balance]
+) -> Posture:
+    """The links' posture, as if they were rigid, in which their bending has the handle where it is asked for."""
+    k, c = len(mechanism.driven), asked.jacobian.shape[-1]
+    for _ in range(STEPS):
+        found = balance(at).solve()
+        away = asked.position - found.handle_place
+        step = np.zeros(c)
+        # what the drives cannot make up for, as bending out of a plane, stays
+        step[:k] = np.linalg.pinv(at.jacobian[:, :k]) @ away
+        if np.max(np.abs(step), initial=0.0) <= SETTLED:
+            return replace(at, position=found.handle_place)
+        at = _moved(mechanism, at, step)
+    raise EquilibriumError("no posture was found in which the bent links have the handle where it is asked for")
 
 
 def _settled(

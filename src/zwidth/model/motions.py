@@ -16,8 +16,9 @@ The last term is what the links' constraint forces do as they turn: f . J B2 = -
 closures' multipliers lambda, A^T lambda = J^T f on the joints that nobody drives. Left out, a loop under load
 has the stiffness of another mechanism.
 
-Flexible links (`flexible_link`) have elastic coordinates among the joint coordinates; theirs are the last. They hang
-on closures, too: with N the elastic motions that leave drives and closures alone, u' = B (p', xi'), B = [B_rigid, N].
+Flexible links (`flexible_link`) have elastic coordinates among the joint coordinates; theirs are the last. They
+hang on closures, too: with N the elastic motions that leave drives and closures alone, u' = B (p', xi'), B =
+[B_rigid, N].
 
 The three rates of a ball joint are one angular velocity, and no rates of coordinates; about a posture they are
 those of the turn from there, whose vector has no second-order terms of its own.
@@ -123,8 +124,8 @@ class Motions:
         return int(self.rates.shape[1])
 
     def point(self, link: int, local: Floats) -> Motion:
-        """A point (3,) of a link's frame [m], with what it is fixed to, in the independent coordinates; link -1: the
-        base."""
+        """A point (3,) of a link's frame [m], with what it is fixed to, in the independent coordinates; link -1:
+        the base."""
         return self._at(self._links, link, local).in_coordinates(self.rates, self.rates_2)
 
     def _at(self, links: Mapping[int, Motion], link: int, local: Floats) -> Motion:
@@ -162,9 +163,10 @@ class Motions:
         """The handle's point, with its link's frame."""
         return self.point(self.mech.handle_link, self.mech.handle[0, 0])
 
-    def handle_along(self, screw: Floats) -> Floats:
-        """h (c,): motion of the handle along a screw (6,) per unit rate of each coordinate, J^T u + W^T w."""
-        return np.asarray(screw[:3] @ self.handle.speed + screw[3:] @ self.handle.spin)
+    def handle_along(self, screws: Floats) -> Floats:
+        """h (..., c): motion of the handle along screws (..., 6) per unit rate of each coordinate, J^T u + W^T
+        w."""
+        return np.asarray(screws[..., :3] @ self.handle.speed + screws[..., 3:] @ self.handle.spin)
 
     def joint(self, link: int) -> tuple[Floats, Floats]:
         """Rate (c,) of a link's joint coordinate, and its second derivative (c, c)."""
@@ -304,12 +306,11 @@ class Motions:
         return B, B2
 
     def _elastic_scale(self) -> Floats:
-        """(e,)  of each elastic coordinate, which moves the stations by the mechanism's size at most."""
+        """(e,)  of each elastic coordinate, by which it moves its beam by the mechanism's size on the average."""
         size, out = float(self.mech.size[0]), np.ones(self.elastic_count)
         for link, beam in self.flexible.items():
-            moved = np.abs(beam.body.displacement).max(axis=(0, 1), initial=0.0)
-            moved = np.maximum(moved, size * np.abs(beam.body.rotation).max(axis=(0, 1), initial=0.0))
-            out[self.elastic[link]] = size / np.where(moved > 0.0, moved, size)
+            mass = beam.body.mass
+            out[self.elastic[link]] = size * np.sqrt(mass[0, 0] / np.diag(mass)[6:])
         return out
 
     def _closures(self) -> tuple[Floats, Floats]:

@@ -14,13 +14,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
-from zwidth.model.drive_side import drive_side, is_plain
-from zwidth.model.effective_parameters import lever_arms, screw
+from zwidth.model.drive_side import is_plain
+from zwidth.model.effective_parameters import screw
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture
 from zwidth.model.ratio_table import at_postures
-from zwidth.model.reduction import MODELS, DirectionError, Model, ModelError, full_matrices, reduce_mechanism
+from zwidth.model.reduction import (
+    MODELS,
+    DirectionError,
+    Model,
+    ModelError,
+    full_matrices,
+    links_and_drives,
+    reduce_mechanism,
+)
 
 # Directions whose least independent combination is below this share of the largest are dependent.
 DEPENDENT = 1e-9
@@ -136,13 +144,14 @@ def reduce_directions(
     first = reduce_mechanism(mechanism, posture, U[0], "full", damping)
     if model not in MODELS:
         raise ValueError(f"there is no model {model!r}; choose one of {', '.join(MODELS)}")
-    H, side = lever_arms(posture, U), drive_side(mechanism, posture)
+    posed = at_postures(mechanism, posture)
+    mass, H, side = links_and_drives(posed, posture, U)
     _check_independent(H[:, : side.driven])
-    drives = at_postures(mechanism, posture).drives
+    drives = posed.drives
     n2 = drives.transmission**2
     rotor, spring, damper = n2 * drives.motor_inertia, n2 * drives.stiffness, n2 * drives.damping
     if model == "full":
-        _, _, _, flexible = full_matrices(drives, side, posture.mass_matrix)
+        _, _, _, flexible = full_matrices(drives, side, mass)
         c, f, shares = H.shape[1], len(flexible), np.stack([side.shares(h) for h in H])
         motors = np.concatenate([side.motion, np.zeros((len(drives.names), f))], axis=1)
         motors[flexible] = np.eye(c + f)[c:]
@@ -154,7 +163,8 @@ def reduce_directions(
     if not is_plain(mechanism):
         raise ModelError(
             f"model {model!r} of several directions needs as many drives as degrees of freedom, without springs, "
-            "dampers or friction of joints, free joints or rotors that turn with their links; use 'full'"
+            "dampers or friction of joints, free joints, flexible links or rotors that turn with their links; use "
+            "'full'"
         )
     if model == "rigid":
         slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0

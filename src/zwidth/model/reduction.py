@@ -78,12 +78,7 @@ def reduce_mechanism(
         raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
     _check_model(model)
     mechanism, u = at_postures(mechanism, posture), screw(direction)
-    mass, h, side = posture.mass_matrix, lever_arms(posture, u), None
-    if mechanism.flexible:
-        moving = Motions(pack(mechanism), posture.angles, mechanism.flexible)
-        mass, h = moving.mass_matrix(), moving.handle_along(u)
-        side = drive_side_of_motions(mechanism, moving, posture.angles)
-    side = side or drive_side(mechanism, posture)
+    mass, h, side = links_and_drives(mechanism, posture, u)
     check_moves_along(posture, side, h, u)
     full, electrical = _full(mechanism, mass, h, side, damping, encoders)
     if model == "full":
@@ -105,6 +100,19 @@ def reduce_mechanism(
     motions = _motions(full, model)
     with_sensor = replace(_with_sensor(reduced, full, motions), nonlinear=full.nonlinear.project(motions))
     return add_dampers(with_sensor, project_dampers(electrical, motions))
+
+
+def links_and_drives(mechanism: Mechanism, posture: Posture, screws: Floats) -> tuple[Floats, Floats, DriveSide]:
+    """Mass matrix (c, c) of the links, motions (..., c) of the handle along screws (..., 6), and the drives'
+    side, in the independent coordinates of one posture; with flexible links also the elastic ones.
+
+    mechanism  with the ratios of the posture
+    """
+    if not mechanism.flexible:
+        return posture.mass_matrix, lever_arms(posture, screws), drive_side(mechanism, posture)
+    motions = Motions(pack(mechanism), posture.angles, mechanism.flexible)
+    side = drive_side_of_motions(mechanism, motions, posture.angles)
+    return motions.mass_matrix(), motions.handle_along(screws), side
 
 
 def check_moves_along(posture: Posture, side: DriveSide, h: Floats, u: Floats) -> None:

@@ -88,6 +88,7 @@ def _check_drives(mechanism: Mechanism) -> None:
     """Raise MotionError for what the motion of a whole mechanism leaves out."""
     drives, links = mechanism.drives, mechanism.links
     present = {
+        "links that bend": bool(mechanism.flexible),
         "joints that nobody drives or holds": bool(mechanism.free),
         "more drives than degrees of freedom": bool(drives.surplus),
         "rotors that turn with their links": drives.motor_link is not None,

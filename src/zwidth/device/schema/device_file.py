@@ -18,7 +18,7 @@ from zwidth.device.schema.plant import PlantSection
 from zwidth.device.schema.response import ResponseSection
 from zwidth.device.schema.value_types import VERSION, Section, Text, WholeNumber, documented_key
 
-TAGS: Final = ("type", "method")  # of a filter, of a velocity's estimate
+TAGS: Final = ("type", "method", "shape")  # of a filter, of a velocity's estimate, of a cross section
 
 
 def flat_sources(value: Any) -> Any:

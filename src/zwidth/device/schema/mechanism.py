@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from zwidth.device.schema.beam import BeamSection
 from zwidth.device.schema.friction import DriveFrictionSection
 from zwidth.device.schema.value_types import (
     Axis,
@@ -111,6 +112,11 @@ class LinkSection(Section):
     )
     center_of_mass_m: Offset = documented_key(
         "centre of mass in the link's frame, x or x, y or x, y, z", "m", default=(0.0, 0.0, 0.0)
+    )
+    beam: BeamSection | None = documented_key(
+        "the link bends: a beam from its joint to its tip; mass, centre of mass and inertia then are those of the "
+        "whole link, or omitted for the beam's own; omitted: the link is rigid",
+        default=None,
     )
     inertia_kg_m2: Inertia | None = documented_key(
         "moments of inertia about the centre of mass, link axes: one number (about the joint axis; enough "
