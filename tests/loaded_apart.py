@@ -60,7 +60,7 @@ class SampledDevice:
         """Joint coordinates of the posture that the computer sees."""
         at = self.posture.angles
         joints = self.mech.to_drive[0] @ at[self.mechanism.drives.joint]
-        return moved_posture(self.mechanism, at, x[self.read] - joints)
+        return moved_posture(self.mech, at, x[self.read] - joints)
 
     def reading(self, x):
         return self.u @ self._handle(self.counted(x))
@@ -95,8 +95,8 @@ class SampledDevice:
         """dx/dp by differences, so that nothing of the linearisation's own derivatives is used."""
         columns = []
         for e in step * np.eye(self.d):
-            ahead, back = (self._handle(moved_posture(self.mechanism, angles, way)) for way in (e, -e))
-            far, farther = (self._handle(moved_posture(self.mechanism, angles, 2 * way)) for way in (e, -e))
+            ahead, back = (self._handle(moved_posture(self.mech, angles, way)) for way in (e, -e))
+            far, farther = (self._handle(moved_posture(self.mech, angles, 2 * way)) for way in (e, -e))
             columns.append((8 * (ahead - back) - (far - farther)) / (12 * step))
         return np.array(columns).T
 
@@ -112,7 +112,7 @@ class SampledDevice:
 
         rows = []
         for e in step * np.eye(self.d):
-            a, b, c, d = (height(moved_posture(self.mechanism, angles, f * e)) for f in (1, -1, 2, -2))
+            a, b, c, d = (height(moved_posture(self.mech, angles, f * e)) for f in (1, -1, 2, -2))
             rows.append(self.gravity @ (8 * (a - b) - (c - d)) / (12 * step))
         return np.array(rows)
 

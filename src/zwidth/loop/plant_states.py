@@ -36,7 +36,7 @@ from zwidth.model.plant import Plant
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-NEUTRAL = 1e-12  # share of the stiffnesses that are summed below which a motion has none
+NEUTRAL = 1e-11  # share of what holds a motion, or of what a load adds, that is rounding
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,10 @@ def _loaded_states(
     """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
     of lagged dampers. What is neutral without load no longer is, and nothing is left out."""
     n, T, lags = plant.size, period, plant.lagged_dampers
-    squared, V = undamped_modes(plant.mass, plant.stiffness)
-    K, B = np.diag(squared), V.T @ plant.damping @ V
+    V = np.eye(n)  # a plant on its modes without load keeps what the load adds to the last digit
+    if not np.array_equal(plant.mass, V):
+        V = undamped_modes(plant.mass, plant.stiffness)[1]
+    K, B = V.T @ plant.stiffness @ V, V.T @ plant.damping @ V
     if plant.circulatory is not None:
         K = K + V.T @ plant.circulatory @ V
     size = 2 * n + len(lags)
@@ -227,16 +229,24 @@ def _loaded_states(
     readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
     pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
     drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lags), np.zeros((n, n)))
-    neutral = _nullity(K - pushes.T @ readings, K, pushes.T @ readings)
-    still = _nullity(np.vstack([K, readings, drag / T]), K, drag / T, readings)
+    feedback = pushes.T @ readings
+    # each mode in its own units, so that the stiff ones do not hide the free ones
+    bare = np.diag(K) if plant.without_load is None else np.diag(V.T @ plant.without_load.stiffness @ V)
+    added = max(_largest(K - np.diag(bare)), _largest(feedback), np.finfo(float).tiny)
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(bare), added))
+    neutral = _nullity(scale[:, None] * (K - feedback) * scale)
+    still = _nullity(np.vstack([scale[:, None] * part * scale for part in (K, feedback, drag / T)]))
     return PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
 
 
-def _nullity(matrix: Floats, *parts: Floats) -> int:
-    """Dimension of what a matrix (r, n) maps to 0, to rounding of its parts."""
-    scale = max((float(np.max(np.abs(part), initial=0.0)) for part in parts), default=0.0)
+def _nullity(matrix: Floats) -> int:
+    """Dimension of what a matrix (r, n) with entries of the order of 1 maps to rounding."""
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL * scale))
+    return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL))
+
+
+def _largest(matrix: Floats) -> float:
+    return float(np.max(np.abs(matrix), initial=0.0))
 
 
 def _growth_rate(decay: float, squared: float) -> float:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -150,15 +150,37 @@ def set_apart(plants: LoadedPlants) -> Plant:
     poles of either by its square; `Load.count_sideways` keeps it.
     """
     moved, still = moved_motions(plants.unloaded)
-    if not still.shape[1]:
-        return replace(plants.loaded, without_load=plants.unloaded)
-    both = replace(plants.loaded, without_load=plants.unloaded)
-    return replace(both.on_motions(moved), apart=both.on_motions(still))
+    if not len(still.squared):
+        return _on(plants, moved)
+    return replace(_on(plants, moved), apart=_on(plants, still))
 
 
-def moved_motions(plant: Plant) -> tuple[Floats, Floats]:
-    """Mass-normalised motions (n, m) that a force at the actuator moves and the sensor reads, and the others: the
-    least subspaces that mass, stiffness and damping keep apart."""
+def counting_all(plants: LoadedPlants) -> Plant:
+    """The loaded plant on all its modes without load, those that no wall moves among them."""
+    squared, V = undamped_modes(plants.unloaded.mass, plants.unloaded.stiffness)
+    return _on(plants, ModalMotions(V, squared))
+
+
+def _on(plants: LoadedPlants, motions: ModalMotions) -> Plant:
+    """The loaded plant on some modes of the unloaded one. Their own mass and stiffness are exact: of a free motion
+    the stiffness is 0, so that what the load adds keeps its digits."""
+    Z = motions.shapes
+    added = Z.T @ (plants.loaded.stiffness - plants.unloaded.stiffness) @ Z
+    own, mass = np.diag(motions.squared), np.eye(len(motions.squared))
+    bare = replace(plants.unloaded.on_motions(Z), mass=mass, stiffness=own)
+    return replace(plants.loaded.on_motions(Z), mass=mass, stiffness=own + added, without_load=bare)
+
+
+class ModalMotions(NamedTuple):
+    """Mass-normalised motions: shapes (n, m), each within one natural frequency, and its square (m,) [1/s^2]."""
+
+    shapes: Floats
+    squared: Floats
+
+
+def moved_motions(plant: Plant) -> tuple[ModalMotions, ModalMotions]:
+    """The motions that a force at the actuator moves, and the others: the least subspaces that mass, stiffness and
+    damping keep apart. Both are sums of what they have at each natural frequency."""
     squared, V = undamped_modes(plant.mass, plant.stiffness)
     drag = V.T @ plant.damping @ V
     for damper in plant.lagged_dampers:
@@ -178,8 +200,14 @@ def moved_motions(plant: Plant) -> tuple[Floats, Floats]:
         fresh = _new_directions(basis, parts)
         basis = np.hstack([basis, fresh])
         fresh = _new_directions(basis, drag @ fresh)
-    left = np.linalg.svd(basis)[0]
-    return np.asarray(V @ basis), np.asarray(V @ left[:, basis.shape[1] :])
+    each_group = list[tuple[Floats, Floats, Floats]]()
+    for group in groups:
+        left, size, _ = np.linalg.svd(basis[group])
+        rank = int(np.count_nonzero(size > 0.5))  # of an orthonormal basis: each is 1 or rounding
+        each_group.append((V[:, group] @ left, squared[group], (np.arange(len(group)) < rank).astype(float)))
+    shapes, own, moves = (np.concatenate(each, axis=-1) for each in zip(*each_group, strict=True))
+    moved = moves > 0.0
+    return ModalMotions(shapes[:, moved], own[moved]), ModalMotions(shapes[:, ~moved], own[~moved])
 
 
 def _new_directions(basis: Floats, vectors: Floats) -> Floats:
