@@ -1,9 +1,9 @@
 """A device under load, simulated nonlinearly from sample to sample: the judge of its linearisation.
 
-The links move by their full equations of motion, integrated by Runge and Kutta; the computer counts the motors, closes
-the loops of the counted posture, and sends J^T f n of the wall's force there. The map from the state at one sample to
-that at the next is differentiated by central differences. State: joints and motors, their rates, lagged torques; then
-the computer's: torques on their way, the last readings, the filter's memory.
+The links move by their full equations of motion, integrated by Runge and Kutta; the computer counts the motors,
+closes the loops of the counted posture, and sends J^T f n of the wall's force there. The map from the state at one
+sample to that at the next is differentiated by central differences. State: joints and motors, their rates, lagged
+torques; then the computer's: torques on their way, the last readings, the filter's memory.
 """
 
 from dataclasses import replace

@@ -20,8 +20,8 @@ def pressed_wall(
         f = F - (F + K x + B v)  inside, where the depth x + F/K has the sign of F;   else F
 
     x is the way from the equilibrium, where wall and hand hold each other. Up to an amplitude of F/K it is the
-    two-sided wall; beyond, the device leaves the wall and the hand's force alone is left. With no_pull the wall's own
-    force never changes its sign.
+    two-sided wall; beyond, the device leaves the wall and the hand's force alone is left. With no_pull the wall's
+    own force never changes its sign.
 
     >>> values = pressed_wall.values(stiffness=1000.0, load=5.0)
     >>> [pressed_wall.function(x, 0.0, 0.0, 1e-3, values, None) for x in (0.001, -0.004, -0.02)]
