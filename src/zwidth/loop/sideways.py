@@ -3,7 +3,8 @@
 A free device slides along a wall as it likes, neither pushed nor held: its roots stay at z = 1. Under load it is
 pushed: by the hand's force, whose lever arms change, and by the computer's, which turns with the counts a little
 late. With rigid drives the two cancel but for that delay, and one root of each motion moves by the order of
-(1/2 + delay)(w T)^2 from 1; with flexible drives a static part of the order of the load stays.
+(1/2 + delay)(w T)^2 from 1, w^2 being the load's stiffness over the mass. With flexible drives a static stiffness
+stays, of the order of the load's square over theirs, and a growth rate of the order of the load.
 """
 
 from __future__ import annotations
