@@ -63,8 +63,9 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
     plant  the motions that stand apart, with what they are without load. Of the two roots of a coordinate that are
            real, the larger one counts
     """
-    form, _ = close_plant(plant, controller.wall_alone)
+    form, states = close_plant(plant, controller.wall_alone)
     d = np.linalg.eigvals(form.growth)
+    d[np.argsort(np.abs(d))[: states.neutral]] = 0.0  # several at once, rounding makes a slow vibration of them
     # |1 + d|^2 - 1 without cancellation
     excess = 2.0 * d.real + np.abs(d) ** 2
     order = np.argsort(-excess)[: 2 * plant.size]
