@@ -138,9 +138,7 @@ def _settled(
     k, u, force, start = len(mechanism.driven), screw[:3], load.force, at
     motions = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
     reached = motions[0][:, motions[1] > 1e-9 * motions[1][0]]
-    across = np.linalg.svd(np.column_stack([u, reached]), full_matrices=False)[0]
-    across = across - np.outer(u, u @ across)
-    across = np.linalg.svd(across, full_matrices=False)[0][:, : reached.shape[1] - 1]
+    across = reached @ np.linalg.svd((u @ reached)[None])[2][1:].T  # the ways along the surface
     size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
 
     def off(there: Posture) -> Floats:
