@@ -204,9 +204,22 @@ class Balance:
             rows[3:] *= size
         return rows
 
+    def _push_of_torques(self) -> Floats:
+        """(n,)  the hand's push along the rendered direction, or about its axis, by generalised forces on the
+        joints."""
+        wrench = self.to_wrench[:3] if np.any(self.screw[:3]) else self.to_wrench[3:]
+        return np.asarray(-(self.along @ wrench) / float(self.along @ self.along))
+
     def solve(self) -> Equilibrium:
         """The deflections of the flexible drives and the wall's force; where the whole load at once leads
-        nowhere, it is brought on in steps."""
+        nowhere, it is brought on in steps. Raises LoadError, too, for a push that the hand cannot give."""
+        if self.normal is not None and not np.any(self._push_of_torques()):
+            linear = bool(np.any(self.screw[:3]))
+            raise LoadError(
+                f"the hand holds the handle by its {'orientation' if linear else 'position'}, which the drives "
+                f"control, and cannot push {'along a direction' if linear else 'about an axis'}; leave the load "
+                f"out, or render {'an axis' if linear else 'a direction'}"
+            )
         start = np.zeros(len(self.ratio)), 0.0
         found = self._newton(1.0, *start)
         for step in range(1, RAMP + 1) if found is None else ():
@@ -290,10 +303,7 @@ class Balance:
         jacobian[:, :] = (tangent - by_ahead)[F]
         if self.normal is None:
             return off, jacobian
-        along = np.zeros(6)
-        along[:3] = self.along if np.any(self.screw[:3]) else 0.0
-        along[3:] = 0.0 if np.any(self.screw[:3]) else self.along
-        row = -(along @ self.to_wrench) / float(self.along @ self.along)
+        row = self._push_of_torques()
         by_spring = row @ self.motion.T
         s_by_ahead, s_by_force = by_ahead.copy(), unit.copy()
         s_by_ahead[F], s_by_force[F] = tangent[F], 0.0
