@@ -161,6 +161,7 @@ class Balance:
         self.gravity = np.zeros(3) if self.compensation == "counterweight" else load.weight
         self.weight, self.weight_change = self.motions.weight(self.gravity)
         self.free_springs = self._free_springs(mechanism.assemblies[posture.assembly])
+        self.heaviest = self._heaviest()
         self.along = screw[:3] if np.any(screw[:3]) else screw[3:]
         self.normal = load.along(screw)
         self.elastic = self.motions.elastic_stiffness()[self.joints :, self.joints :]
@@ -180,6 +181,13 @@ class Balance:
         self.pull = share * (self.weight[:n] + self.weight_change[:n, n:] @ bending)
         self.motion = self.drives.T[:, :n] + self.drives.Z[:, :n, n:] @ bending
         self.to_wrench = self._wrench_of_torques()
+
+    def _heaviest(self) -> Floats:
+        """Generalised forces (n,) of the whole weight at the mechanism's size, to judge a balance by: where it has
+        no lever arm, its own are rounding."""
+        mech = self.motions.mech
+        weight = float(np.linalg.norm(self.gravity) * np.sum(mech.mass[0]))
+        return np.asarray(weight * mech.size[0] / mech.unit[0, len(mech.joint) - self.joints :])
 
     def _free_springs(self, rest: Floats) -> Floats:
         """Torques (c,) of the free joints' own springs."""
@@ -371,7 +379,7 @@ class Balance:
         """Raise EquilibriumError where the hand cannot balance a coordinate."""
         left, count = found.unbalanced, self.joints
         scale = max(
-            float(np.max(np.abs(self.weight), initial=0.0)),
+            float(np.max(self.heaviest, initial=0.0)),
             float(np.max(np.abs(self.motion.T) @ np.abs(found.torques), initial=0.0)),
             float(np.max(np.abs(self.free_springs), initial=0.0)),
         )

@@ -162,9 +162,7 @@ def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balanc
 
     def off(there: Posture) -> Floats:
         own = balance(there)
-        scale = max(
-            float(np.max(np.abs(own.weight), initial=0.0)), float(np.max(np.abs(own.free_springs), initial=0.0))
-        )
+        scale = max(float(np.max(own.heaviest[k:])), float(np.max(np.abs(own.free_springs))))
         return np.asarray(own.solve().unbalanced[k:] / (scale or 1.0))
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
