@@ -63,6 +63,8 @@ def loaded_postures(
             continue
         for name in ("position", "angles", "mass_matrix", "jacobian", "angular_jacobian"):
             getattr(changed, name)[index] = getattr(one, name)
+        if changed.rotation is not None and one.rotation is not None:
+            changed.rotation[index] = one.rotation
     return changed
 
 
