@@ -7,8 +7,8 @@ readings belong to the states: the encoder's y, and the force f that a sensor at
 
 where a motion's acceleration is in it. Motions are left out that the force does not move, or that show in neither.
 
-Under load the computer adds forces of its own that it reads off the states (`model.plant.SampledForce`). All
-motions are kept then.
+Under load the computer may add forces of its own that it reads off the states (`model.plant.SampledForce`). All
+motions are kept then, those that the wall does not move among them.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def plant_states(
     force_filter        of the computer, for what it adds under load
     Returns     no states where the force moves nothing that shows in a reading
     """
-    if plant.is_loaded:
+    if plant.is_loaded or plant.without_load is not None:
         return _loaded_states(plant, period, force_rows, force_filter)
     modes = real_modes(plant)
     # each free motion with damping has a pole at z = 1, for the place where it comes to rest: two share this pole

@@ -126,7 +126,8 @@ class _Balanced:
     def of(cls, form: SampledForm) -> _Balanced:
         from scipy.linalg import matrix_balance
 
-        E, (scale, _) = matrix_balance(form.growth, permute=False, separate=True)
+        with np.errstate(invalid="ignore"):  # scales beyond 2^63 are no permutation, for which it takes them, too
+            E, (scale, _) = matrix_balance(form.growth, permute=False, separate=True)
         g, c = form.new / scale, form.output * scale
         return cls(E, g, c)
 

@@ -69,7 +69,7 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
     # |1 + d|^2 - 1 without cancellation
     excess = 2.0 * d.real + np.abs(d) ** 2
     order = np.argsort(-excess)[: 2 * plant.size]
-    rates = 0.5 * np.log1p(np.maximum(excess[order], -1.0 + 1e-300)) / controller.sampling_period
+    rates = 0.5 * np.log1p(np.maximum(excess[order], np.nextafter(-1.0, 0.0))) / controller.sampling_period
     rates[np.abs(excess[order]) < NEUTRAL] = 0.0
     frequencies = np.abs(np.angle(1.0 + d[order])) / (2.0 * pi * controller.sampling_period)
     vibrates = np.abs(d[order].imag) > 0.0

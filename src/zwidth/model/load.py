@@ -112,7 +112,7 @@ class Load:
             if vector is not None:
                 parts.append(f"{what} {vector_text(vector)} {unit}")
         if self.push is not None:
-            parts.insert(0, f"a push of {self.push:g} N along the direction")
+            parts.insert(0, along_text(self.push))
         return ", ".join(parts) or "no force"
 
     def along(self, screw: Floats) -> float | None:
@@ -145,11 +145,16 @@ class Load:
         """The same load with a push as strong as the hand's force, along whatever direction is rendered."""
         if self.force is None:
             return self
-        return replace(self, force=None, push=float(np.linalg.norm(self.force)))
+        return replace(self, force=None, push=float(np.linalg.norm(self.force)), settle=False)
 
     def with_gravity(self, gravity: ArrayLike) -> Load:
         """The same load under another gravity."""
         return replace(self, gravity=np.asarray(gravity, dtype=np.float64))
+
+
+def along_text(push: float) -> str:
+    """A push along whatever direction is rendered, in words."""
+    return f"a push of {push:g} N along the direction"
 
 
 def vector_text(values: Floats) -> str:
