@@ -13,10 +13,14 @@ import zwidth
 from zwidth.device.new_device import new_device
 from zwidth.measures.definition import MISSING, OK, OUT_OF_REACH, STATUS
 from zwidth.model.load import Load
+from zwidth.show import load_text
 from zwidth.show.figures.load_path import COLOURS, draw_close_up, load_path_figure
 from zwidth.show.figures.map import MARKS
 from zwidth.show.figures.study import SYMBOLS
-from zwidth.show.load_text import balance_text, path_sentences, pushes_text
+from zwidth.show.load_text import balance_text, pushes_text
+from zwidth.show.report import load as section
+from zwidth.show.report.facts import gather
+from zwidth.show.units import typed
 from zwidth.study.load_path import LoadPath, PushedChart
 
 WEAK = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
@@ -46,6 +50,11 @@ def changed(path, **columns):
     return replace(path, steps=tuple(steps))
 
 
+def path_sentences(path):
+    """The sentences, with blanks and signs that can be typed."""
+    return [typed(sentence) for sentence in load_text.path_sentences(path)]
+
+
 def said(path, begin):
     (sentence,) = [sentence for sentence in path_sentences(path) if sentence.startswith(begin)]
     return sentence
@@ -70,8 +79,8 @@ def test_a_stiffness_that_does_not_change_is_told_once():
 def test_a_chart_without_a_push_may_be_missing(path):
     none = PushedChart(0.0, "no wall with K > 0 and B >= 0 is stable")
     steps = (*path.steps[:2], none, *path.steps[3:])
-    assert said(LoadPath(steps, None), "The largest").endswith("; without a push no wall is stable.")
-    alone = LoadPath((none, path.steps[1], none), None)
+    assert said(LoadPath(steps), "The largest").endswith("; without a push no wall is stable.")
+    alone = LoadPath((none, path.steps[1], none))
     assert "A wall is stable under -2 N alone, up to 7.850 kN/m." in path_sentences(alone)
 
 
@@ -81,7 +90,7 @@ def test_what_is_neglected_is_told_with_where_it_is_worth_most(path):
     assert said(path, "Neglecting").endswith(f"% at most, under {worst:g} N.")
     same = changed(path, hand_neglected=path.stiffness_max.tolist())
     assert "makes no difference" in said(same, "Whether the change of the hand's force is neglected")
-    own = replace(path, load=Load(gravity=(0.0, -9.81), hand="neglected"))
+    own = replace(path, hand="neglected")
     assert not [one for one in path_sentences(own) if "eglect" in one]
 
 
@@ -123,7 +132,8 @@ def test_pushes_without_an_answer_are_told_with_the_reason_of_the_weakest(device
 
 def test_neighbouring_pushes_are_named_together():
     pushes = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    assert pushes_text(pushes, np.array([True, True, False, True, False])) == "-2 N to -1 N and 1 N"
+    named = typed(pushes_text(pushes, np.array([True, True, False, True, False])))
+    assert named == "-2 N to -1 N and 1 N"
 
 
 def test_the_balance_names_a_force_across_only_where_there_is_one(device):
@@ -202,3 +212,61 @@ def test_every_status_of_a_map_or_a_study_has_its_mark():
     assert set(MARKS) == kinds - {OUT_OF_REACH}
     assert len(set(SYMBOLS.values())) == len(SYMBOLS)
     assert len({hatch for _, hatch in MARKS.values()}) == len(MARKS)
+
+
+# --- the report's section ---------------------------------------------------------------------------
+
+GRAVITY = {"load.gravity_m_per_s2": [0.0, -9.81]}
+BENT = {f"drives.motor-{side}.backward_stiffness_Nm_per_rad": 0.3 for side in ("right", "left")}
+
+
+def facts(name, settings):
+    return gather(zwidth.load(name, settings))
+
+
+def told(of):
+    return typed(" ".join(section.sentences(of)))
+
+
+def test_the_section_says_who_carries_what_and_what_it_changes():
+    text = told(facts("five-bar", {"load.push_N": -5.0}))
+    assert "in balance under a push of -5 N along the direction: the hand gives (-0.002916, -5) N" in text
+    assert (
+        "the wall 5.005 N along the direction, and the motors motor-right 0.02440 Nm, motor-left -0.02444 Nm"
+        in text
+    )
+    assert "Of the hand's force (-0.002916, 0) N is across the direction" in text
+    assert "changes the largest stiffness by +0.02079 %, from 7.849 kN/m without it" in text
+    assert "below F/K, which at the largest stiffness is 637.5 µm" in text
+    assert "a motion stands apart from the chart: it grows by 0.2759 1/s and doubles in 2.512 s" in text
+
+
+def test_gravity_alone_has_no_one_sided_wall():
+    text = told(facts("five-bar", GRAVITY))
+    assert "under gravity (0, -9.81, 0) m/s²: the hand gives" in text
+    assert "the wall 0 N" in text
+    assert "F/K" not in text
+
+
+def test_several_motions_are_told_each():
+    text = told(facts("stamper-delta", {"load.push_N": -5.0, "load.gravity_m_per_s2": [0.0, 0.0, -9.81]}))
+    assert "2 motions stand apart from the chart: one vibrates at 611.1 mHz, decays by" in text
+    assert "across the direction" not in text
+
+
+def test_springs_with_two_stiffnesses_have_both():
+    text = told(facts("five-bar", {**BENT, **GRAVITY}))
+    assert ("The stiffness of motor-" in text) == bool(
+        zwidth.load("five-bar", {**BENT, **GRAVITY}).at().other_branch
+    )
+
+
+def test_a_load_that_leaves_no_wall_has_no_number():
+    of = facts("five-bar", {"load.push_N": -5.0, "loop.delay_samples": 3.0, "mechanism.damping.mode_ratio": 0.0})
+    assert "has no number: no wall with K > 0 and B >= 0 is stable without load." in told(of)
+
+
+def test_nothing_is_said_without_a_load():
+    of = facts("five-bar", {})
+    assert section.sentences(of) == section.path(of) == []
+    assert of.load_path is None

@@ -141,6 +141,7 @@ def test_the_load_of_the_point_comes_before_that_of_the_device(device):
     path = load_path(device, 2.0, 3, point)
     assert path.steps[0].equilibrium.load.hand == "neglected"
     assert path.steps[0].hand_neglected == path.steps[0].stiffness_max
+    assert path.hand == "neglected"
 
 
 def test_a_load_that_settles_has_the_push_as_the_whole_force():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.show.units import amount, as_written, number, percent, signed, typed, vector
+from zwidth.show.units import SPACE, amount, as_written, number, percent, quantity, signed, vector
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
@@ -64,7 +64,7 @@ def drive_rows(point: OperatingPoint) -> Iterator[Row]:
 
 
 def path_sentences(path: LoadPath) -> list[str]:
-    """What the charts under all pushes say, in words that terminals can show."""
+    """What the charts under all pushes say."""
     said = [_stiffness(path), _neglected(path), _fixed_surface(path), _sideways(path), *_unanswered(path)]
     return [sentence for sentence in said if sentence]
 
@@ -76,14 +76,14 @@ def _stiffness(path: LoadPath) -> str:
         return ""
     low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
     if have.sum() == 1:
-        return f"A wall is stable under {push_text(pushes[high])} alone, up to {amount(values[high], 'N/m')}."
+        return f"A wall is stable under {push_text(pushes[high])} alone, up to {quantity(values[high], 'N/m')}."
     if values[high] - values[low] <= UNCHANGED * values[high]:
-        return f"The largest stiffness is {amount(values[high], 'N/m')} under every push{_that_has_one(have)}."
-    ends = " to ".join(f"{amount(values[k], 'N/m')} under {push_text(pushes[k])}" for k in (low, high))
+        return f"The largest stiffness is {quantity(values[high], 'N/m')} under every push{_that_has_one(have)}."
+    ends = " to ".join(f"{quantity(values[k], 'N/m')} under {push_text(pushes[k])}" for k in (low, high))
     if np.isnan(free):
         return f"The largest stiffness goes from {ends}; without a push no wall is stable."
-    changes = " to ".join(typed(f"{signed(100.0 * (values[k] - free) / free)} %") for k in (low, high))
-    return f"The largest stiffness goes from {ends}: {changes} of the {amount(free, 'N/m')} without a push."
+    changes = " to ".join(f"{signed(100.0 * (values[k] - free) / free)}{SPACE}%" for k in (low, high))
+    return f"The largest stiffness goes from {ends}: {changes} of the {quantity(free, 'N/m')} without a push."
 
 
 def _that_has_one(have: NDArray[np.bool_]) -> str:
@@ -101,7 +101,7 @@ def _sideways(path: LoadPath) -> str:
     fastest = int(np.argmax(np.where(growing, rates, 0.0)))
     motion = path.steps[fastest].sideways
     assert motion is not None
-    shape = f", as a vibration of {amount(motion.frequency, 'Hz')}" if motion.frequency else ""
+    shape = f", as a vibration of {quantity(motion.frequency, 'Hz')}" if motion.frequency else ""
     doubles = f"{push_text(pushes[fastest])}, where it doubles in {seconds(motion.time_to_double)}{shape}"
     where = pushes_text(pushes, growing)
     return f"Along the surface, where no wall acts, a motion grows under {where}: fastest under {doubles}."
@@ -109,11 +109,11 @@ def _sideways(path: LoadPath) -> str:
 
 def _neglected(path: LoadPath) -> str:
     off = _largest_difference(path, path.hand_neglected)
-    if off is None or (path.load is not None and path.load.hand == "neglected"):
+    if off is None or path.hand == "neglected":
         return ""
     if off[0] < ROUNDING:
         return "Whether the change of the hand's force is neglected makes no difference to these stiffnesses."
-    share, push = typed(percent(off[0])), push_text(off[1])
+    share, push = percent(off[0]), push_text(off[1])
     return f"Neglecting the change of the hand's force changes it by {share} at most, under {push}."
 
 
@@ -126,7 +126,7 @@ def _fixed_surface(path: LoadPath) -> str:
         return f"{sinks} there is no answer: {'; '.join(reasons)}." if reasons else ""
     if off[0] < ROUNDING:
         return f"{sinks} the largest stiffness is the same."
-    share, push = typed(percent(off[0])), push_text(off[1])
+    share, push = percent(off[0]), push_text(off[1])
     return f"{sinks} it differs from that with the posture kept by {share} at most, under {push}."
 
 
@@ -154,12 +154,12 @@ def _unanswered(path: LoadPath) -> Iterator[str]:
 
 def seconds(time: float) -> str:
     """A time without a prefix: 8200 s, and no 8.2 ks."""
-    return amount(time, "s") if time < 1e3 else typed(f"{number(time)} s")
+    return quantity(time, "s") if time < 1e3 else f"{number(time)}{SPACE}s"
 
 
 def push_text(push: float) -> str:
     """A push in words."""
-    return typed(as_written(push, "N"))
+    return as_written(push, "N")
 
 
 def pushes_text(pushes: Floats, chosen: NDArray[np.bool_]) -> str:

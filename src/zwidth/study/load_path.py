@@ -31,7 +31,7 @@ from zwidth.measures.load_effect import NONE_STABLE, fastest_sideways_motion
 from zwidth.model.argument_checks import require
 from zwidth.model.effective_parameters import screw
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError
-from zwidth.model.load import Load
+from zwidth.model.load import HandForce, Load
 from zwidth.model.mechanism import Floats
 from zwidth.model.posture import PostureError
 from zwidth.progress import Progress
@@ -108,11 +108,13 @@ class LoadPath(Result):
     """The charts of one posture under pushes from one side to the other.
 
     steps  by ascending push, the middle one without
-    load   what is kept of the load: all but its push; None: nothing
+    load   what acts without a push; None: nothing
+    hand   how the hand's force goes with the handle, as in `Load`
     """
 
     steps: tuple[PushedChart, ...]
-    load: Load | None
+    load: Load | None = None
+    hand: HandForce = "dead"
 
     @property
     def pushes(self) -> Floats:
@@ -233,7 +235,7 @@ def load_path(
         steps.append(pushes.chart(push * k / half))
         if progress is not None:
             progress("pushes", len(steps), count)
-    path = LoadPath(tuple(steps), pushes.kept)
+    path = LoadPath(tuple(steps), pushes.kept, pushes.load.hand)
     middle = path.unpushed.chart
     about = None if middle is None else middle.operating_point
     return path.about(about or pushes.here)

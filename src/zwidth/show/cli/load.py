@@ -127,7 +127,7 @@ class LoadCommand(Command):
             ["push", "wall", "hand across", "sideways growth", "doubles in", "one-sided below F/K"],
             [_balance_row(step) for step in result.steps],
         )
-        yield from path_sentences(result)
+        yield from map(typed, path_sentences(result))
 
     def draw(self, case: CommandLine, result: LoadPath) -> Figure:
         from zwidth.show.figures.load_path import load_path_figure
@@ -153,10 +153,10 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
     """free: the largest stiffness without a push."""
     chart = step.chart
     if chart is None or not chart.frequencies_at_stiffness_max:
-        return [push_text(step.push), "none", *[""] * 5]
+        return [typed(push_text(step.push)), "none", *[""] * 5]
     change = 100.0 * (chart.stiffness_max - free) / free
     return [
-        push_text(step.push),
+        typed(push_text(step.push)),
         amount(chart.stiffness_max, "N/m"),
         typed(f"{signed(change)} %") if step.push and change == change else "",
         amount(chart.damping_at_stiffness_max, "Ns/m"),
@@ -168,13 +168,13 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
 
 def _balance_row(step: PushedChart) -> list[str]:
     if step.wall_force != step.wall_force:
-        return [push_text(step.push), *[""] * 5]
+        return [typed(push_text(step.push)), *[""] * 5]
     motion = step.sideways
     return [
-        push_text(step.push),
+        typed(push_text(step.push)),
         amount(step.wall_force, "N"),
         vector(step.sideways_force, spoken_unit("N")),
         "none" if motion is None else amount(motion.growth_rate, "1/s"),
-        "" if motion is None or motion.growth_rate <= 0.0 else seconds(motion.time_to_double),
+        "" if motion is None or motion.growth_rate <= 0.0 else typed(seconds(motion.time_to_double)),
         amount(step.one_sided_amplitude, "m") if step.push else "",
     ]

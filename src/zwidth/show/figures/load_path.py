@@ -163,7 +163,7 @@ def draw_stiffness(ax: Axes, path: LoadPath) -> None:
     title = "Largest stiffness"
     if relative:
         ax.set_ylabel("Change of stiffness [%]")
-        title += f", from {quantity(free, 'N/m')} without a push"
+        title += f",\nfrom {quantity(free, 'N/m')} without a push"
     else:
         label(ax.yaxis, title, "N/m")
     _over_push(ax, path, path.stiffness_max)
