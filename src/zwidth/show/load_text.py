@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.show.units import SPACE, amount, as_written, number, percent, quantity, signed, vector
+from zwidth.show.units import SPACE, amount, as_written, percent, quantity, seconds, signed, vector
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
@@ -76,10 +76,12 @@ def _stiffness(path: LoadPath) -> str:
         return ""
     low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
     if have.sum() == 1:
-        return f"A wall is stable under {push_text(pushes[high])} alone, up to {quantity(values[high], 'N/m')}."
+        return (
+            f"A wall is stable under {as_written(pushes[high], 'N')} alone, up to {quantity(values[high], 'N/m')}."
+        )
     if values[high] - values[low] <= UNCHANGED * values[high]:
         return f"The largest stiffness is {quantity(values[high], 'N/m')} under every push{_that_has_one(have)}."
-    ends = " to ".join(f"{quantity(values[k], 'N/m')} under {push_text(pushes[k])}" for k in (low, high))
+    ends = " to ".join(f"{quantity(values[k], 'N/m')} under {as_written(pushes[k], 'N')}" for k in (low, high))
     if np.isnan(free):
         return f"The largest stiffness goes from {ends}; without a push no wall is stable."
     changes = " to ".join(f"{signed(100.0 * (values[k] - free) / free)}{SPACE}%" for k in (low, high))
@@ -102,7 +104,7 @@ def _sideways(path: LoadPath) -> str:
     motion = path.steps[fastest].sideways
     assert motion is not None
     shape = f", as a vibration of {quantity(motion.frequency, 'Hz')}" if motion.frequency else ""
-    doubles = f"{push_text(pushes[fastest])}, where it doubles in {seconds(motion.time_to_double)}{shape}"
+    doubles = f"{as_written(pushes[fastest], 'N')}, where it doubles in {seconds(motion.time_to_double)}{shape}"
     where = pushes_text(pushes, growing)
     return f"Along the surface, where no wall acts, a motion grows under {where}: fastest under {doubles}."
 
@@ -113,7 +115,7 @@ def _neglected(path: LoadPath) -> str:
         return ""
     if off[0] < ROUNDING:
         return "Whether the change of the hand's force is neglected makes no difference to these stiffnesses."
-    share, push = percent(off[0]), push_text(off[1])
+    share, push = percent(off[0]), as_written(off[1], "N")
     return f"Neglecting the change of the hand's force changes it by {share} at most, under {push}."
 
 
@@ -126,7 +128,7 @@ def _fixed_surface(path: LoadPath) -> str:
         return f"{sinks} there is no answer: {'; '.join(reasons)}." if reasons else ""
     if off[0] < ROUNDING:
         return f"{sinks} the largest stiffness is the same."
-    share, push = percent(off[0]), push_text(off[1])
+    share, push = percent(off[0]), as_written(off[1], "N")
     return f"{sinks} it differs from that with the posture kept by {share} at most, under {push}."
 
 
@@ -152,18 +154,10 @@ def _unanswered(path: LoadPath) -> Iterator[str]:
         yield f"Without an answer, {pushes_text(path.pushes, here)}: {weakest.status.rstrip('.')}."
 
 
-def seconds(time: float) -> str:
-    """A time without a prefix: 8200 s, and no 8.2 ks."""
-    return quantity(time, "s") if time < 1e3 else f"{number(time)}{SPACE}s"
-
-
-def push_text(push: float) -> str:
-    """A push in words."""
-    return as_written(push, "N")
-
-
 def pushes_text(pushes: Floats, chosen: NDArray[np.bool_]) -> str:
     """Some of the pushes in words: each stretch of neighbours from its first to its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
     stretches = [(float(pushes[a]), float(pushes[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return " and ".join(push_text(a) if a == b else f"{push_text(a)} to {push_text(b)}" for a, b in stretches)
+    return " and ".join(
+        as_written(a, "N") if a == b else f"{as_written(a, 'N')} to {as_written(b, 'N')}" for a, b in stretches
+    )

@@ -178,14 +178,17 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
 
 def _varied(operator: Operator, random: np.random.Generator, spread: float) -> Operator:
     """The operator with each number times its own log-normal factor exp(spread n)."""
-    factors = np.exp(spread * random.standard_normal(len(fields(operator)))).tolist()
-    preset = {field.name: getattr(operator, field.name) for field in fields(operator)}
-    varied = {
-        name: value * factor
-        for (name, value), factor in zip(preset.items(), factors, strict=True)
-        if value is not None
-    }
-    return replace(operator, **varied)
+    names = [field.name for field in fields(operator) if field.name != "directions"]
+    numbers = {name: getattr(operator, name) for name in names}
+    factors = np.exp(spread * random.standard_normal(len(numbers))).tolist()
+    return replace(
+        operator,
+        **{
+            name: value * factor
+            for (name, value), factor in zip(numbers.items(), factors, strict=True)
+            if value is not None
+        },
+    )
 
 
 def _stability_trial(

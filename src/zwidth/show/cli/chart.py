@@ -12,7 +12,6 @@ from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Numbers
-from zwidth.show.load_text import balance_rows
 from zwidth.show.units import amount, percent, radius, typed
 
 if TYPE_CHECKING:
@@ -137,6 +136,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
 def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
     """Rows on the equilibrium of a device under load."""
     from zwidth.chart.chart import StabilityChart
+    from zwidth.show.load_text import balance_rows
 
     point = chart.operating_point
     if point is None or point.load is None or not isinstance(chart, StabilityChart):

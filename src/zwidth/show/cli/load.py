@@ -12,9 +12,8 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Finite
-from zwidth.show.load_text import path_sentences, push_text, seconds
 from zwidth.show.moment_units import spoken_unit
-from zwidth.show.units import amount, signed, typed, vector
+from zwidth.show.units import amount, as_written, seconds, signed, typed, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,6 +116,8 @@ class LoadCommand(Command):
         return super().caption_facts(case, document) | {"varied": ["the hand's push"]}
 
     def pages(self, case: CommandLine, result: LoadPath, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.show.load_text import path_sentences
+
         free = result.unpushed.stiffness_max
         charted = ["largest stiffness", "change", "at damping", "oscillates at"]
         yield table(
@@ -153,10 +154,10 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
     """free: the largest stiffness without a push."""
     chart = step.chart
     if chart is None or not chart.frequencies_at_stiffness_max:
-        return [typed(push_text(step.push)), "none", *[""] * 5]
+        return [typed(as_written(step.push, "N")), "none", *[""] * 5]
     change = 100.0 * (chart.stiffness_max - free) / free
     return [
-        typed(push_text(step.push)),
+        typed(as_written(step.push, "N")),
         amount(chart.stiffness_max, "N/m"),
         typed(f"{signed(change)} %") if step.push and change == change else "",
         amount(chart.damping_at_stiffness_max, "Ns/m"),
@@ -168,10 +169,10 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
 
 def _balance_row(step: PushedChart) -> list[str]:
     if step.wall_force != step.wall_force:
-        return [typed(push_text(step.push)), *[""] * 5]
+        return [typed(as_written(step.push, "N")), *[""] * 5]
     motion = step.sideways
     return [
-        typed(push_text(step.push)),
+        typed(as_written(step.push, "N")),
         amount(step.wall_force, "N"),
         vector(step.sideways_force, spoken_unit("N")),
         "none" if motion is None else amount(motion.growth_rate, "1/s"),

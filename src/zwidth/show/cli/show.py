@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.load_text import balance_rows, drive_rows
 from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import DATA, json_value
 from zwidth.show.units import amount, percent, typed
@@ -70,6 +69,8 @@ class ShowCommand(Command):
         if result.effective is not None:
             yield two_columns(_felt(values))
         if case.device.load is not None:
+            from zwidth.show.load_text import balance_rows, drive_rows
+
             yield two_columns([*balance_rows(case.point), *drive_rows(case.point)])
         if case.device.mechanism is not None:
             with speaking_of_moments(False):  # the mechanism's own lengths are none of the rendered axis

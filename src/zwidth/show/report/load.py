@@ -8,9 +8,9 @@ from zwidth.loop.sideways import SidewaysMotion
 from zwidth.measures.load_effect import NoWallError, load_change
 from zwidth.model.load import Load
 from zwidth.show.circumstances import load_text
-from zwidth.show.load_text import ROUNDING, has_sideways_force, path_sentences, seconds
+from zwidth.show.load_text import ROUNDING, has_sideways_force, path_sentences
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, SPACE, number, point, quantity, signed
+from zwidth.show.units import MINUS, SPACE, number, point, quantity, seconds, signed
 
 
 def sentences(facts: Facts) -> list[str]:
