@@ -18,9 +18,9 @@ has the stiffness of another mechanism.
 
 Flexible links (`flexible_link`) have elastic coordinates among the joint coordinates; theirs are the last. They
 hang on closures, too: with N the elastic motions that leave drives and closures alone, u' = B (p', xi'), B =
-[B_rigid, N]. Of all bases N the natural modes are taken that the links have while the drives stand still, of a mass
-of 1 each, the slowest first. Other bases tell the same, but where light parts of links move and heavy ones do not,
-as most of a loop's fast motions do, their mass matrix is singular to rounding.
+[B_rigid, N]. Of all bases N the natural modes are taken that the links have while the drives stand still, of a
+mass of 1 each, the slowest first. Other bases tell the same, but their mass matrix is singular to rounding where
+light parts of links move and heavy ones do not, as they do in most fast motions of a loop.
 
 The three rates of a ball joint are one angular velocity, and no rates of coordinates; about a posture they are
 those of the turn from there, whose vector has no second-order terms of its own.
@@ -131,15 +131,16 @@ class Motions:
         the base."""
         return self._at(self._links, link, local).in_coordinates(self.rates, self.rates_2)
 
-    def _at(self, links: Mapping[int, Motion], link: int, local: Floats) -> Motion:
-        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to its nearest station."""
+    def _at(self, links: Mapping[int, Motion], link: int, local: Floats, fixed_at: Floats | None = None) -> Motion:
+        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to the station next to it, or
+        to another place, as what slides in a guide is to the guide's."""
         if link < 0:
             return links[-1].at(local)
         R, own = self.rotation[link], links[link]
         if link not in self.flexible:
             return own.at(R @ local)
         beam, columns = self.flexible[link], self._columns(link)
-        k = beam.station_of(local)
+        k = beam.station_of(local if fixed_at is None else fixed_at)
         straight = own.at(R[:, 0] * beam.body.stations[k])
         bent, turned = (np.zeros_like(own.speed) for _ in range(2))
         bent[:, columns], turned[:, columns] = R @ beam.body.displacement[k], R @ beam.body.rotation[k]
@@ -261,15 +262,16 @@ class Motions:
         still = Motion(
             np.zeros(3), *(np.zeros((3, m)) for _ in range(2)), *(np.zeros((3, m, m)) for _ in range(2))
         )
-        links = {-1: still}
+        links, carried = {-1: still}, list[Floats]()
         for i in range(mech.parent.size):
             p, u, z = int(mech.parent[i]), int(mech.column[i]), self._axis[i]
-            carrier = links[int(mech.carrier[i])]
-            moved = self._at(links, p, self._local(p, self._origin[i]))
+            moved = self._at(links, p, self._local(p, self._origin[i]), mech.origin[0, i])
+            # spin of what carries the joint: of a flexible parent its station there, of a ball joint its base
+            carried.append(moved.spin if mech.carrier[i] == p else carried[-1])
             own = np.zeros(m)
             if u >= 0:
                 own[u] = 1.0
-            along, turned = np.outer(z, own), _cross_forms(carrier.spin, np.outer(z, own))
+            along, turned = np.outer(z, own), _cross_forms(carried[i], np.outer(z, own))
             if mech.kind[i] == PRISMATIC:
                 links[i] = Motion(
                     moved.position, moved.speed + along, moved.spin, moved.speed_2 + 2.0 * turned, moved.spin_2
