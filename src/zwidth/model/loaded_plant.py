@@ -27,7 +27,7 @@ from zwidth.model.damping import Damping
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.equilibrium import Equilibrium, command_change
 from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.modes import REPEATED, clusters, undamped_modes
+from zwidth.model.modes import clusters, repeat_tolerance, undamped_modes
 from zwidth.model.plant import Plant, SampledForce
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, reduce_mechanism
@@ -163,30 +163,20 @@ def moved_motions(plant: Plant) -> tuple[Floats, Floats]:
     drag = V.T @ plant.damping @ V
     for damper in plant.lagged_dampers:
         drag = drag + damper.damping * np.outer(V.T @ damper.along, V.T @ damper.along)
-    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
-    groups = [np.arange(len(squared))[run] for run in clusters(squared, REPEATED * scale)]
+    groups = [np.arange(len(squared))[run] for run in clusters(squared, repeat_tolerance(squared))]
     drag = drag / max(float(np.max(np.abs(drag))), np.finfo(float).tiny)
-    basis = np.zeros((plant.size, 0))
-    fresh = (V.T @ plant.actuator)[:, None]
-    fresh = fresh / np.linalg.norm(fresh)
-    while fresh.shape[1]:
-        parts = np.zeros((plant.size, 0))
+    pushed = (V.T @ plant.actuator)[:, None]
+    pushed = pushed / np.linalg.norm(pushed)
+    moved = np.zeros((plant.size, 0))
+    while True:
+        reached, found = np.hstack([pushed, drag @ moved]), [np.zeros((plant.size, 0))]
         for group in groups:
-            part = np.zeros_like(fresh)
-            part[group] = fresh[group]
-            parts = np.hstack([parts, part])
-        fresh = _new_directions(basis, parts)
-        basis = np.hstack([basis, fresh])
-        fresh = _new_directions(basis, drag @ fresh)
-    left = np.linalg.svd(basis)[0]
-    return np.asarray(V @ basis), np.asarray(V @ left[:, basis.shape[1] :])
-
-
-def _new_directions(basis: Floats, vectors: Floats) -> Floats:
-    """Orthonormal directions that vectors (n, k) have beyond a basis, where these are more than rounding."""
-    if not vectors.shape[1]:
-        return vectors
-    for _ in range(2):  # the second time takes what rounding has left
-        vectors = vectors - basis @ (basis.T @ vectors)
-    left, size, _ = np.linalg.svd(vectors, full_matrices=False)
-    return np.asarray(left[:, size > MOVED])
+            left, size, _ = np.linalg.svd(reached[group])
+            own = left[:, : np.count_nonzero(size > MOVED)]
+            found.append(np.zeros((plant.size, own.shape[1])))
+            found[-1][group] = own
+        count, moved = moved.shape[1], np.hstack(found)
+        if moved.shape[1] == count:
+            break
+    left = np.linalg.svd(moved)[0]
+    return np.asarray(V @ moved), np.asarray(V @ left[:, moved.shape[1] :])
