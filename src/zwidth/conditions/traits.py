@@ -10,7 +10,7 @@ import numpy as np
 
 from zwidth.loop.controller import FirstOrder
 from zwidth.loop.loop import Loop
-from zwidth.model.modes import REPEATED, clusters, undamped_modes
+from zwidth.model.modes import clusters, repeat_tolerance, undamped_modes
 from zwidth.model.plant import Floats, LaggedDamper, Plant
 from zwidth.model.reduction import plant_effective_parameters
 
@@ -120,9 +120,9 @@ def _moved_modes(squared: Floats, push: Floats, read: Floats) -> list[slice]:
     squared     (n,)  squared natural frequencies [rad^2/s^2]
     push, read  (n,)  modal parts of the actuator's force and of the reading
     """
-    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
     whole = float(np.linalg.norm(push) * np.linalg.norm(read))
-    return [run for run in clusters(squared, REPEATED * scale) if abs(push[run] @ read[run]) > UNSEEN * whole]
+    runs = clusters(squared, repeat_tolerance(squared))
+    return [run for run in runs if abs(push[run] @ read[run]) > UNSEEN * whole]
 
 
 def _is_uncoupled(plant: Plant, shapes: Floats, run: slice, push: Floats) -> bool:

@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.motion_names import motion_name, pole_name
-from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, undamped_modes
+from zwidth.model.modes import (
+    REPEATED,
+    UNOBSERVED,
+    UNOBSERVED_UNDAMPED,
+    clusters,
+    repeat_tolerance,
+    undamped_modes,
+)
 from zwidth.model.multi_plant import MultiPlant
 
 Floats = NDArray[np.float64]
@@ -64,9 +71,8 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
     fraction  f, fractional part of the delay [samples]
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
-    runs = np.split(np.arange(len(squared)), np.flatnonzero(np.diff(squared) > REPEATED * scale) + 1)
-    for run in runs:  # equal frequencies: onto the axes of their own damping
+    tolerance = repeat_tolerance(squared)
+    for run in clusters(squared, tolerance):  # equal frequencies: onto the axes of their own damping
         local = shapes[:, run].T @ plant.damping @ shapes[:, run]
         shapes[:, run] = shapes[:, run] @ np.linalg.eigh((local + local.T) / 2.0)[1]
     damping = shapes.T @ plant.damping @ shapes
@@ -79,10 +85,9 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
 
     count, block_of = connected_components(coupled, directed=False)
     alone = np.array([int(np.sum(block_of == number)) == 1 for number in block_of], dtype=bool)
-    tolerances = [float(REPEATED * scale), float(REPEATED * level)]
     parts = [
         _equal_poles(squared[k], damping[k, k], inputs[group], outputs[:, group], (period, fraction), total)
-        for group in _groups(squared, np.diag(damping), np.flatnonzero(alone), tolerances)
+        for group in _groups(squared, np.diag(damping), np.flatnonzero(alone), tolerance, REPEATED * level)
         for k in group[:1]
     ]
     for c in range(count):
@@ -101,13 +106,15 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
     )
 
 
-def _groups(squared: Floats, drag: Floats, members: NDArray[np.int64], tolerances: list[float]) -> list[list[int]]:
-    """Modes in groups of equal frequency squared and damping, within tolerances [1/s^2] and [1/s]."""
+def _groups(
+    squared: Floats, drag: Floats, members: NDArray[np.int64], tolerance: Floats, drag_tolerance: float
+) -> list[list[int]]:
+    """Modes in groups of equal frequency squared and damping, within tolerances (n,) [1/s^2] and [1/s]."""
     groups: list[list[int]] = []
     for k in members.tolist():
         for group in groups:
             g = group[0]
-            if abs(squared[k] - squared[g]) <= tolerances[0] and abs(drag[k] - drag[g]) <= tolerances[1]:
+            if abs(squared[k] - squared[g]) <= tolerance[k] and abs(drag[k] - drag[g]) <= drag_tolerance:
                 group.append(k)
                 break
         else:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,14 +14,16 @@ from zwidth.model.plant_modes import fill_modes
 
 Floats = NDArray[np.float64]
 
+MOST: Final = 12  # coordinates of which the kernel finds the modes; of more they are found faster otherwise
+
 
 def plant_rows(plant: Plant, controller: Controller) -> Floats | None:
     """The rows (m, 9) of a plant, as of `loop.sections`.
 
     Returns  None for a plant that `sections` says more about: dampers that couple its modes or lag, a loss factor,
-             a wall force that moves nothing that the sensor reads
+             a wall force that moves nothing that the sensor reads; and for a large one
     """
-    if plant.lagged_dampers or plant.hysteresis is not None:
+    if plant.lagged_dampers or plant.hysteresis is not None or plant.size > MOST:
         return None
     n = plant.size
     numbers, drag, coupled = np.empty((5, 1, n)), np.empty((1, n, n)), np.zeros(1, dtype=np.bool_)

@@ -7,13 +7,13 @@ readings belong to the states: the encoder's y, and the force f that a sensor at
 
 where a motion's acceleration is in it. Motions are left out that the force does not move, or that show in neither.
 
-Under load the computer may add forces of its own that it reads off the states (`model.plant.SampledForce`). All
-motions are kept then, those that the wall does not move among them.
+Under load the computer may add forces of its own that it reads off the states (`model.plant.SampledForce`). Slow
+motions are all kept then, those that the wall does not move among them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,9 @@ from zwidth.loop.sections import equal_modes
 from zwidth.model.first_order_form import (
     SECOND_UNREAD,
     FirstOrderForm,
+    fast_and_unseen,
     first_order_form,
+    invariant_subspace,
     without_hidden_poles,
 )
 from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes, undamped_modes
@@ -36,6 +38,7 @@ from zwidth.model.plant import Plant
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+FEW = 12  # coordinates of a plant that is small
 NEUTRAL = 1e-11  # share of what holds a motion, or of what a load adds, that is rounding
 
 
@@ -177,7 +180,8 @@ def _loaded_states(
     plant: Plant, period: float, force_rows: Floats | None, force_filter: LowPass | None
 ) -> PlantStates:
     """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
-    of lagged dampers. What is neutral without load no longer is, and nothing is left out."""
+    of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a large
+    plant, as links that bend have."""
     n, T, lags = plant.size, period, plant.lagged_dampers
     V = np.eye(n)  # a plant on its modes without load keeps what the load adds to the last digit
     if not np.array_equal(plant.mass, V):
@@ -236,7 +240,28 @@ def _loaded_states(
     scale = 1.0 / np.sqrt(np.maximum(np.abs(bare), added))
     neutral = _nullity(scale[:, None] * (K - feedback) * scale)
     still = _nullity(np.vstack([scale[:, None] * part * scale for part in (K, feedback, drag / T)]))
-    return PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
+    states = PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
+    return _without_fast(states, form, T) if n > FEW else states
+
+
+def _without_fast(states: PlantStates, form: FirstOrderForm, period: float) -> PlantStates:
+    """The states of a plant under load without its fast motions that no force shows in any reading."""
+    sampled = states.sampled
+    inputs = np.array([form.input, *(each.input for each in sampled)])
+    seen = [form.output, *(each.reading for each in sampled)]
+    readings = np.array(seen if form.second_output is None else [*seen, form.second_output])
+    kept, unseen = fast_and_unseen(form.dynamics, inputs, readings, period)
+    if not len(unseen):
+        return states
+    split = replace(form, poles=kept, hidden_poles=unseen)
+    right, left = invariant_subspace(split, kept)
+    return replace(
+        states,
+        form=without_hidden_poles(split),
+        hidden=unseen.real,
+        unobserved=tuple(pole_name(pole) for pole in unseen if pole.imag >= 0.0),
+        sampled=tuple(replace(each, input=left.T @ each.input, reading=each.reading @ right) for each in sampled),
+    )
 
 
 def _nullity(matrix: Floats) -> int:

@@ -29,7 +29,7 @@ from zwidth.model.operator import Operator
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
 from zwidth.model.ratio_table import drives_at
-from zwidth.model.reduction import Encoders, Model, plant_effective_parameters, reduce_mechanism
+from zwidth.model.reduction import Encoders, Model, plant_effective_parameters
 from zwidth.model.response import Response
 
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
@@ -262,29 +262,11 @@ class PosedDevice:
         Raises  OperatingPointError  for several directions, and for a measured response
         """
         self.require("dynamics")
-        if self.mechanism is not None and self.mechanism.flexible:
-            return self._effective_of_plants()
         if self.mechanism is not None:
             return effective_parameters(self.mechanism, self._posture, self.direction)
         if self.given_plant is None:
             raise OperatingPointError(NO_MODEL)
         return plant_effective_parameters(self.given_plant)
-
-    def _effective_of_plants(self) -> EffectiveParameters:
-        """The same of a mechanism with links that bend, read off the matrices of each point; nan where it is not
-        OK."""
-        numbers = np.full((4, *self.shape), np.nan)
-        for index in np.ndindex(self.shape):
-            one = self[index] if self.shape else self
-            if one.posture is None or one.mechanism is None or one.posture.status != OK:
-                continue
-            plant = reduce_mechanism(one.mechanism, one.posture, one.direction, "full", one.damping, one.encoders)
-            found = plant_effective_parameters(plant)
-            numbers[(slice(None), *index)] = [
-                float(each)
-                for each in (found.link_side_mass, found.motor_side_mass, found.rigid_mass, found.stiffness)
-            ]
-        return EffectiveParameters(*numbers)
 
     @property
     def handle_rows(self) -> Floats:
@@ -298,7 +280,8 @@ class PosedDevice:
     @property
     def loaded_mechanism(self) -> Mechanism:
         """One design's mechanism as it is linearised under load: the ratios of tables looked up at its posture,
-        and all drives rigid in the rigid model. Raises NoMechanismError as `jacobian`, OperatingPointError."""
+        and all drives and links rigid in the rigid model. Raises NoMechanismError as `jacobian`,
+        OperatingPointError."""
         self._check_single("equilibrium")
         posture = self._posture
         assert self.mechanism is not None
@@ -307,6 +290,7 @@ class PosedDevice:
         )
         if self.model == "rigid":
             drives = replace(drives, stiffness=np.full(len(drives.names), np.inf))
+            return replace(self.mechanism, drives=drives, flexible=())
         return replace(self.mechanism, drives=drives)
 
     @cached_property

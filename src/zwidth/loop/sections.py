@@ -11,7 +11,14 @@ from zwidth.loop.coupled_hold import SampledForm, form_rows, rows_error, sample_
 from zwidth.loop.hold import modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
-from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes
+from zwidth.model.modes import (
+    REPEATED,
+    UNOBSERVED,
+    UNOBSERVED_UNDAMPED,
+    RealModes,
+    real_modes,
+    repeat_tolerance,
+)
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -100,13 +107,13 @@ def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float
 
 def equal_modes(modes: RealModes) -> list[list[int]]:
     """Modes of one frequency and one damping, to rounding."""
-    scale = max(float(np.max(np.abs(modes.frequency_squared))), np.finfo(float).tiny)
+    tolerance = repeat_tolerance(modes.frequency_squared)
     drag = max(float(np.max(np.abs(modes.decay))), np.finfo(float).tiny)
     groups: list[list[int]] = []
     for k in range(len(modes.decay)):
         for group in groups:
             apart = abs(modes.frequency_squared[k] - modes.frequency_squared[group[0]])
-            if apart <= REPEATED * scale and abs(modes.decay[k] - modes.decay[group[0]]) <= REPEATED * drag:
+            if apart <= tolerance[k] and abs(modes.decay[k] - modes.decay[group[0]]) <= REPEATED * drag:
                 group.append(k)
                 break
         else:

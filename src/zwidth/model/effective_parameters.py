@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.compiled import compiled
-from zwidth.model.drive_side import DriveSide, drive_side, is_plain
+from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
 from zwidth.model.mechanism import Floats, Ints, Mechanism
-from zwidth.model.mechanism_arrays import design_of_each, per_design
-from zwidth.model.posture import Posture
+from zwidth.model.mechanism_arrays import design_of_each, pack, per_design
+from zwidth.model.motions import Motions
+from zwidth.model.posture import OK, Posture
 from zwidth.model.ratio_table import at_postures
 
 Marks = NDArray[np.bool_]
@@ -27,6 +29,10 @@ class EffectiveParameters:
     stiffness        (...)  1 / (h^T K^-1 h), inf with rigid drives                  (thesis eq. 2.34) [N/m]
 
     A direction in which the handle cannot move has h = 0: all four are inf.
+
+    Of links that bend, masses are those of the links as if they did not: what a slow motion feels. What the
+    fastest one feels, 1 / (h^T M^-1 h) with all elastic coordinates, is less with each further mode of a beam,
+    down to what is fixed at the handle. The stiffness is that of drives and links in series, the motors held.
     """
 
     link_side_mass: Floats
@@ -47,6 +53,9 @@ def effective_parameters(mechanism: Mechanism, posture: Posture, direction: Arra
     Raises     ValueError  if a direction is not of unit length
     """
     u = screw(direction)
+    if mechanism.flexible:
+        rigid = effective_parameters(replace(mechanism, flexible=()), posture, direction)
+        return replace(rigid, stiffness=_stiffness_with_links(mechanism, posture, u))
     posed = at_postures(mechanism, posture)
     drives = posed.drives
     ratio = per_design(posed, drives.transmission, 1)
@@ -117,6 +126,31 @@ def _effective_in_general(
     return EffectiveParameters(*(np.asarray(x).reshape(shape) for x in (link, motor, rigid, stiffness)))
 
 
+def _stiffness_with_links(mechanism: Mechanism, posture: Posture, screws: Floats) -> Floats:
+    """1 / (h^T K^-1 h) (...) of drives and links that bend, posture by posture; nan where it is not OK."""
+    shape = np.broadcast_shapes(posture.status.shape, screws.shape[:-1])
+    postures, screws = posture.broadcast_to(shape), np.broadcast_to(screws, (*shape, 6))
+    out = np.full(shape, np.nan)
+    for index in np.ndindex(shape):
+
+        def single(array: NDArray[Any], index: tuple[int, ...] = index) -> NDArray[Any]:
+            return np.asarray(array[index])
+
+        one = postures.with_axes(single)
+        if one.status != OK:
+            continue
+        posed = at_postures(mechanism, one)
+        motions = Motions(pack(posed), one.angles, posed.flexible)
+        side, drives = drive_side_of_motions(posed, motions, one.angles), posed.drives
+        held = np.r_[0 : side.driven, motions.joint_count : motions.count]
+        T, h = side.motion[:, held], motions.handle_along(screws[index])[held]
+        spring = drives.transmission**2 * drives.stiffness
+        bending = motions.elastic_stiffness()[np.ix_(held, held)]
+        with np.errstate(divide="ignore"):
+            out[index] = 1.0 / _compliance(T[None], spring[None], h[None], bending)[0]
+    return out
+
+
 def _solve(A: Floats, h: Floats) -> Floats:
     """A^-1 h of each (N, c); nan where A holds nan."""
     unknown: Marks = np.asarray(np.isnan(A).any(axis=(1, 2)))
@@ -125,8 +159,11 @@ def _solve(A: Floats, h: Floats) -> Floats:
     return np.asarray(np.where(unknown[:, None], np.nan, solved))
 
 
-def _compliance(T: Floats, spring: Floats, h: Floats) -> Floats:
-    """h^T (T^T K T)^-1 h (N,) with rigid drives in the limit: they leave the motions N of T_r N = 0."""
+def _compliance(T: Floats, spring: Floats, h: Floats, bending: Floats | None = None) -> Floats:
+    """h^T (T^T K T)^-1 h (N,) with rigid drives in the limit: they leave the motions N of T_r N = 0.
+
+    bending  (c, c)  stiffness of the links, which is added
+    """
     out = np.full(len(h), np.nan)
     for k in np.flatnonzero(~np.isnan(T).any(axis=(1, 2))):
         flexible = np.isfinite(spring[k])
@@ -136,6 +173,7 @@ def _compliance(T: Floats, spring: Floats, h: Floats) -> Floats:
             motions = rows[int(np.sum(values > 1e-12 * values[0])) :].T
         moved = T[k][flexible] @ motions
         A, b = moved.T @ (spring[k][flexible, None] * moved), motions.T @ h[k]
+        A = A if bending is None else A + motions.T @ bending @ motions
         out[k] = b @ np.linalg.solve(A, b) if len(b) else 0.0
     return out
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.modes import UNOBSERVED_UNDAMPED, undamped_modes
+from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, undamped_modes
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -18,6 +18,9 @@ SHARED = 1e-3
 ZERO = 1e-13  # a pole below this share of the largest is a rounded zero
 UNREAD = 1e-12  # share of a sensor's reading that is rounding
 SECOND_UNREAD = 1e-10  # what a second reading, of a force per force, may show of an undamped motion that is hidden
+# Of so many poles, as links that bend have, fast ones that the wall hardly moves would only lengthen the chain
+MANY = 24
+FAST = 1.0  # poles times period from which a motion is gone, or has turned round, by the next sample
 ROUNDING = 1e-13  # of a residue, in shares of the terms that it is summed from
 
 
@@ -167,10 +170,27 @@ def _poles(
     reach = reach / np.where(alone, np.abs(overlap), 1.0)
     gain = np.abs((left.conj().T @ source) * (reading @ right)) * reach
     rounding = ROUNDING * (np.abs(left.T) @ np.abs(source)) * (np.abs(reading) @ np.abs(right)) * reach
+    least = np.zeros(len(poles))
+    if len(poles) > MANY:
+        largest = min(alone_gain, float(np.max(gain, where=alone, initial=0.0)))
+        least = np.where(np.abs(poles) * period > FAST, UNOBSERVED * largest, 0.0)
     # an undamped motion that the wall hardly moves could only hide the stability of the rest
-    least = np.where(np.abs(poles.real) * period < 1e-9, UNOBSERVED_UNDAMPED * alone_gain, 0.0)
+    least = np.where(np.abs(poles.real) * period < 1e-9, UNOBSERVED_UNDAMPED * alone_gain, least)
     hidden = alone & (gain <= np.maximum(least, rounding))
     return poles, hidden & hidden[_partners(poles)]
+
+
+def fast_and_unseen(A: Floats, inputs: Floats, readings: Floats, period: float) -> tuple[Complexes, Complexes]:
+    """Poles of a form, and those of them that are fast and that no input of several (r, k) moves in any reading
+    (q, k), on states of which the first half are amplitudes of modes and the next their velocities [m per period].
+    """
+    poles, unseen = np.zeros(0, dtype=complex), np.ones(len(A), dtype=np.bool_)
+    for source in inputs:
+        for reading in readings:
+            together = float(np.sum(np.abs(source)) * np.sum(np.abs(reading))) * period
+            poles, hidden = _poles(A, source, reading, period, together)
+            unseen &= hidden & (np.abs(poles) * period > FAST)
+    return poles[~unseen], poles[unseen]
 
 
 def _partners(poles: Complexes) -> NDArray[np.int64]:

@@ -27,7 +27,7 @@ from zwidth.model.damping import Damping
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.equilibrium import Equilibrium, command_change
 from zwidth.model.mechanism import Floats, Mechanism
-from zwidth.model.modes import REPEATED, clusters, undamped_modes
+from zwidth.model.modes import clusters, repeat_tolerance, undamped_modes
 from zwidth.model.plant import Plant, SampledForce
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, reduce_mechanism
@@ -221,36 +221,20 @@ def moved_motions(plant: Plant) -> tuple[ModalMotions, ModalMotions]:
     drag = V.T @ plant.damping @ V
     for damper in plant.lagged_dampers:
         drag = drag + damper.damping * np.outer(V.T @ damper.along, V.T @ damper.along)
-    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
-    groups = [np.arange(len(squared))[run] for run in clusters(squared, REPEATED * scale)]
+    groups = [np.arange(len(squared))[run] for run in clusters(squared, repeat_tolerance(squared))]
     drag = drag / max(float(np.max(np.abs(drag))), np.finfo(float).tiny)
-    basis = np.zeros((plant.size, 0))
-    fresh = (V.T @ plant.actuator)[:, None]
-    fresh = fresh / np.linalg.norm(fresh)
-    while fresh.shape[1]:
-        parts = np.zeros((plant.size, 0))
+    pushed = (V.T @ plant.actuator)[:, None]
+    pushed = pushed / np.linalg.norm(pushed)
+    moved = np.zeros((plant.size, 0))
+    while True:
+        reached = np.hstack([pushed, drag @ moved])
+        turned, moves = np.zeros_like(V), np.zeros(plant.size, dtype=bool)
         for group in groups:
-            part = np.zeros_like(fresh)
-            part[group] = fresh[group]
-            parts = np.hstack([parts, part])
-        fresh = _new_directions(basis, parts)
-        basis = np.hstack([basis, fresh])
-        fresh = _new_directions(basis, drag @ fresh)
-    each_group = list[tuple[Floats, Floats, Floats]]()
-    for group in groups:
-        left, size, _ = np.linalg.svd(basis[group])
-        rank = int(np.count_nonzero(size > 0.5))  # of an orthonormal basis: each is 1 or rounding
-        each_group.append((V[:, group] @ left, squared[group], (np.arange(len(group)) < rank).astype(float)))
-    shapes, own, moves = (np.concatenate(each, axis=-1) for each in zip(*each_group, strict=True))
-    moved = moves > 0.0
-    return ModalMotions(shapes[:, moved], own[moved]), ModalMotions(shapes[:, ~moved], own[~moved])
-
-
-def _new_directions(basis: Floats, vectors: Floats) -> Floats:
-    """Orthonormal directions that vectors (n, k) have beyond a basis, where these are more than rounding."""
-    if not vectors.shape[1]:
-        return vectors
-    for _ in range(2):  # the second time takes what rounding has left
-        vectors = vectors - basis @ (basis.T @ vectors)
-    left, size, _ = np.linalg.svd(vectors, full_matrices=False)
-    return np.asarray(left[:, size > MOVED])
+            left, size, _ = np.linalg.svd(reached[group])
+            turned[np.ix_(group, group)] = left
+            moves[group] = np.arange(len(group)) < np.count_nonzero(size > MOVED)
+        if np.count_nonzero(moves) == moved.shape[1]:
+            break
+        moved = turned[:, moves]
+    shapes = V @ turned
+    return ModalMotions(shapes[:, moves], squared[moves]), ModalMotions(shapes[:, ~moves], squared[~moves])

@@ -16,8 +16,15 @@ Floats = NDArray[np.float64]
 # Squared frequencies below this share of the largest are rounding of a rigid mode's exact zero.
 RIGID = 1e-13
 # Relative distance under which two frequencies or damping rates are one: above the rounding of the
-# eigenvalue problem, below anything a mechanism is built to.
+# eigenvalue problem, below anything a mechanism is built to. Of slow modes beside fast ones it is the distance in
+# shares of the larger of their own squared frequency and SLOW_SHARE of the largest.
 REPEATED = 1e-10
+SLOW_SHARE = 1e-4
+AMONG_SLOW = 1e3
+# Squared frequencies as far apart as this are computed in two parts: the slow ones would be lost in the rounding
+# of the fast ones.
+WIDE = 1e-8
+SMALLEST = 1e-26  # of the largest squared frequency: what the rounding of a motion leaves of the fastest mode
 # A motion whose residue is below this share of all residues is rounding: no wall moves it.
 UNOBSERVED = 1e-11
 # The same for a motion without damping: the wall would move its poles by less than the band in which stability is
@@ -45,15 +52,51 @@ class RealModes:
 def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
     """Squared frequencies (n,), ascending, and mass-normalised shapes (n, n): V^T M V = I, V^T K V = diag.
 
-    Rigid modes come out as exactly zero. Raises LinAlgError where M is not positive definite.
+    Rigid modes come out as exactly zero. Modes much slower than the fastest are lost in their rounding: among the
+    motions that they make they are found again, by the stiffness of these alone. Raises LinAlgError where M is not
+    positive definite.
     """
     root = np.linalg.cholesky(mass)
     half = np.linalg.solve(root, stiffness)
     reduced = np.linalg.solve(root, half.T)
     squared, vectors = np.linalg.eigh((reduced + reduced.T) / 2.0)
-    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
+    shapes = np.linalg.solve(root.T, vectors)
+    fastest = float(np.max(np.abs(squared), initial=0.0))
+    among, scale = np.arange(len(squared)), max(fastest, np.finfo(float).tiny)
     squared = np.where(np.abs(squared) <= RIGID * scale, 0.0, squared)
-    return squared, np.linalg.solve(root.T, vectors)
+    while True:
+        slow = among[np.abs(squared[among]) <= WIDE * scale]
+        own, rounding = _stiffness_and_rounding(stiffness, shapes[:, slow], fastest)
+        if len(slow) == len(among) or not np.any(np.abs(own) > 10.0 * rounding):
+            return squared, shapes
+        fast = np.setdiff1d(among, slow)
+        # what rounding has left of the fast modes in the slow ones
+        left = (shapes[:, fast].T @ stiffness @ shapes[:, slow]) / squared[fast, None]
+        motions = shapes[:, slow] - shapes[:, fast] @ left
+        shapes[:, fast] += motions @ left.T
+        relative = motions.T @ stiffness @ motions
+        found, turned = np.linalg.eigh((relative + relative.T) / 2.0)
+        shapes[:, slow] = motions @ turned
+        among, scale = slow, max(float(np.max(np.abs(found))), np.finfo(float).tiny)
+        _, rounding = _stiffness_and_rounding(stiffness, shapes[:, slow], fastest)
+        squared[slow] = np.where(np.abs(found) <= np.maximum(RIGID * scale, rounding), 0.0, found)
+
+
+def _stiffness_and_rounding(stiffness: Floats, motions: Floats, fastest: float) -> tuple[Floats, Floats]:
+    """v^T K v (k,) of mass-normalised motions (n, k), and what of it may be rounding: of the terms that it is summed
+    from, and of what is left in it of the fastest mode."""
+    own = np.einsum("ik,ik->k", motions, stiffness @ motions)
+    terms = np.einsum("ik,ik->k", np.abs(motions), np.abs(stiffness) @ np.abs(motions))
+    return own, np.maximum(RIGID * terms, SMALLEST * fastest)
+
+
+def repeat_tolerance(squared: Floats) -> Floats:
+    """(n,)  by how much squared frequencies may differ from each of these and still be the same."""
+    size = np.abs(squared)
+    least = SLOW_SHARE * max(float(np.max(size, initial=0.0)), np.finfo(float).tiny)
+    slowest = float(np.min(size, where=size > 0.0, initial=np.inf))
+    least = min(least, AMONG_SLOW * slowest)  # as near as the slow modes of a wide spread are known
+    return np.asarray(REPEATED * np.maximum(size, least))
 
 
 def natural_frequencies(plant: Plant) -> Floats:
@@ -77,9 +120,10 @@ def least_deforming_motion(plant: Plant) -> Floats:
     return np.asarray(motion / (plant.sensor @ motion))
 
 
-def clusters(values: Floats, tolerance: float) -> list[slice]:
-    """Runs of ascending values that lie within the tolerance of their neighbour."""
-    starts = [0, *(int(i) + 1 for i in np.flatnonzero(np.diff(values) > tolerance)), len(values)]
+def clusters(values: Floats, tolerance: float | Floats) -> list[slice]:
+    """Runs of ascending values that lie within the tolerance, one or (n,) one each, of their neighbour."""
+    apart = np.diff(values) > np.broadcast_to(tolerance, values.shape)[1:]
+    starts = [0, *(int(i) + 1 for i in np.flatnonzero(apart)), len(values)]
     return [slice(a, b) for a, b in pairwise(starts)]
 
 
@@ -92,8 +136,7 @@ def real_modes(plant: Plant) -> RealModes | None:
     if plant.lagged_dampers:
         return None
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    scale = max(float(np.max(np.abs(squared))), np.finfo(float).tiny)
-    for run in clusters(squared, REPEATED * scale):
+    for run in clusters(squared, repeat_tolerance(squared)):
         if run.stop - run.start > 1:
             local = shapes[:, run].T @ plant.damping @ shapes[:, run]
             shapes[:, run] = shapes[:, run] @ np.linalg.eigh((local + local.T) / 2.0)[1]

@@ -18,7 +18,9 @@ has the stiffness of another mechanism.
 
 Flexible links (`flexible_link`) have elastic coordinates among the joint coordinates; theirs are the last. They
 hang on closures, too: with N the elastic motions that leave drives and closures alone, u' = B (p', xi'), B =
-[B_rigid, N].
+[B_rigid, N]. Of all bases N the natural modes are taken that the links have while the drives stand still, of a
+mass of 1 each, the slowest first. Other bases tell the same, but their mass matrix is singular to rounding where
+light parts of links move and heavy ones do not, as they do in most fast motions of a loop.
 
 The three rates of a ball joint are one angular velocity, and no rates of coordinates; about a posture they are
 those of the turn from there, whose vector has no second-order terms of its own.
@@ -34,6 +36,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.compiled import compiled
+from zwidth.model.flexible_body import symmetric
 from zwidth.model.flexible_link import FlexibleLink
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats
@@ -128,15 +131,16 @@ class Motions:
         the base."""
         return self._at(self._links, link, local).in_coordinates(self.rates, self.rates_2)
 
-    def _at(self, links: Mapping[int, Motion], link: int, local: Floats) -> Motion:
-        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to its nearest station."""
+    def _at(self, links: Mapping[int, Motion], link: int, local: Floats, fixed_at: Floats | None = None) -> Motion:
+        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to the station next to it, or
+        to another place, as what slides in a guide is to the guide's."""
         if link < 0:
             return links[-1].at(local)
         R, own = self.rotation[link], links[link]
         if link not in self.flexible:
             return own.at(R @ local)
         beam, columns = self.flexible[link], self._columns(link)
-        k = beam.station_of(local)
+        k = beam.station_of(local if fixed_at is None else fixed_at)
         straight = own.at(R[:, 0] * beam.body.stations[k])
         bent, turned = (np.zeros_like(own.speed) for _ in range(2))
         bent[:, columns], turned[:, columns] = R @ beam.body.displacement[k], R @ beam.body.rotation[k]
@@ -175,37 +179,41 @@ class Motions:
 
     def mass_matrix(self) -> Floats:
         """Mass matrix (c, c) of the links in the independent coordinates."""
-        M = np.zeros((self.count, self.count))
-        for link in self.mech.bodies:
-            R, beam = self.rotation[link], self.flexible.get(int(link))
-            mass, place, inertia = self._rigid_body(int(link))
-            centre = self.point(link, place)
-            M += mass * centre.speed.T @ centre.speed + centre.spin.T @ (R @ inertia @ R.T) @ centre.spin
-            if beam is not None:
-                base = self._links[link]
-                moved = np.vstack([R.T @ base.speed, R.T @ base.spin, self._elastic_rows(int(link))]) @ self.rates
-                M += moved.T @ beam.body.mass @ moved
-        return np.asarray(0.5 * (M + M.T))
+        return self._mass_of(self.rates)
 
     def elastic_stiffness(self) -> Floats:
         """Stiffness (c, c) of the flexible links."""
-        K = np.zeros((self.count, self.count))
-        for link, beam in self.flexible.items():
-            bent = self._elastic_rows(link) @ self.rates
-            K += bent.T @ beam.body.stiffness @ bent
-        return np.asarray(0.5 * (K + K.T))
+        return self._stiffness_of(self.rates)
 
     def elastic_damping(self) -> Floats:
         """Damping (c, c) of the flexible links themselves."""
         B = np.zeros((self.count, self.count))
         for link, beam in self.flexible.items():
-            bent = self._elastic_rows(link) @ self.rates
+            bent = self.rates[self._columns(link)]
             B += beam.damping_time * bent.T @ beam.body.stiffness @ bent
-        return np.asarray(0.5 * (B + B.T))
+        return symmetric(B)
 
-    def _elastic_rows(self, link: int) -> Floats:
-        """(e_i, m + e)  a flexible link's coordinates among all coordinates."""
-        return np.eye(len(self.unknowns) + self.elastic_count)[self._columns(link)]
+    def _mass_of(self, rates: Floats) -> Floats:
+        """Mass matrix (k, k) of the links in coordinates with these rates (m + e, k) of all."""
+        M = np.zeros((rates.shape[1],) * 2)
+        for link in self.mech.bodies:
+            R, base, beam = self.rotation[link], self._links[link], self.flexible.get(int(link))
+            mass, place, inertia = self._rigid_body(int(link))
+            centre = self._at(self._links, int(link), place)
+            speed, spin = centre.speed @ rates, R.T @ (centre.spin @ rates)
+            M += mass * speed.T @ speed + spin.T @ inertia @ spin
+            if beam is not None:
+                moved = np.vstack([R.T @ base.speed @ rates, R.T @ base.spin @ rates, rates[self._columns(link)]])
+                M += moved.T @ beam.body.mass @ moved
+        return symmetric(M)
+
+    def _stiffness_of(self, rates: Floats) -> Floats:
+        """Stiffness (k, k) of the flexible links in coordinates with these rates (m + e, k) of all."""
+        K = np.zeros((rates.shape[1],) * 2)
+        for link, beam in self.flexible.items():
+            bent = rates[self._columns(link)]
+            K += bent.T @ beam.body.stiffness @ bent
+        return symmetric(K)
 
     def _rigid_body(self, link: int) -> tuple[float, Floats, Floats]:
         """Mass, centre and inertia of what of a link is rigid: all of it, or what a beam carries."""
@@ -254,15 +262,16 @@ class Motions:
         still = Motion(
             np.zeros(3), *(np.zeros((3, m)) for _ in range(2)), *(np.zeros((3, m, m)) for _ in range(2))
         )
-        links = {-1: still}
+        links, carried = {-1: still}, list[Floats]()
         for i in range(mech.parent.size):
             p, u, z = int(mech.parent[i]), int(mech.column[i]), self._axis[i]
-            carrier = links[int(mech.carrier[i])]
-            moved = self._at(links, p, self._local(p, self._origin[i]))
+            moved = self._at(links, p, self._local(p, self._origin[i]), mech.origin[0, i])
+            # spin of what carries the joint: of a flexible parent its station there, of a ball joint its base
+            carried.append(moved.spin if mech.carrier[i] == p else carried[-1])
             own = np.zeros(m)
             if u >= 0:
                 own[u] = 1.0
-            along, turned = np.outer(z, own), _cross_forms(carrier.spin, np.outer(z, own))
+            along, turned = np.outer(z, own), _cross_forms(carried[i], np.outer(z, own))
             if mech.kind[i] == PRISMATIC:
                 links[i] = Motion(
                     moved.position, moved.speed + along, moved.spin, moved.speed_2 + 2.0 * turned, moved.spin_2
@@ -286,6 +295,7 @@ class Motions:
         B = np.zeros((m + e, c + e))
         B[passive:m, :c], B[m:, c:] = mech.to_joint[0], np.eye(e)
         if not mech.a.size:
+            B[:, c:] = self._natural(B[:, c:])
             return B, np.zeros((m + e, c + e, c + e))
         A, A2 = self._closures()
         unit = mech.unit[0, :passive]
@@ -300,10 +310,24 @@ class Motions:
             rank = int(np.count_nonzero(size > RANK * size[0]))
             B = np.hstack([B[:, :c], np.zeros((m + e, len(hanging) - rank))])
             B[hanging, c:] = scale[:, None] * right[rank:].T
+            B[:, c:] = self._natural(B[:, c:])
             inverse = scale[:, None] * np.linalg.pinv(rows, rcond=RANK)
         B2 = np.zeros((m + e, B.shape[1], B.shape[1]))
         B2[hanging] = -np.tensordot(inverse, B.T @ A2 @ B, 1)
         return B, B2
+
+    def _natural(self, motions: Floats) -> Floats:
+        """The natural modes (m + e, k) among as many motions in which no drive moves, the slowest first, of a mass
+        of 1."""
+        if not motions.shape[1]:
+            return motions
+        M, K = self._mass_of(motions), self._stiffness_of(motions)
+        # of M in terms of K, whose largest eigenvalues are the slowest modes, which so keep their digits
+        root = np.linalg.cholesky(K)
+        half = np.linalg.solve(root, M)
+        inverse, modes = np.linalg.eigh(symmetric(np.linalg.solve(root, half.T)))
+        slowest = modes[:, ::-1]
+        return np.asarray(motions @ np.linalg.solve(root.T, slowest) * np.abs(inverse[::-1]) ** -0.5)
 
     def _elastic_scale(self) -> Floats:
         """(e,)  of each elastic coordinate, by which it moves its beam by the mechanism's size on the average."""

@@ -7,7 +7,7 @@ actuators = sensors = [0, H], and the operator holds the links, handles = [H, 0]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -140,6 +140,8 @@ def reduce_directions(
                 ValueError      for a batch of postures, a posture that is not OK, a direction not of unit length
     """
     U = screw(np.atleast_2d(np.asarray(directions, dtype=float)))
+    if model == "rigid" and mechanism.flexible:
+        mechanism = replace(mechanism, flexible=())
     # checks the posture and the model, and holds what does not depend on the direction
     first = reduce_mechanism(mechanism, posture, U[0], "full", damping)
     if model not in MODELS:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.model.argument_checks import require
-from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
+from zwidth.model.damping import Damping, GivenDamping, ModalDamping, ProportionalDamping, modal_matrix
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
@@ -64,6 +64,9 @@ def reduce_mechanism(
     motor-mass  motor side on the spring, the link side held fixed                   (thesis eq. 2.44)
     rigid       links and rotors as one mass                                         (thesis eq. 2.42)
 
+    Links that bend have their whole mass on the link side, as if they did not bend, and their bending in the
+    spring; in the rigid model they are rigid.
+
     posture    a single one, OK
     direction  (3,)  unit vector in the base frame; or (6,), a screw: see `effective_parameters.screw`
     encoders   what they read: the motors, or the links behind the drives
@@ -77,24 +80,30 @@ def reduce_mechanism(
     if posture.status != OK:
         raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
     _check_model(model)
+    if model == "rigid" and mechanism.flexible:
+        mechanism = replace(mechanism, flexible=())
     mechanism, u = at_postures(mechanism, posture), screw(direction)
     mass, h, side = links_and_drives(mechanism, posture, u)
     check_moves_along(posture, side, h, u)
     full, electrical = _full(mechanism, mass, h, side, damping, encoders)
     if model == "full":
         return add_dampers(full, electrical)
-    if not is_plain(mechanism):  # the shares of its drives and joints are read off the matrices
+    # without links that bend the shares of drives and joints are read off the matrices
+    if not (is_plain(mechanism) or mechanism.flexible):
         return reduce_plant(add_dampers(full, electrical), model)
     numbers = effective_parameters(mechanism, posture, u)
     if model == "rigid":
         slip = damping.mass_coefficient_1_per_s if isinstance(damping, ProportionalDamping) else 0.0
         reduced = _rigid(float(numbers.rigid_mass), slip * float(numbers.rigid_mass))
-    elif np.isfinite(numbers.stiffness):
-        reduced = _two_mass(mechanism.drives, numbers, h, damping, link_fixed=model == "motor-mass")
-    else:
+    elif not np.isfinite(numbers.stiffness):
         raise ModelError(
             f"model {model!r} needs a flexible drive in this direction and all are rigid; use 'rigid'"
         )
+    elif mechanism.flexible:
+        dampers = _own_dampers(mechanism.drives, side, damping)
+        reduced = _two_mass_of_links(full, numbers, damping, dampers, link_fixed=model == "motor-mass")
+    else:
+        reduced = _two_mass(mechanism.drives, numbers, h, damping, link_fixed=model == "motor-mass")
     if encoders == "motor" and not electrical and not full.nonlinear:
         return reduced
     motions = _motions(full, model)
@@ -285,16 +294,47 @@ def _two_mass(
     given         b = x^T B x, the dampers moved as the drives deflect under one metre: x_i = k h_i / k_i
     """
     m1, m2, k = float(numbers.link_side_mass), float(numbers.motor_side_mass), float(numbers.stiffness)
-    slip = 0.0
-    if isinstance(damping, ModalDamping):
-        b = 2.0 * damping.ratio * float(np.sqrt(k * m1 * m2 / (m1 + m2)))
-    elif isinstance(damping, ProportionalDamping):
-        b, slip = damping.stiffness_coefficient_s * k, damping.mass_coefficient_1_per_s
-    else:
+    b, slip = _damping_between(m1, m2, k, damping), 0.0
+    if isinstance(damping, ProportionalDamping):
+        slip = damping.mass_coefficient_1_per_s
+    elif not isinstance(damping, ModalDamping):
         _, spring, damper = _at_joint(drives)
         b = float(np.sum(damper * (k * h / spring) ** 2))
     plant = _motor_mass(m2, b, k) if link_fixed else _pair(m1, m2, b, k)
     return replace(plant, damping=plant.damping + slip * plant.mass)
+
+
+def _own_dampers(drives: Drives, side: DriveSide, damping: Damping) -> Floats:
+    """Dampers (n, n) of the full model that are given one by one: of joints, of links that bend, and of the drives
+    where these are the device's damping."""
+    _, spring, damper = _at_joint(drives)
+    flexible = np.isfinite(spring)
+    f = int(np.count_nonzero(flexible))
+    D = np.concatenate([side.motion[flexible], -np.eye(f)], axis=1)
+    own = D.T @ (damper[flexible, None] * D) if isinstance(damping, GivenDamping) else np.zeros((D.shape[1],) * 2)
+    return own if side.damping is None else own + _padded(side.damping, f)
+
+
+def _two_mass_of_links(
+    full: Plant, numbers: EffectiveParameters, damping: Damping, dampers: Floats, *, link_fixed: bool
+) -> Plant:
+    """The same for links that bend: the spring is that of drives and links together, the dampers (n, n) that are
+    given one by one are moved by the motions of the two sides."""
+    m1, m2, k = float(numbers.link_side_mass), float(numbers.motor_side_mass), float(numbers.stiffness)
+    pair = _pair(m1, m2, _damping_between(m1, m2, k, damping), k)
+    if isinstance(damping, ProportionalDamping):
+        pair = replace(pair, damping=pair.damping + damping.mass_coefficient_1_per_s * pair.mass)
+    W = _motions(full, "two-mass")
+    own = W.T @ dampers @ W
+    pair = replace(pair, damping=pair.damping + (own + own.T) / 2.0)
+    return _motor_mass(m2, float(pair.damping[1, 1]), k) if link_fixed else pair
+
+
+def _damping_between(link: float, motor: float, stiffness: float, damping: Damping) -> float:
+    """Of two masses on a spring, by their mode's ratio or in proportion to the spring; 0 for given dampers."""
+    if isinstance(damping, ModalDamping):
+        return 2.0 * float(damping.ratio) * float(np.sqrt(stiffness * link * motor / (link + motor)))
+    return damping.stiffness_coefficient_s * stiffness if isinstance(damping, ProportionalDamping) else 0.0
 
 
 def _pair(link: float, motor: float, damping: float, stiffness: float) -> Plant:

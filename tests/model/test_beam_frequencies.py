@@ -11,7 +11,7 @@ from numpy import cos, cosh, sin, sinh
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
-from tests.frame_elements import GROUND, Frame, natural_frequencies
+from tests.model.frame_elements import GROUND, Frame, natural_frequencies
 from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
 from zwidth.model.beam_section import BeamProperties
 from zwidth.model.flexible_body import clamped_frequencies, highest_frequency

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 from scipy.special import jv
 
-from tests.rods import assert_moves_as_a_rod, middles
+from tests.model.rods import assert_moves_as_a_rod, middles
 from zwidth.model import beam_bodies
 from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
 from zwidth.model.beam_integrals import Shapes, body_of_shapes, gauss_panels

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.frame_elements import (
+from tests.model.frame_elements import (
     GROUND,
     Frame,
     axial_forces,

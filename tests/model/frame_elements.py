@@ -175,7 +175,12 @@ def natural_modes(frame: Frame, axial_forces=None) -> tuple[np.ndarray, np.ndarr
     """
     T = frame.motions()
     K = frame.stiffness() + (0.0 if axial_forces is None else frame.geometric_stiffness(axial_forces))
-    K, M = T.T @ K @ T, T.T @ frame.mass() @ T
+    squared, shapes = modes_of(T.T @ K @ T, T.T @ frame.mass() @ T)
+    return squared, T @ shapes
+
+
+def modes_of(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same of matrices (n, n), with mass-normalised modes (n, n) but for those without mass."""
     rough, _ = _modes(M, K, np.trace(K) / np.trace(M))
     highest = rough[np.isfinite(rough)][-1]
     # Low frequencies are many powers of ten below the highest, and lost in its rounding. In 1/(w^2 + shift) they
@@ -183,7 +188,9 @@ def natural_modes(frame: Frame, axial_forces=None) -> tuple[np.ndarray, np.ndarr
     shift = rough[rough > 1e-12 * highest][0] + max(0.0, -2.0 * rough[0])
     squared, shapes = _modes(M, K, shift)
     rounding = max(1e-9 * shift, 1e-13 * highest)  # of a free motion's zero
-    return np.where(np.abs(squared) < rounding, 0.0, squared), T @ shapes
+    massive = np.isfinite(squared)
+    shapes[:, massive] /= np.sqrt(np.einsum("ik,ij,jk->k", shapes[:, massive], M, shapes[:, massive]))
+    return np.where(np.abs(squared) < rounding, 0.0, squared), shapes
 
 
 def _modes(M, K, shift) -> tuple[np.ndarray, np.ndarray]:
