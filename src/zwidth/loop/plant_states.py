@@ -180,8 +180,8 @@ def _loaded_states(
     plant: Plant, period: float, force_rows: Floats | None, force_filter: LowPass | None
 ) -> PlantStates:
     """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
-    of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a large
-    plant, as links that bend have."""
+    of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a
+    large plant, as links that bend have."""
     n, T, lags = plant.size, period, plant.lagged_dampers
     V = np.eye(n)  # a plant on its modes without load keeps what the load adds to the last digit
     if not np.array_equal(plant.mass, V):
