@@ -1,4 +1,4 @@
-"""Write the pictures of the documentation: the README's chart, and two of the thesis's figures."""
+"""Write the pictures of the documentation: the README's chart, pushes of a hand, and two of the thesis's figures."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from gallery import fig_5_4_common_area, fig_5_10_eigenvalues
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import load
+from zwidth.show.figures.caption import caption_of_result, write_caption
+from zwidth.show.figures.load_path import load_path_figure
 from zwidth.show.figures.stability import draw_chart
 from zwidth.show.figures.style import context, figure, save
 
@@ -26,6 +28,11 @@ def main() -> None:
         made, ax = figure(6.2, 3.7)
         draw_chart(ax, chart)
     print(save(made, IMAGES / "five-bar-chart.svg"))
+    path = device.load_path(10.0)
+    with context():
+        made = load_path_figure(path)
+        write_caption(made, caption_of_result(path))
+    print(save(made, IMAGES / "load-five-bar.svg"))
     page(fig_5_4_common_area.draw, "fig-5-4-common-area", 6.4, 4.8)
     page(fig_5_10_eigenvalues.draw, "fig-5-10-eigenvalues", 7.4, 4.6)
 
