@@ -363,7 +363,8 @@ class SimulatedDevice(LoadedDevice):
         N = 2 * self.n + len(self.system.lag_time)
         torque = max(np.max(np.abs(self.at.torques)), 1e-2)
         steps = np.full(self.size, 1e-3 * self.reading_size)
-        steps[: self.n], steps[self.n : 2 * self.n] = 1e-4, 1e-4 / self.controller.sampling_period
+        step = min(1e-4, 0.2 * np.min(np.abs(self.bent), initial=1.0))  # springs stay on their branch
+        steps[: self.n], steps[self.n : 2 * self.n] = step, step / self.controller.sampling_period
         steps[2 * self.n : N + self.queue * self.d] = 0.1 * torque
         columns = [
             sum(w / step * self.map(s * step * e) for s, w in FOURTH)
@@ -404,22 +405,27 @@ class _LowPass:
         return out, np.concatenate([b[1] * signal - a[1] * out + second, b[2] * signal - a[2] * out])
 
 
-def root_errors(ours, judge, least=0.3):
+def root_errors(ours, judge, least=0.3, hidden=0):
     """How far our roots are from those of the judge's matrix above a least size, in two measures (r,) each.
 
     First the distance from the partner as a share of the root. Then the least change, as a share of the balanced
     matrix, that makes ours a root of the judge's matrix: what the errors of its differences have to explain. Roots
     that nearly coincide are known to the root of these errors, and their distance says little.
+
+    hidden  how many roots of the judge's we leave out
     """
     theirs = np.linalg.eigvals(judge)
-    big = theirs[np.abs(theirs) > least]
-    cost = np.abs(ours[None, :] - big[:, None])
+    big, mine = theirs[np.abs(theirs) > least], ours
+    if hidden:
+        mine = ours[np.abs(ours) > least]
+        assert len(big) - len(mine) == hidden
+    cost = np.abs(mine[None, :] - big[:, None])
     rows, columns = linear_sum_assignment(cost)
-    assert len(rows) == len(big), "the loop has fewer roots than the judge"
+    assert len(rows) == len(big) - hidden, "the loop has fewer roots than the judge"
     balanced = matrix_balance(judge, permute=False)[0]
     size = np.linalg.norm(balanced, 2)
     distance = cost[rows, columns] / np.abs(big[rows])
     backward = np.array(
-        [np.linalg.svd(balanced - z * np.eye(len(judge)), compute_uv=False)[-1] / size for z in ours[columns]]
+        [np.linalg.svd(balanced - z * np.eye(len(judge)), compute_uv=False)[-1] / size for z in mine[columns]]
     )
     return distance, backward

@@ -45,9 +45,9 @@ def transition(point, wall=None):
     return loop.transition_matrix(*(wall or some_wall(loop.plant, loop.period)))
 
 
-def check_alike(ours, theirs, rounding=ROUNDING):
+def check_alike(ours, theirs, rounding=ROUNDING, hidden=0):
     """The same roots, but for what the errors of a matrix explain."""
-    distance, backward = root_errors(np.linalg.eigvals(ours), theirs)
+    distance, backward = root_errors(np.linalg.eigvals(ours), theirs, hidden=hidden)
     assert np.all((distance <= ROOTS) | (backward <= rounding)), (distance, backward)
     assert np.all(backward <= 100.0 * rounding), backward
 
@@ -58,7 +58,9 @@ def check_roots(point, judge=LoadedDevice, rounding=ROUNDING):
     wall = some_wall(loop.plant, loop.period)
     device = judge(point, *wall)
     assert device.unbalanced() <= 1e-9
-    check_alike(loop.transition_matrix(*wall), device.jacobian(), rounding)
+    # a load that the computer adds nothing to leaves motions that no wall moves, as there are without load
+    hidden = 0 if loop.plant.is_loaded else 2 * len(loop.sections.unobserved)
+    check_alike(loop.transition_matrix(*wall), device.jacobian(), rounding, hidden)
 
 
 def plain_point(mechanism, load, u=None, controller=None, seed=0, model="full", posture=None):
@@ -89,7 +91,7 @@ def test_roots_are_those_of_the_nonlinear_device(kind):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", MADE)
 def test_roots_of_many_devices(kind):
-    for point in random_points(kind, seed=1, count=150):
+    for point in random_points(kind, seed=1, count=80):
         check_roots(point)
 
 
@@ -108,9 +110,10 @@ def bundled_point(name, seed):
     return device.at(posture, **({"direction": u} if u.shape == (3,) else {"axis": u[3:]}), load=load)
 
 
-@pytest.mark.parametrize("name", ["novint-falcon", "openwrist"])
-def test_roots_of_a_delta_and_of_a_wrist(name):
-    check_roots(bundled_point(name, 1))
+@pytest.mark.parametrize(("name", "seed"), [("novint-falcon", 1), ("openwrist", 1), ("openwrist", 5)])
+def test_roots_of_a_delta_and_of_a_wrist(name, seed):
+    """The wrist by the second seed has two poles at z = 1 and one motion that nothing holds."""
+    check_roots(bundled_point(name, seed))
 
 
 @pytest.mark.slow
@@ -371,6 +374,32 @@ def test_sideways_motions_grow_as_the_nonlinear_device_does_against_a_wall(kind,
         small, large = error(0.5 * sign), error(sign)
         assert large <= (2e-4 if model == "rigid" else 0.02)
         assert small <= (2e-4 if model == "rigid" else 0.6 * large)
+
+
+def test_a_slide_that_the_load_does_not_turn_stays_neutral():
+    """A five-bar on a slide across its plane: the motion in the plane grows as it does without the slide."""
+    plain = five_bar(base=0.06, stiffness=(inf, inf))
+    mechanism = with_fixed_foot(plain)
+    links = mechanism.links
+    slide = {"joint": [PRISMATIC, *links.joint[1:]], "axis": links.axis, "rotation": links.rotation}
+    slide = {name: np.array(value) for name, value in slide.items()}
+    slide["rotation"][0] = np.eye(3)
+    mechanism = replace(
+        mechanism,
+        links=replace(links, **slide),
+        drives=drives_on([0, *mechanism.drives.joint], (inf, inf, inf)),
+        reference_position=links.origin[0] + plain.reference_position,
+    )
+    u, load = (0.6, 0.8, 0.0), Load(push=-5.0)
+    one, other = (
+        plain_point(each, load, u, posture=solve_posture(each, each.reference_position))
+        for each in (plain, mechanism)
+    )
+    (motion,) = one.loop.sideways_motions
+    assert motion.growth_rate > 0.0
+    grows, still = other.loop.sideways_motions
+    assert grows.growth_rate == pytest.approx(motion.growth_rate, rel=1e-9)
+    assert (still.growth_rate, still.frequency) == (0.0, 0.0)
 
 
 def test_a_sideways_motion_in_words():

@@ -18,6 +18,7 @@ from tests.model.random_mechanisms import place
 from zwidth.model.mechanism import AXIS, BALL_X, BALL_Z, FIXED, FRAME, PRISMATIC
 
 FOURTH = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))  # steps and weights
+PART = 0.1  # of a motion that is taken at once [rad], [m]
 SURE = 1e-9  # step of a passive joint after which the next one of Newton's method is rounding
 
 
@@ -112,7 +113,14 @@ class Joints:
         return q
 
     def moved(self, q, motion):
-        """Joint coordinates after a motion (c,) of the independent joints, the loops closed again."""
+        """Joint coordinates after a motion (c,) of the independent joints, the loops closed again, in parts of
+        PART."""
+        parts = 1 + int(np.max(np.abs(motion), initial=0.0) / PART)
+        for _ in range(parts):
+            q = self._moved(q, motion / parts)
+        return q
+
+    def _moved(self, q, motion):
         step = np.zeros(len(self.moving))
         step[self.independent] = motion
         if self.passive:

@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 
 from tests.model.joints_apart import FOURTH, Joints, along_motion, travel, travel_rates
-from tests.model.model_cases import KINDS, NO_CLOSURES, Z, closures_of, drives_on, links_of, some_postures
+from tests.model.model_cases import (
+    KINDS,
+    NO_CLOSURES,
+    Z,
+    closures_of,
+    drives_on,
+    links_of,
+    some_postures,
+)
 from tests.model.model_engines import ask_mujoco, ask_pinocchio
-from tests.model.random_mechanisms import random_mechanisms
+from tests.model.random_mechanisms import random_mechanism, random_mechanisms
 from zwidth.model.drive_motion import DriveMotion, counted_posture, drive_travel
-from zwidth.model.mechanism import BALL_X, PRISMATIC, REVOLUTE, Mechanism
+from zwidth.model.mechanism import AXIS, BALL_X, PRISMATIC, REVOLUTE, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
 from zwidth.model.posture import solve_posture
@@ -31,6 +39,14 @@ def random_builds(seed, count=2):
     for make in KINDS.values():
         mechanism = make(rng)
         yield mechanism, some_postures(mechanism, rng, count=1).angles[0]
+    yield closed_by_a_turning_hinge()
+
+
+def closed_by_a_turning_hinge():
+    """A spatial chain closed by a hinge, all of whose five equations count: its axis turns, and links about it."""
+    joints = ["revolute", "universal", "revolute", "universal", "universal", "revolute"]
+    mechanism = random_mechanism(np.random.default_rng(11), joints, [AXIS])
+    return mechanism, mechanism.assemblies["as built"]
 
 
 def motions_at(mechanism, q):
@@ -38,8 +54,8 @@ def motions_at(mechanism, q):
 
 
 def some_motions(rng, count):
-    """Each coordinate alone, and some mixed ones: together they determine a quadratic form."""
-    mixed = rng.normal(size=(count, count))
+    """Each coordinate alone, and three mixed ones."""
+    mixed = rng.normal(size=(3, count))
     return [*np.eye(count), *(mixed / np.linalg.norm(mixed, axis=1, keepdims=True))]
 
 
@@ -95,7 +111,7 @@ def test_columns_of_angular_velocity_turn_with_each_coordinate(seed):
             assert close(handle.turning[:, :, t], along_motion(joints, q, e, lambda at: at.handle[2]))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_the_closures_bear_is_what_keeps_them_closed(seed):
     """The second derivative along closed loops is that of the opened ones and of the closures' forces on them:
 
@@ -212,33 +228,25 @@ def test_the_base_stands_still_and_a_slide_goes_straight():
 
 
 def with_everything(mechanism, q, rng):
-    """Drives with tables of their ratios, or ones that turn with other joints, one more than there need be."""
+    """Drives with tables of their ratios, or ones that turn with each other's joints, and where there is a loop
+    one more than there need be."""
     drives = mechanism.drives
-    d, n = len(drives.names), len(q)
-    if rng.random() < 0.5:
-        coupling = np.zeros((d, n))
-        for i in range(d):
-            for j in drives.joint:
-                coupling[i, j] = 0.0 if j == drives.joint[i] else rng.uniform(-0.4, 0.4)
-        drives = replace(drives, coupling=coupling)
-    else:
-        tables = [
-            RatioTable(q[j] + np.linspace(-0.4, 0.5, 5), rng.uniform(8.0, 12.0, 5), turns=False)
-            for j in drives.joint
-        ]
-        drives = replace(drives, ratio_tables=tuple(tables))
     passive = [i for i in Joints(mechanism).moving if i not in (*mechanism.driven, *mechanism.free)]
     passive = [i for i in passive if mechanism.links.joint[i] in (REVOLUTE, PRISMATIC)]
     if passive:
         more = {"joint": passive[0], "transmission": 10.0, "motor_inertia": 1e-6, "stiffness": 1.0, "damping": 0.0}
         more |= {"torque_constant": np.nan, "torque_limit": np.inf, "encoder_counts": np.nan}
         grown = {name: np.append(getattr(drives, name), value) for name, value in more.items()}
-        if drives.coupling is not None:
-            grown["coupling"] = np.vstack([drives.coupling, np.zeros(n)])
-        if drives.ratio_tables is not None:
-            grown["ratio_tables"] = (*drives.ratio_tables, None)
-        drives = replace(drives, names=(*drives.names, "more"), surplus=(d,), **grown)
-    return replace(mechanism, drives=drives)
+        drives = replace(drives, names=(*drives.names, "more"), surplus=(len(drives.names),), **grown)
+    if rng.random() < 0.5:
+        coupling = np.zeros((len(drives.names), len(q)))
+        coupling[:, drives.joint] = rng.uniform(-0.4, 0.4, (len(drives.names), len(drives.names)))
+        coupling[np.arange(len(drives.names)), drives.joint] = 0.0
+        return replace(mechanism, drives=replace(drives, coupling=coupling))
+    tables = [
+        RatioTable(q[j] + np.linspace(-0.4, 0.5, 5), rng.uniform(8.0, 12.0, 5), turns=False) for j in drives.joint
+    ]
+    return replace(mechanism, drives=replace(drives, ratio_tables=tuple(tables)))
 
 
 def ratios_at(mechanism, q):
@@ -277,7 +285,7 @@ def counted(mechanism, q, ahead, ratio):
     return counted_posture(mechanism, motions_at(mechanism, q), q, ahead, ratio)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0])
 def test_the_counted_posture_is_the_nearest_to_the_counts(seed):
     """Least squares where there are more drives than coordinates, and how it follows the counts."""
     rng = np.random.default_rng(seed)
