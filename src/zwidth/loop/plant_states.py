@@ -231,8 +231,11 @@ def _loaded_states(
     readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
     pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
     drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lags), np.zeros((n, n)))
-    neutral = _nullity(K - pushes.T @ readings, K, pushes.T @ readings)
-    still = _nullity(np.vstack([K, readings, drag / T]), K, drag / T, readings)
+    # a large plant's fast modes are no free motions, and many powers of ten stiffer than what a load adds
+    fast = squared * T**2 > 1.0 if n > FEW else np.zeros(n, dtype=np.bool_)
+    held, pushed = K - pushes.T @ readings, pushes.T @ readings
+    neutral = _nullity(held @ _slow(held, fast), K[~fast], pushed[~fast])
+    still = _nullity(np.vstack([K, readings, drag / T]) @ _slow(K, fast), K[~fast], drag[~fast] / T, readings)
     states = PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
     return _without_fast(states, form, T) if n > FEW else states
 
@@ -255,6 +258,14 @@ def _without_fast(states: PlantStates, form: FirstOrderForm, period: float) -> P
         unobserved=tuple(pole_name(pole) for pole in unseen if pole.imag >= 0.0),
         sampled=tuple(replace(each, input=left.T @ each.input, reading=each.reading @ right) for each in sampled),
     )
+
+
+def _slow(stiffness: Floats, fast: NDArray[np.bool_]) -> Floats:
+    """Motions (n, s) of the coordinates that are not fast, whom the fast ones follow without a force of their own."""
+    motions = np.eye(len(stiffness))[:, ~fast]
+    if np.any(fast):
+        motions[fast] = -np.linalg.solve(stiffness[np.ix_(fast, fast)], stiffness[np.ix_(fast, ~fast)])
+    return motions
 
 
 def _nullity(matrix: Floats, *parts: Floats) -> int:
