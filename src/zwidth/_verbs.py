@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from zwidth.progress import Progress
     from zwidth.result import Result
     from zwidth.study.experiment_plan import Plan
+    from zwidth.study.load_path import LoadPath
     from zwidth.study.measured_boundary import Experiment
     from zwidth.study.sensitivity_result import Sensitivities
     from zwidth.study.validity import Validity
@@ -66,6 +67,14 @@ def device_sensitivities(device: Device, point: OperatingPoint, progress: Progre
     from zwidth.study.sensitivity import sensitivities
 
     return sensitivities(device, point, progress)
+
+
+def device_load_path(
+    device: Device, push: float, count: int, point: OperatingPoint | None, progress: Progress | None
+) -> LoadPath:
+    from zwidth.study.load_path import load_path
+
+    return load_path(device, push, count, point, progress)
 
 
 def device_report(device: Device, path: Any, point: OperatingPoint) -> dict[str, Any]:

@@ -28,6 +28,7 @@ def test_the_commands_are_those_promised():
         "chart",
         "check",
         "polar",
+        "load",
         "map",
         "sweep",
         "report",

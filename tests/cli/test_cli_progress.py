@@ -132,6 +132,7 @@ def test_bars_leave_a_wait_of_unknown_length_to_the_message_that_explains_it(clo
     ("words", "stage", "steps"),
     [
         (["polar", "five-bar", "--count", "8"], "directions", 8),
+        (["load", "five-bar", "--count", "3"], "pushes", 3),
         (["check", "five-bar", "--stiffness", "100", "--damping", "1"], "walls", 1),
         (["sensitivity", "published-two-mass"], "numbers", 17),
     ],

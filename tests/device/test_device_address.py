@@ -151,7 +151,7 @@ def test_unset_removes_and_what_is_not_there_is_no_fault():
         ("operator.arm_mas_kg=1", "did you mean 'operator.arm_mass_kg'?"),
         ("loop.velocity.sample=1", "did you mean 'loop.velocity.samples'?"),
         ("drives.elbow.coulomb_N=1", "did you mean 'mechanism.drives.elbow.coulomb_Nm'?"),
-        ("links.upper.xyzzy=1", "mechanism.links.upper has: axis, center_of_mass_m,"),
+        ("links.upper.xyzzy=1", "mechanism.links.upper has: axis, beam, center_of_mass_m,"),
         ("links.upper.length_m", "must be PATH=VALUE"),
         ("=3", "must be PATH=VALUE"),
         ("", "must be PATH=VALUE"),

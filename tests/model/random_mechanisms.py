@@ -8,10 +8,10 @@ NumPy.
 from __future__ import annotations
 
 import numpy as np
-from model_cases import NO_CLOSURES, drives_on, random_inertia, random_rotation, rotation_about
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
+from tests.model.model_cases import NO_CLOSURES, drives_on, random_inertia, random_rotation, rotation_about
 from zwidth.model.mechanism import (
     AXIS,
     BALL_X,

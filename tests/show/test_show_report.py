@@ -28,6 +28,7 @@ CASES = {
     "two-mass": ("published-two-mass", []),
     "nothing stable": ("published-two-mass", NO_STABLE_WALL),
     "one mass": ("hapkit-course", []),
+    "under load": ("five-bar", ["load.push_N=-5"]),
 }
 VOID = {"meta", "br", "link", "img", "wbr", "hr"}
 HTML_IN_NAME = "<script>alert('x')</script> & \"quotes\" {{ 7*7 }} --> ü"
@@ -156,6 +157,21 @@ def test_the_numbers_of_what_to_change_is_felt_and_may_be_simplified(report_of):
     assert [name for name in ("felt", "sensitivities", "validity") if f'<figure id="{name}">' in text] == [
         "sensitivities"
     ]
+
+
+def test_a_load_has_a_section_with_its_numbers(report_of):
+    _, found, text = report_of("under load")
+    shown = Page(text).text
+    equilibrium, path = found["equilibrium"], found["load_path"]
+    assert "Under load" in shown
+    assert "Under load" not in Page(report_of("five-bar")[2]).text
+    assert "equilibrium" not in report_of("five-bar")[1]
+    assert f"the hand gives ({equilibrium['hand_force_N'][0]:.4g}, -5) N".replace("-", "−") in shown
+    assert path["push_N"] == [-5.0, -2.5, 0.0, 2.5, 5.0]
+    assert path["stiffness_max_N_per_m"][0] == found["stiffness_max_N_per_m"]
+    assert found["sideways_motions"][0]["growth_rate_1_per_s"] == path["growth_rate_1_per_s"][0]
+    assert found["static_stiffness_limit_N_per_m"] is None  # the impedance at the handle is not known under load
+    assert text.count('<figure id="load">') == 1
 
 
 def test_nothing_stable_has_a_reason_and_nulls(report_of):
@@ -335,6 +351,6 @@ def test_it_prints_on_a4(tmp_path, report):
     printed = pdf.read_bytes()
     assert printed.startswith(b"%PDF")
     pages = len(re.findall(rb"/Type\s*/Page\b", printed))
-    assert 2 <= pages <= 8
+    assert 2 <= pages <= (9 if "equilibrium" in report[1] else 8)
     sizes = re.findall(rb"/MediaBox\s*\[\s*0 0 ([\d.]+) ([\d.]+)\s*\]", printed)
     assert {(round(float(w) / 72 * 25.4), round(float(h) / 72 * 25.4)) for w, h in sizes} == {(210, 297)}

@@ -319,6 +319,11 @@ SETTING = [
         "Assembly elbows-out, full model; sampled every 1.25 ms, no delay, velocity not filtered.",
     ),
     (
+        lambda: facts("five-bar", "load.push_N=-5"),
+        "Assembly elbows-out, full model, under a push of −5 N along the direction; "
+        "sampled every 1.25 ms, no delay, velocity not filtered.",
+    ),
+    (
         lambda: facts("hapkit-course", FILTER),
         "Plant as given; sampled every 1 ms, no delay, "
         "velocity through a Butterworth filter of order 2 at 20 Hz (tustin).",

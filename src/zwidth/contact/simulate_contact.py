@@ -85,7 +85,7 @@ def simulate_contact(
 
     point              the device, and the operator who holds it
     stiffness, damping  of the wall, or of an environment that has them [N/m], [N s/m]; a wall needs a stiffness
-    wall               does it act on both sides of its position?
+    wall               does it act on both sides of its position? Under load, of that from which F/K is left
     no_pull            the one-sided wall, or an environment that can, never pulls the device inwards
     environment        something else to touch: an Environment, a bundled name or "file.py:name"; None: the wall
     parameters         of the environment by name; those left out have its defaults
@@ -128,6 +128,8 @@ def simulate_contact(
     require("point", point, OperatingPoint)
     _check_numbers(wall_position, start_position, start_velocity, duration, seed)
     parameters = parameters or {}
+    if point.load is not None:
+        wall, environment, parameters = _under_load(point, wall, environment, parameters)
     touched, values = environment_with_values(
         _wall_or(environment, wall, has_stiffness=stiffness is not None or "stiffness" in parameters),
         parameters,
@@ -224,6 +226,26 @@ def _check_numbers(
     check_number("duration", 1.0 if duration is None else duration, "s", above=0.0)
     if seed < 0:
         raise ValueError(f"seed must be zero or positive, got {seed}")
+
+
+def _under_load(
+    point: OperatingPoint,
+    wall: WallSides,
+    environment: str | Environment | None,
+    parameters: Mapping[str, float],
+) -> tuple[WallSides, str | Environment | None, Mapping[str, float]]:
+    """The wall under load: the one-sided one is that on which the hand leans; parameters with its load.
+
+    Raises  ContactArgumentError  for anything but a wall, on which no hand leans
+    """
+    if environment is not None:
+        raise ContactArgumentError("environment", "does not go with a load, which the wall holds; leave one out")
+    if wall == "two-sided":
+        return wall, None, parameters
+    load = -point.equilibrium.wall_force
+    if not load:
+        raise ContactArgumentError("wall", "is one-sided, and no hand leans on it; give a load with a force")
+    return "two-sided", ENVIRONMENTS["pressed_wall"], {"load": load, **parameters}
 
 
 def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stiffness: bool) -> str | Environment:

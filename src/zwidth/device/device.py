@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
     from zwidth.progress import Progress
+    from zwidth.study.load_path import LoadPath
     from zwidth.study.sensitivity_result import Sensitivities
 
 
@@ -310,6 +311,24 @@ class Device:
         """
         point = point or self.at()
         return _verbs.device_sensitivities(self, point, progress).about(point)
+
+    def load_path(
+        self,
+        push: float = 5.0,
+        count: int = 9,
+        *,
+        point: OperatingPoint | None = None,
+        progress: Progress | None = None,
+    ) -> LoadPath:
+        """How the chart moves with the hand's push along the rendered direction; see `study.load_path.load_path`.
+
+            device.load_path(push=5.0).stiffness_max
+
+        push   the largest to either side [N], about an axis [N m]
+        count  number of pushes, odd
+        point  where, and under which load otherwise: `device.at(...)`; left out: the reference, and the file's
+        """
+        return _verbs.device_load_path(self, push, count, point, progress)
 
     def report(self, path: str | os.PathLike[str], point: OperatingPoint | None = None) -> dict[str, Any]:
         """Write everything about the device into one HTML file; returns the numbers in it. See `write_report`.

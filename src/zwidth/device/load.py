@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
@@ -25,11 +25,13 @@ from zwidth.device.schema.device_file import DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
-from zwidth.model.arm import Arm
 from zwidth.model.flexible_link import BeamError
 from zwidth.model.load import Load
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
+
+if TYPE_CHECKING:
+    from zwidth.model.arm import Arm
 
 UNNAMED_OPERATOR: Final = "as given"  # an operator without a name
 

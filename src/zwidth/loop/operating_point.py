@@ -22,7 +22,7 @@ from zwidth.loop.point_errors import OperatingPointError, check_several_directio
 from zwidth.loop.point_text import point_text
 from zwidth.loop.posed_device import NO_MODEL, PosedDevice
 from zwidth.model.arm import attach_arm
-from zwidth.model.loaded_plant import LoadedPlants, linearise, set_apart
+from zwidth.model.loaded_plant import LoadedPlants, counting_all, linearise, set_apart
 from zwidth.model.mechanism import Floats
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import attach
@@ -104,7 +104,7 @@ class OperatingPoint(PosedDevice):
         elif held:
             plants = LoadedPlants(self.attach_operator(plants.loaded), self.attach_operator(plants.unloaded))
         if self.load.count_sideways:
-            return replace(plants.loaded, without_load=plants.unloaded)
+            return counting_all(plants)
         return set_apart(plants)
 
     @cached_property

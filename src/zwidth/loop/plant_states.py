@@ -7,8 +7,8 @@ readings belong to the states: the encoder's y, and the force f that a sensor at
 
 where a motion's acceleration is in it. Motions are left out that the force does not move, or that show in neither.
 
-Under load the computer adds forces of its own that it reads off the states (`model.plant.SampledForce`). Slow
-motions are all kept then.
+Under load the computer may add forces of its own that it reads off the states (`model.plant.SampledForce`). Slow
+motions are all kept then, those that the wall does not move among them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 FEW = 12  # coordinates of a plant that is small
-NEUTRAL = 1e-12  # share of the stiffnesses that are summed below which a motion has none
+NEUTRAL = 1e-11  # share of what holds a motion, or of what a load adds, that is rounding
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def plant_states(
     force_filter        of the computer, for what it adds under load
     Returns     no states where the force moves nothing that shows in a reading
     """
-    if plant.is_loaded:
+    if plant.is_loaded or plant.without_load is not None:
         return _loaded_states(plant, period, force_rows, force_filter)
     modes = real_modes(plant)
     # each free motion with damping has a pole at z = 1, for the place where it comes to rest: two share this pole
@@ -180,11 +180,13 @@ def _loaded_states(
     plant: Plant, period: float, force_rows: Floats | None, force_filter: LowPass | None
 ) -> PlantStates:
     """States of a plant under load: amplitudes of its undamped modes, their velocities [m per period], and forces
-    of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a large
-    plant, as links that bend have."""
+    of lagged dampers. What is neutral without load no longer is, and nothing is left out but fast motions of a
+    large plant, as links that bend have."""
     n, T, lags = plant.size, period, plant.lagged_dampers
-    squared, V = undamped_modes(plant.mass, plant.stiffness)
-    K, B = np.diag(squared), V.T @ plant.damping @ V
+    V = np.eye(n)  # a plant on its modes without load keeps what the load adds to the last digit
+    if not np.array_equal(plant.mass, V):
+        V = undamped_modes(plant.mass, plant.stiffness)[1]
+    K, B = V.T @ plant.stiffness @ V, V.T @ plant.damping @ V
     if plant.circulatory is not None:
         K = K + V.T @ plant.circulatory @ V
     size = 2 * n + len(lags)
@@ -231,11 +233,21 @@ def _loaded_states(
     readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
     pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
     drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lags), np.zeros((n, n)))
+<<<<<<< HEAD
     # a large plant's fast modes are no free motions, and many powers of ten stiffer than what a load adds
     fast = squared * T**2 > 1.0 if n > FEW else np.zeros(n, dtype=np.bool_)
     held, pushed = K - pushes.T @ readings, pushes.T @ readings
     neutral = _nullity(held @ _slow(held, fast), K[~fast], pushed[~fast])
     still = _nullity(np.vstack([K, readings, drag / T]) @ _slow(K, fast), K[~fast], drag[~fast] / T, readings)
+=======
+    feedback = pushes.T @ readings
+    # each mode in its own units, so that the stiff ones do not hide the free ones
+    bare = np.diag(K) if plant.without_load is None else np.diag(V.T @ plant.without_load.stiffness @ V)
+    added = max(_largest(K - np.diag(bare)), _largest(feedback), np.finfo(float).tiny)
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(bare), added))
+    neutral = _nullity(scale[:, None] * (K - feedback) * scale)
+    still = _nullity(np.vstack([scale[:, None] * part * scale for part in (K, feedback, drag / T)]))
+>>>>>>> main
     states = PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
     return _without_fast(states, form, T) if n > FEW else states
 
@@ -260,6 +272,7 @@ def _without_fast(states: PlantStates, form: FirstOrderForm, period: float) -> P
     )
 
 
+<<<<<<< HEAD
 def _slow(stiffness: Floats, fast: NDArray[np.bool_]) -> Floats:
     """Motions (n, s) of the coordinates that are not fast, whom the fast ones follow without a force of their own."""
     motions = np.eye(len(stiffness))[:, ~fast]
@@ -271,8 +284,16 @@ def _slow(stiffness: Floats, fast: NDArray[np.bool_]) -> Floats:
 def _nullity(matrix: Floats, *parts: Floats) -> int:
     """Dimension of what a matrix (r, n) maps to 0, to rounding of its parts."""
     scale = max((float(np.max(np.abs(part), initial=0.0)) for part in parts), default=0.0)
+=======
+def _nullity(matrix: Floats) -> int:
+    """Dimension of what a matrix (r, n) with entries of the order of 1 maps to rounding."""
+>>>>>>> main
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL * scale))
+    return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL))
+
+
+def _largest(matrix: Floats) -> float:
+    return float(np.max(np.abs(matrix), initial=0.0))
 
 
 def _growth_rate(decay: float, squared: float) -> float:

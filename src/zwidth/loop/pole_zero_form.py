@@ -70,7 +70,7 @@ def pole_zero_form(
     """
     system, behind = _Balanced.of(form), _Balanced.of(path)
     poles = np.linalg.eigvals(system.E).astype(np.complex128)
-    poles[np.argsort(np.abs(poles))[:zero_poles]] = 0.0
+    poles = _with_exact_zeros(poles, zero_poles)
     zeros, own = behind.zeros(), np.linalg.eigvals(behind.E).astype(np.complex128)
     match = _Match(system, _probes(poles), zero_poles)
     finer = _improved(behind, zeros, SMALL_STEP, own)
@@ -81,6 +81,16 @@ def pole_zero_form(
         steps.append(_improved(system, _off_axis(poles), ANY_STEP, None, MANY_STEPS))
         found = match.best([poles, *steps], [np.append(known_zeros, each) for each in some])
     return _without_common_roots(found[0]), found[1]
+
+
+def _with_exact_zeros(poles: Complexes, count: int) -> Complexes:
+    """Poles with so many of them, the least ones, at 0. Where that takes one of a conjugate pair, the other one is
+    next to 0, too, and real."""
+    order, exact = np.argsort(np.abs(poles)), poles.copy()
+    exact[order[:count]] = 0.0
+    if np.count_nonzero(exact.imag > 0.0) != np.count_nonzero(exact.imag < 0.0):
+        exact[order[count]] = exact[order[count]].real
+    return exact
 
 
 class _Match:
@@ -126,7 +136,8 @@ class _Balanced:
     def of(cls, form: SampledForm) -> _Balanced:
         from scipy.linalg import matrix_balance
 
-        E, (scale, _) = matrix_balance(form.growth, permute=False, separate=True)
+        with np.errstate(invalid="ignore"):  # scales beyond 2^63 are no permutation, for which it takes them, too
+            E, (scale, _) = matrix_balance(form.growth, permute=False, separate=True)
         g, c = form.new / scale, form.output * scale
         return cls(E, g, c)
 

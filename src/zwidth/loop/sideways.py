@@ -3,7 +3,8 @@
 A free device slides along a wall as it likes, neither pushed nor held: its roots stay at z = 1. Under load it is
 pushed: by the hand's force, whose lever arms change, and by the computer's, which turns with the counts a little
 late. With rigid drives the two cancel but for that delay, and one root of each motion moves by the order of
-(1/2 + delay)(w T)^2 from 1; with flexible drives a static part of the order of the load stays.
+(1/2 + delay)(w T)^2 from 1, w^2 being the load's stiffness over the mass. With flexible drives a static stiffness
+stays, of the order of the load's square over theirs, and a growth rate of the order of the load.
 """
 
 from __future__ import annotations
@@ -62,12 +63,13 @@ def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMoti
     plant  the motions that stand apart, with what they are without load. Of the two roots of a coordinate that are
            real, the larger one counts
     """
-    form, _ = close_plant(plant, controller.wall_alone)
+    form, states = close_plant(plant, controller.wall_alone)
     d = np.linalg.eigvals(form.growth)
+    d[np.argsort(np.abs(d))[: states.neutral]] = 0.0  # several at once, rounding makes a slow vibration of them
     # |1 + d|^2 - 1 without cancellation
     excess = 2.0 * d.real + np.abs(d) ** 2
     order = np.argsort(-excess)[: 2 * plant.size]
-    rates = 0.5 * np.log1p(np.maximum(excess[order], -1.0 + 1e-300)) / controller.sampling_period
+    rates = 0.5 * np.log1p(np.maximum(excess[order], np.nextafter(-1.0, 0.0))) / controller.sampling_period
     rates[np.abs(excess[order]) < NEUTRAL] = 0.0
     frequencies = np.abs(np.angle(1.0 + d[order])) / (2.0 * pi * controller.sampling_period)
     vibrates = np.abs(d[order].imag) > 0.0

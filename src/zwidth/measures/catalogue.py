@@ -210,6 +210,34 @@ _MEASURES: Final = (
         "size of the impedance without a wall, docs/felt.md",
         each=True,
     ),
+    # what a load does
+    _measure(
+        "load",
+        "load_change",
+        "Change of the largest stiffness by the load, as a share",
+        "",
+        None,
+        "exact, by D-decomposition with the load and without, docs/equilibrium.md",
+        each=True,
+    ),
+    _measure(
+        "load",
+        "sideways_growth",
+        "Growth rate of the fastest motion along the surface",
+        "1/s",
+        "lower",
+        "roots of the sampled loop under load, docs/equilibrium.md",
+        each=True,
+    ),
+    _measure(
+        "load",
+        "sideways_force",
+        "Force of the hand across the direction that the posture needs",
+        "N",
+        "lower",
+        "balance of thesis eq. 2.4, docs/equilibrium.md",
+        each=True,
+    ),
     # forces, accelerations and steps of its motors and encoders
     _measure("forces", "peak_force", "Peak force", "N", "higher", "J^T f within the drives' torque limits"),
     _measure(

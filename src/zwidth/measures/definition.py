@@ -30,7 +30,8 @@ FAILED: Final = 5
 BEYOND_LIMIT: Final = 6
 NO_EQUILIBRIUM: Final = 7
 MISSING: Final = 255
-UNREACHED: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT, NO_EQUILIBRIUM)
+NO_POSTURE: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT)
+UNREACHED: Final = (*NO_POSTURE, NO_EQUILIBRIUM)
 STATUS: Final = {
     OK: "ok",
     OUT_OF_REACH: "out of reach",
@@ -115,7 +116,7 @@ class MeasureValues(Result):
 
     values  (...)  nan where the status is not OK
     status  (...)  OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT, NO_EQUILIBRIUM, NO_VALUE, UNDECIDED or FAILED
-    notes   reasons of NO_VALUE, UNDECIDED and FAILED
+    notes   reasons of NO_VALUE, UNDECIDED and FAILED, and of NO_EQUILIBRIUM where it shows with the measure alone
     """
 
     values: NDArray[np.float64]

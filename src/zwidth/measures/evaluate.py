@@ -16,6 +16,7 @@ from zwidth.loop.sections import HysteresisError, UnmovedError
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import (
     FAILED,
+    NO_EQUILIBRIUM,
     NO_VALUE,
     OK,
     UNDECIDED,
@@ -27,6 +28,7 @@ from zwidth.measures.definition import (
     WantedWall,
 )
 from zwidth.model.argument_checks import require
+from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
@@ -165,6 +167,8 @@ def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
         raise MeasureError(str(error)) from None
     except NO_VALUE_ERRORS as error:
         return float("nan"), NO_VALUE, str(error)
+    except EquilibriumError as error:
+        return float("nan"), NO_EQUILIBRIUM, str(error)
     except ChartError as error:
         return float("nan"), UNDECIDED, str(error)
     except FAILURES as error:

@@ -161,6 +161,7 @@ class Balance:
         self.gravity = np.zeros(3) if self.compensation == "counterweight" else load.weight
         self.weight, self.weight_change = self.motions.weight(self.gravity)
         self.free_springs = self._free_springs(mechanism.assemblies[posture.assembly])
+        self.heaviest = self._heaviest()
         self.along = screw[:3] if np.any(screw[:3]) else screw[3:]
         self.normal = load.along(screw)
         self.elastic = self.motions.elastic_stiffness()[self.joints :, self.joints :]
@@ -180,6 +181,13 @@ class Balance:
         self.pull = share * (self.weight[:n] + self.weight_change[:n, n:] @ bending)
         self.motion = self.drives.T[:, :n] + self.drives.Z[:, :n, n:] @ bending
         self.to_wrench = self._wrench_of_torques()
+
+    def _heaviest(self) -> Floats:
+        """Generalised forces (n,) of the whole weight at the mechanism's size, to judge a balance by: where it has
+        no lever arm, its own are rounding."""
+        mech = self.motions.mech
+        weight = float(np.linalg.norm(self.gravity) * np.sum(mech.mass[0]))
+        return np.asarray(weight * mech.size[0] / mech.unit[0, len(mech.joint) - self.joints :])
 
     def _free_springs(self, rest: Floats) -> Floats:
         """Torques (c,) of the free joints' own springs."""
@@ -204,9 +212,22 @@ class Balance:
             rows[3:] *= size
         return rows
 
+    def _push_of_torques(self) -> Floats:
+        """(n,)  the hand's push along the rendered direction, or about its axis, by generalised forces on the
+        joints."""
+        wrench = self.to_wrench[:3] if np.any(self.screw[:3]) else self.to_wrench[3:]
+        return np.asarray(-(self.along @ wrench) / float(self.along @ self.along))
+
     def solve(self) -> Equilibrium:
         """The deflections of the flexible drives and the wall's force; where the whole load at once leads
-        nowhere, it is brought on in steps."""
+        nowhere, it is brought on in steps. Raises LoadError, too, for a push that the hand cannot give."""
+        if self.normal is not None and not np.any(self._push_of_torques()):
+            linear = bool(np.any(self.screw[:3]))
+            raise LoadError(
+                f"the hand holds the handle by its {'orientation' if linear else 'position'}, which the drives "
+                f"control, and cannot push {'along a direction' if linear else 'about an axis'}; leave the load "
+                f"out, or render {'an axis' if linear else 'a direction'}"
+            )
         start = np.zeros(len(self.ratio)), 0.0
         found = self._newton(1.0, *start)
         for step in range(1, RAMP + 1) if found is None else ():
@@ -290,10 +311,7 @@ class Balance:
         jacobian[:, :] = (tangent - by_ahead)[F]
         if self.normal is None:
             return off, jacobian
-        along = np.zeros(6)
-        along[:3] = self.along if np.any(self.screw[:3]) else 0.0
-        along[3:] = 0.0 if np.any(self.screw[:3]) else self.along
-        row = -(along @ self.to_wrench) / float(self.along @ self.along)
+        row = self._push_of_torques()
         by_spring = row @ self.motion.T
         s_by_ahead, s_by_force = by_ahead.copy(), unit.copy()
         s_by_ahead[F], s_by_force[F] = tangent[F], 0.0
@@ -361,7 +379,7 @@ class Balance:
         """Raise EquilibriumError where the hand cannot balance a coordinate."""
         left, count = found.unbalanced, self.joints
         scale = max(
-            float(np.max(np.abs(self.weight), initial=0.0)),
+            float(np.max(self.heaviest, initial=0.0)),
             float(np.max(np.abs(self.motion.T) @ np.abs(found.torques), initial=0.0)),
             float(np.max(np.abs(self.free_springs), initial=0.0)),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import inf, isfinite
+from numbers import Real
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -74,7 +75,7 @@ class Load:
         given = [name for name in ("force", "moment", "push") if getattr(self, name) is not None]
         if len(given) > 1:
             raise LoadError(f"{given[1]} is given beside {given[0]}; give one of them")
-        if self.push is not None and not isfinite(self.push):
+        if self.push is not None and not _is_finite(self.push):
             raise LoadError(f"push must be a finite number [N], got {self.push!r}")
         if given and not np.any(getattr(self, given[0])):
             raise LoadError(
@@ -84,7 +85,7 @@ class Load:
         check_choice("hand", self.hand, get_args(HandForce))
         check_choice("posture_of", self.posture_of, get_args(PostureOf))
         check_choice("branch", self.branch, ("forward", "backward"))
-        if self.surface_radius == 0.0 or not (isfinite(self.surface_radius) or self.surface_radius == inf):
+        if self.surface_radius == 0.0 or not (_is_finite(self.surface_radius) or self.surface_radius == inf):
             raise LoadError(f"surface_radius must be a number but 0, or inf [m], got {self.surface_radius!r}")
         if self.settle and self.force is None:
             raise LoadError("settle needs a load, under which the device slides to where it is in balance")
@@ -111,7 +112,7 @@ class Load:
             if vector is not None:
                 parts.append(f"{what} {vector_text(vector)} {unit}")
         if self.push is not None:
-            parts.insert(0, f"a push of {self.push:g} N along the direction")
+            parts.insert(0, along_text(self.push))
         return ", ".join(parts) or "no force"
 
     def along(self, screw: Floats) -> float | None:
@@ -144,11 +145,16 @@ class Load:
         """The same load with a push as strong as the hand's force, along whatever direction is rendered."""
         if self.force is None:
             return self
-        return replace(self, force=None, push=float(np.linalg.norm(self.force)))
+        return replace(self, force=None, push=float(np.linalg.norm(self.force)), settle=False)
 
     def with_gravity(self, gravity: ArrayLike) -> Load:
         """The same load under another gravity."""
         return replace(self, gravity=np.asarray(gravity, dtype=np.float64))
+
+
+def along_text(push: float) -> str:
+    """A push along whatever direction is rendered, in words."""
+    return f"a push of {push:g} N along the direction"
 
 
 def vector_text(values: Floats) -> str:
@@ -158,3 +164,7 @@ def vector_text(values: Floats) -> str:
 
 def _way(linear: bool) -> str:
     return "a direction" if linear else "an axis"
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Real) and isfinite(value)

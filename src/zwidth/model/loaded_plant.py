@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -73,13 +73,13 @@ def linearise(
     seen, k = equilibrium.counted, len(mechanism.driven)
     share = np.asarray(np.linalg.pinv(seen.drives.T[:, :k].T), dtype=np.float64)
     h = seen.motions.handle_along(axis)[:k]
-    symmetric, turning = 0.5 * (K + K.T), 0.5 * (K - K.T)
+    symmetric, turning = _parts(K)
     backward = equilibrium.load.branch == "backward"
     parts = nonlinear_of_drives(drives, h @ seen.seen, links, motors, counted, equilibrium.deflections, backward)
     loaded = replace(
         unloaded,
         stiffness=unloaded.stiffness + symmetric,
-        circulatory=turning if np.any(np.abs(turning) > ROUNDING * np.max(np.abs(K), initial=0.0)) else None,
+        circulatory=turning,
         actuator=(share @ h) @ motors,
         sensor=(h @ seen.seen) @ counted,
         sampled_forces=_sampled_forces(equilibrium, share, motors, counted),
@@ -88,6 +88,12 @@ def linearise(
         ),
     )
     return LoadedPlants(loaded, unloaded)
+
+
+def _parts(K: Floats) -> tuple[Floats, Floats | None]:
+    """The symmetric and the antisymmetric part of a stiffness (n, n); None where the second is rounding."""
+    symmetric, turning = 0.5 * (K + K.T), 0.5 * (K - K.T)
+    return symmetric, turning if np.any(np.abs(turning) > ROUNDING * np.max(np.abs(K), initial=0.0)) else None
 
 
 def _force_left(mechanism: Mechanism, equilibrium: Equilibrium, share: Floats) -> float:
@@ -146,19 +152,71 @@ def _rank_one(change: Floats, motors: Floats, counted: Floats, filtered: bool) -
 def set_apart(plants: LoadedPlants) -> Plant:
     """The loaded plant on the motions that the wall's force moves without load; the others stand apart.
 
-    Without load the two do not know of each other. What couples them is of the order of the load, and moves the
-    poles of either by its square; `Load.count_sideways` keeps it.
+    Without load the two do not know of each other. What couples them is of the order of the load, and moves poles
+    by its square; `Load.count_sideways` keeps it. Motions that are free without load may be held by no more than
+    that themselves, so that those apart have it (`_giving_way`).
     """
     moved, still = moved_motions(plants.unloaded)
-    if not still.shape[1]:
-        return replace(plants.loaded, without_load=plants.unloaded)
-    both = replace(plants.loaded, without_load=plants.unloaded)
-    return replace(both.on_motions(moved), apart=both.on_motions(still))
+    if not len(still.squared):
+        return _on(plants, moved)
+    return replace(_on(plants, moved), apart=_giving_way(_on(plants, still), plants, moved, still.shapes))
 
 
-def moved_motions(plant: Plant) -> tuple[Floats, Floats]:
-    """Mass-normalised motions (n, m) that a force at the actuator moves and the sensor reads, and the others: the
-    least subspaces that mass, stiffness and damping keep apart."""
+def _giving_way(apart: Plant, plants: LoadedPlants, moved: ModalMotions, still: Floats) -> Plant:
+    """The motions apart with the stiffness that they have where springs give way to them and a stiff wall holds
+    the reading:
+
+        K_ss - [K_sm 0] [K_mm a_m; c_m^T 0]^-1 [K_ms; 0]      K with what the computer adds, actuator a, sensor c
+
+    The second part is of the order of the load's square over the drives' stiffness. So is all that is left of the
+    first where the links' half and the computer's cancel.
+    """
+    loaded, held = plants.loaded, moved.squared != 0.0
+    if not held.any():
+        return apart
+    free = moved.shapes[:, ~held]
+    along = free @ (free.T @ loaded.actuator)  # of free motions the one that the wall's force starts
+    ways = np.column_stack([moved.shapes[:, held], along])
+    added = loaded.stiffness - plants.unloaded.stiffness
+    added = added - sum(np.outer(force.along, force.reading) for force in loaded.sampled_forces)
+    if loaded.circulatory is not None:
+        added = added + loaded.circulatory
+    K = np.diag(np.append(moved.squared[held], 0.0)) + ways.T @ added @ ways
+    bordered = np.block([[K, (loaded.actuator @ ways)[:, None]], [loaded.sensor @ ways, 0.0]])
+    pushed = np.vstack([ways.T @ added @ still, np.zeros((1, still.shape[1]))])
+    change = -(still.T @ added @ ways @ np.linalg.lstsq(bordered, pushed, rcond=None)[0][:-1])
+    if apart.circulatory is not None:
+        change = change + apart.circulatory
+    symmetric, turning = _parts(change)
+    return replace(apart, stiffness=apart.stiffness + symmetric, circulatory=turning)
+
+
+def counting_all(plants: LoadedPlants) -> Plant:
+    """The loaded plant on all its modes without load, those that no wall moves among them."""
+    squared, V = undamped_modes(plants.unloaded.mass, plants.unloaded.stiffness)
+    return _on(plants, ModalMotions(V, squared))
+
+
+def _on(plants: LoadedPlants, motions: ModalMotions) -> Plant:
+    """The loaded plant on some modes of the unloaded one. Their own mass and stiffness are exact: of a free motion
+    the stiffness is 0, so that what the load adds keeps its digits."""
+    Z = motions.shapes
+    added = Z.T @ (plants.loaded.stiffness - plants.unloaded.stiffness) @ Z
+    own, mass = np.diag(motions.squared), np.eye(len(motions.squared))
+    bare = replace(plants.unloaded.on_motions(Z), mass=mass, stiffness=own)
+    return replace(plants.loaded.on_motions(Z), mass=mass, stiffness=own + added, without_load=bare)
+
+
+class ModalMotions(NamedTuple):
+    """Mass-normalised motions: shapes (n, m), each within one natural frequency, and its square (m,) [1/s^2]."""
+
+    shapes: Floats
+    squared: Floats
+
+
+def moved_motions(plant: Plant) -> tuple[ModalMotions, ModalMotions]:
+    """The motions that a force at the actuator moves, and the others: the least subspaces that mass, stiffness and
+    damping keep apart. Both are sums of what they have at each natural frequency."""
     squared, V = undamped_modes(plant.mass, plant.stiffness)
     drag = V.T @ plant.damping @ V
     for damper in plant.lagged_dampers:
@@ -169,14 +227,14 @@ def moved_motions(plant: Plant) -> tuple[Floats, Floats]:
     pushed = pushed / np.linalg.norm(pushed)
     moved = np.zeros((plant.size, 0))
     while True:
-        reached, found = np.hstack([pushed, drag @ moved]), [np.zeros((plant.size, 0))]
+        reached = np.hstack([pushed, drag @ moved])
+        turned, moves = np.zeros_like(V), np.zeros(plant.size, dtype=bool)
         for group in groups:
             left, size, _ = np.linalg.svd(reached[group])
-            own = left[:, : np.count_nonzero(size > MOVED)]
-            found.append(np.zeros((plant.size, own.shape[1])))
-            found[-1][group] = own
-        count, moved = moved.shape[1], np.hstack(found)
-        if moved.shape[1] == count:
+            turned[np.ix_(group, group)] = left
+            moves[group] = np.arange(len(group)) < np.count_nonzero(size > MOVED)
+        if np.count_nonzero(moves) == moved.shape[1]:
             break
-    left = np.linalg.svd(moved)[0]
-    return np.asarray(V @ moved), np.asarray(V @ left[:, moved.shape[1] :])
+        moved = turned[:, moves]
+    shapes = V @ turned
+    return ModalMotions(shapes[:, moves], squared[moves]), ModalMotions(shapes[:, ~moves], squared[~moves])

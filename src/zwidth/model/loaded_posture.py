@@ -63,6 +63,8 @@ def loaded_postures(
             continue
         for name in ("position", "angles", "mass_matrix", "jacobian", "angular_jacobian"):
             getattr(changed, name)[index] = getattr(one, name)
+        if changed.rotation is not None and one.rotation is not None:
+            changed.rotation[index] = one.rotation
     return changed
 
 
@@ -138,9 +140,7 @@ def _settled(
     k, u, force, start = len(mechanism.driven), screw[:3], load.force, at
     motions = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
     reached = motions[0][:, motions[1] > 1e-9 * motions[1][0]]
-    across = np.linalg.svd(np.column_stack([u, reached]), full_matrices=False)[0]
-    across = across - np.outer(u, u @ across)
-    across = np.linalg.svd(across, full_matrices=False)[0][:, : reached.shape[1] - 1]
+    across = reached @ np.linalg.svd((u @ reached)[None])[2][1:].T  # the ways along the surface
     size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
 
     def off(there: Posture) -> Floats:
@@ -164,9 +164,7 @@ def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balanc
 
     def off(there: Posture) -> Floats:
         own = balance(there)
-        scale = max(
-            float(np.max(np.abs(own.weight), initial=0.0)), float(np.max(np.abs(own.free_springs), initial=0.0))
-        )
+        scale = max(float(np.max(own.heaviest[k:])), float(np.max(np.abs(own.free_springs))))
         return np.asarray(own.solve().unbalanced[k:] / (scale or 1.0))
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:

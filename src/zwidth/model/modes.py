@@ -83,8 +83,8 @@ def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
 
 
 def _stiffness_and_rounding(stiffness: Floats, motions: Floats, fastest: float) -> tuple[Floats, Floats]:
-    """v^T K v (k,) of mass-normalised motions (n, k), and what of it may be rounding: of the terms that it is summed
-    from, and of what is left in it of the fastest mode."""
+    """v^T K v (k,) of mass-normalised motions (n, k), and what of it may be rounding: of the terms that it is a
+    sum of, and of what is left in it of the fastest mode."""
     own = np.einsum("ik,ik->k", motions, stiffness @ motions)
     terms = np.einsum("ik,ik->k", np.abs(motions), np.abs(stiffness) @ np.abs(motions))
     return own, np.maximum(RIGID * terms, SMALLEST * fastest)

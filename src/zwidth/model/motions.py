@@ -132,8 +132,8 @@ class Motions:
         return self._at(self._links, link, local).in_coordinates(self.rates, self.rates_2)
 
     def _at(self, links: Mapping[int, Motion], link: int, local: Floats, fixed_at: Floats | None = None) -> Motion:
-        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to the station next to it, or
-        to another place, as what slides in a guide is to the guide's."""
+        """A point (3,) of a link's frame in all coordinates: of a flexible link fixed to the station next to it,
+        or to another place, as what slides in a guide is to the guide's."""
         if link < 0:
             return links[-1].at(local)
         R, own = self.rotation[link], links[link]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
 
+from zwidth.show.moment_units import spoken_unit
 from zwidth.show.output import printable
 from zwidth.show.units import as_written, typed
 
 if TYPE_CHECKING:
     from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+    from zwidth.model.load import Load
 
 AS_GIVEN: Final = "as given"  # a plant that no model reduces; an operator that the device file describes
 
@@ -20,11 +22,14 @@ def operator_text(name: str) -> str:
     return "the operator of the file" if name == AS_GIVEN else printable(name)
 
 
-def load_text(table: Mapping[str, Any]) -> str:
-    """A [load] in words."""
-    from zwidth.device.load_choice import load_of_table
+def load_text(load: Load) -> str:
+    """A load in words, in the units of what is rendered."""
+    from zwidth.model.load import along_text
 
-    return load_of_table(dict(table)).text
+    text = load.text
+    if load.push is None or spoken_unit("N") == "N":
+        return text
+    return text.replace(along_text(load.push), f"a moment of {load.push:g} {spoken_unit('N')} about the axis")
 
 
 def omission_text(left_out: Sequence[str]) -> str:

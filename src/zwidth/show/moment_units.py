@@ -27,18 +27,23 @@ ENDINGS: Final = (
 )
 KEPT: Final = re.compile(r"[xyz]_m|plane_through_m|characteristic_length_m")
 """Keys that are lengths whatever is rendered."""
+OF_SPACE: Final = {"equilibrium": frozenset({"hand_force_N", "position_m", "counted_position_m"})}
+"""Table -> those of its keys that keep their units: forces and places in space, whatever is rendered."""
 
 _moments: ContextVar[bool] = ContextVar("moments", default=False)
 
 
-def keys_of_moments(value: Any) -> Any:
+def keys_of_moments(value: Any, table: str = "") -> Any:
     """A document, or columns, with the keys of moments about an axis.
+
+    table  the key under which it stands
 
     >>> keys_of_moments({"stiffness_max_N_per_m": 2.0, "x_m": [0.1], "inner": [{"rigid_mass_kg": 1.0}]})
     {'stiffness_max_Nm_per_rad': 2.0, 'x_m': [0.1], 'inner': [{'rigid_mass_kg_m2': 1.0}]}
     """
     if isinstance(value, Mapping):
-        return {_key(key): keys_of_moments(inner) for key, inner in value.items()}
+        kept = OF_SPACE.get(table, frozenset())
+        return {(key if key in kept else _key(key)): keys_of_moments(inner, key) for key, inner in value.items()}
     return [keys_of_moments(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 

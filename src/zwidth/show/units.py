@@ -143,6 +143,11 @@ def quantity(value: float, unit: str) -> str:
     return f"{number(rounded / 10.0**exponent)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
 
 
+def seconds(time: float) -> str:
+    """A time without a prefix: 8200 s, and no 8.2 ks."""
+    return quantity(time, "s") if time < 1e3 else f"{number(time)}{SPACE}s"
+
+
 def as_written(value: float, unit: str = "") -> str:
     """A number that somebody chose, as short as it was written: 1.25 ms, 0.03 kg.
 

@@ -1,6 +1,8 @@
 from .common_area import common_area as common_area
 from .experiment import measure_boundary as measure_boundary
 from .experiment_plan import Plan as Plan
+from .load_path import LoadPath as LoadPath
+from .load_path import load_path as load_path
 from .map import workspace_map as workspace_map
 from .map_data import map_document as map_document
 from .map_data import map_table as map_table

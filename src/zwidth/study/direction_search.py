@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -59,7 +59,9 @@ class DirectionSearch:
 
 def direction_searches(measure: Measure, point: OperatingPoint) -> Iterator[tuple[Ints, DirectionSearch]]:
     """For each number of dimensions in which the handle can move: the indices of the points that are OK, and their
-    `DirectionSearch`."""
+    `DirectionSearch`. Under load the hand pushes as hard along each direction."""
+    if point.load is not None:
+        point = replace(point, load=point.load.along_every_direction)
     ok = np.flatnonzero(point.status == OK)
     if not len(ok):
         return

@@ -37,6 +37,7 @@ from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.unsupported_feedback import refuse_load
 from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator, attach
 from zwidth.progress import Progress
@@ -80,6 +81,8 @@ def measure_boundary(
     require("point", point, OperatingPoint)
     plan = plan or Plan()
     loop = point.contact_loop
+    if plan.one_sided:
+        refuse_load(loop.plant, "a boundary of one-sided walls is not measured", "measure two-sided ones")
     operator = None if loop.plant.handle is None else point.operator
     journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
     result = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
@@ -175,14 +178,17 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
 
 def _varied(operator: Operator, random: np.random.Generator, spread: float) -> Operator:
     """The operator with each number times its own log-normal factor exp(spread n)."""
-    factors = np.exp(spread * random.standard_normal(len(fields(operator)))).tolist()
-    preset = {field.name: getattr(operator, field.name) for field in fields(operator)}
-    varied = {
-        name: value * factor
-        for (name, value), factor in zip(preset.items(), factors, strict=True)
-        if value is not None
-    }
-    return replace(operator, **varied)
+    names = [field.name for field in fields(operator) if field.name != "directions"]
+    numbers = {name: getattr(operator, name) for name in names}
+    factors = np.exp(spread * random.standard_normal(len(numbers))).tolist()
+    return replace(
+        operator,
+        **{
+            name: value * factor
+            for (name, value), factor in zip(numbers.items(), factors, strict=True)
+            if value is not None
+        },
+    )
 
 
 def _stability_trial(

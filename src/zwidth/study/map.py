@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.definition import STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
+from zwidth.measures.definition import NO_POSTURE, STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.argument_checks import require
 from zwidth.processors import Processor
@@ -211,6 +211,8 @@ def map_job(
                     raise error.with_name(one.name) from None
     else:
         device.direction(direction)  # raises what is wrong with it
+    if isinstance(direction, str) and device.load is not None:
+        device = device.under(device.load.along_every_direction)
     if not isinstance(direction, str) and device.renders_moments(direction):
         requested_measures = tuple(one.about_moments() for one in requested_measures)
     plane = plane or plane_of(device, assembly=assembly)
@@ -287,7 +289,7 @@ def _sentence(note: Note, plane: PlaneGrid) -> str:
 
 
 def _check_reached(job: MapJob, cells: CellValues) -> None:
-    if not np.isin(cells.status, UNREACHED).all():
+    if not np.isin(cells.status, NO_POSTURE).all():
         return
     mechanism = job.device.mechanism
     assert mechanism is not None
@@ -314,6 +316,7 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "assembly": job.assembly or device.reference_assembly or "",
         "model": job.model or "full",
         "operator": device.operator_name or "none",
+        **({} if device.load is None else {"load": device.load.text}),
         "direction": rendered,
         "plane": "".join(plane.names),
         "plane_axes": [*plane.first.tolist(), *plane.second.tolist()],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device.device import Device
-from zwidth.measures.definition import OK, STATUS
+from zwidth.measures.definition import NO_EQUILIBRIUM, OK, STATUS
 from zwidth.study.map import measures_of
 from zwidth.study.workspace_summary import over_the_workspace, positions
 
@@ -67,6 +67,10 @@ def why_no_cell(dataset: xr.Dataset) -> str | None:
     if any((dataset[f"{name}_status"].values == OK).any() for name in names):
         return None
     notes = [note for name in names for note in _notes(dataset, name)]
+    if not notes and any((dataset[f"{name}_status"].values == NO_EQUILIBRIUM).any() for name in names):
+        return (
+            f"no cell has a value: in none that is reached is there an equilibrium under {dataset.attrs['load']}"
+        )
     return "no cell has a value" + (f": {notes[0]}" if notes else "")
 
 

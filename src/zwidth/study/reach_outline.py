@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH, SINGULAR, UNREACHED
+from zwidth.measures.definition import BEYOND_LIMIT, NO_POSTURE, OUT_OF_REACH, SINGULAR
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.reach_shells import shells
@@ -82,7 +82,7 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
     at the true edge, not at the last cell.
     """
     known = np.array(values, dtype=np.float64)
-    beyond = np.isin(status, UNREACHED)
+    beyond = np.isin(status, NO_POSTURE)
     finite = known[np.isfinite(known)]
     if not len(finite):
         return known

@@ -159,5 +159,6 @@ def _attributes(sweep: Sweep) -> dict[str, Any]:
         "study": json.dumps(sweep.study.document),
         "device_file": json.dumps(device.document),
         "operator": device.operator_name or "none",
+        **({} if device.load is None else {"load": device.load.text}),
         "zwidth": __version__,
     }

@@ -24,6 +24,7 @@ from zwidth.measures.definition import (
     BEYOND_LIMIT,
     FAILED,
     MISSING,
+    NO_EQUILIBRIUM,
     NO_VALUE,
     OK,
     OUT_OF_REACH,
@@ -37,6 +38,8 @@ from zwidth.measures.definition import (
     WantedWalls,
 )
 from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
+from zwidth.model.equilibrium import EquilibriumError
+from zwidth.model.load import LoadError
 from zwidth.model.posture import BeyondLimit, OutOfReach, PostureError, Singular
 from zwidth.study.column import Column
 from zwidth.study.design_groups import DesignColumn, DesignGroup, DesignGrouping
@@ -171,7 +174,7 @@ class SweepJob:
                     missed = group.rows[piece][group.valid[piece]]
                     yield from ((int(row), column, (np.nan, status, "")) for row in missed for column in columns)
                     continue
-                except (PostureError, DeviceError):
+                except (PostureError, LoadError, DeviceError):
                     continue  # each design alone says why
                 same = not group.batch.differs and (over_workspace or group.positions is None)
                 decided = group.valid[piece] & ~alone
@@ -306,9 +309,9 @@ class Design:
         try:
             device = self.job.device(self.settings)
             assembly = self._circumstance("assembly")
-            # what changes the computer or the operator alone leaves the posture as it is
+            # what changes the computer or the operator alone leaves the posture as it is, but for a load
             same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.settings)
-            kept, solved = self.job._cache.get(name, (None, None))
+            kept, solved = self.job._cache.get(name, (None, None)) if device.load is None else (None, None)
             if kept == same and isinstance(solved, _NoPoint):
                 raise solved
             point = device.at(
@@ -321,6 +324,8 @@ class Design:
                 if point.posture is not None and not masses_moved(point.posture).all():
                     from_document(device.document, device.label)  # says what is wrong
                 self.job._cache[name] = same, point.posture
+        except EquilibriumError as error:
+            raise _NoPoint(NO_EQUILIBRIUM, str(error)) from error
         except (OutOfReach, Singular, BeyondLimit) as error:
             none = _NoPoint(_status_of(error))
             self.job._cache[name] = same, none

@@ -11,6 +11,7 @@ from zwidth.contact.environments.grating import grating
 from zwidth.contact.environments.hunt_crossley import hunt_crossley
 from zwidth.contact.environments.nonlinear_wall import nonlinear_wall
 from zwidth.contact.environments.one_sided_wall import one_sided_wall
+from zwidth.contact.environments.pressed_wall import pressed_wall
 from zwidth.contact.environments.slot import slot
 from zwidth.contact.environments.texture import texture
 from zwidth.contact.environments.virtual_mass import virtual_mass
@@ -21,6 +22,7 @@ ENVIRONMENTS: Final[dict[str, Environment]] = {
     for each in (
         wall,
         one_sided_wall,
+        pressed_wall,
         slot,
         nonlinear_wall,
         hunt_crossley,
@@ -40,6 +42,7 @@ __all__ = [
     "hunt_crossley",
     "nonlinear_wall",
     "one_sided_wall",
+    "pressed_wall",
     "slot",
     "texture",
     "virtual_mass",

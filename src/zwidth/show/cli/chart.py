@@ -12,7 +12,7 @@ from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Numbers
-from zwidth.show.units import amount, percent, radius, typed, vector
+from zwidth.show.units import amount, percent, radius, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,8 +29,6 @@ OPEN_EDGE: Final = (
     "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
     "sampling rate"
 )
-
-ACROSS: Final = 1e-9  # share of the hand's force across the direction that is rounding
 
 Window = tuple[float, float, float, float]
 
@@ -138,21 +136,14 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
 def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
     """Rows on the equilibrium of a device under load."""
     from zwidth.chart.chart import StabilityChart
+    from zwidth.show.load_text import balance_rows
 
     point = chart.operating_point
     if point is None or point.load is None or not isinstance(chart, StabilityChart):
         return
-    found = point.equilibrium
-    forces = f"wall {amount(found.wall_force, 'N')}, hand {vector(found.hand_force, 'N')}"
-    across = found.sideways_force
-    if (across**2).sum() > ACROSS**2 * (found.hand_force**2).sum():
-        forces += f", of which {vector(across, 'N')} across the direction, which this posture needs"
-    yield "balance", forces
-    if found.load.pushes and chart.stiffness_max > 0.0:
-        valid = amount(found.one_sided_amplitude(chart.stiffness_max), "m")
-        yield "one-sided wall", f"as charted while the amplitude stays below F/K, {valid} at the largest stiffness"
+    yield from balance_rows(point, chart.stiffness_max)
     if (other := chart.other_branch) is not None:
-        names = ", ".join(point.drives.names[i] for i in found.kinked)
+        names = ", ".join(point.drives.names[i] for i in point.equilibrium.kinked)
         yield (
             "on the other branch",
             f"largest stiffness {_stiffest(other)} (of {names}, without torque, whose stiffness changes there; a "

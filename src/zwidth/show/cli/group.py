@@ -22,6 +22,7 @@ COMMANDS: Final = {
     "chart": ("chart", "ChartCommand"),
     "check": ("check", "CheckCommand"),
     "polar": ("polar", "PolarCommand"),
+    "load": ("load", "LoadCommand"),
     "map": ("map", "MapCommand"),
     "sweep": ("sweep", "SweepCommand"),
     "report": ("report", "ReportCommand"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from zwidth.show.circumstances import computer_text, omission_text, operator_text
+from zwidth.show.circumstances import computer_text, load_text, omission_text, operator_text
 from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import printable
 from zwidth.show.units import amount, typed, vector, way
@@ -32,7 +32,7 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
                 where += f" ({amount(facts['projected_m'], 'm')} from the requested position)"
         place = f"{where}, assembly {facts['assembly']}, {place}"
     held = f", held by {operator_text(facts['operator'])}" if facts["operator"] else ""
-    held += "" if device.load is None else f", under {device.load.text}"
+    held += "" if device.load is None else f", under {load_text(device.load)}"
     lines = [f"{printable(device.name)}: {place}{held}", computer_text(device.controller)]
     return "\n".join(lines + ([omission(device)] if linear and device.linear_omissions else []))
 

@@ -296,11 +296,13 @@ def _plane_option(name: str, value: str | None) -> str:
 
 
 def _plane(case: CommandLine) -> PlaneGrid:
+    from zwidth.model.equilibrium import EquilibriumError
     from zwidth.model.posture import PostureError
     from zwidth.study.plane_grid import plane_of
 
     device, assembly = case.device, case.question.assembly
-    with suppress(PostureError):  # an assembly that does not reach the reference position may reach others
+    # an assembly that does not reach the reference position, or holds nothing there, may reach and hold others
+    with suppress(PostureError, EquilibriumError):
         device.at(assembly=assembly)  # raises what is wrong with its name
     ranges = case["x_range"], case["y_range"]
     return plane_of(device, case["plane"], case["through"], *ranges, case["cells"], assembly)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from zwidth.measures.definition import OK, STATUS
-from zwidth.show.circumstances import computer_text
+from zwidth.show.circumstances import computer_text, load_text
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.heading import omission
 from zwidth.show.output import printable
@@ -52,6 +52,7 @@ def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
         plane += f" along {vector(about['plane_axes'][:3])} and {vector(about['plane_axes'][3:])}"
     plane += f" through {vector(about['plane_through_m'], 'm')}"
     held = f", held by {printable(about['operator'])}" if about["operator"] != "none" else ""
+    held += "" if device.load is None else f", under {load_text(device.load)}"
     which = f"{way + ', ' if along else ''}assembly {about['assembly']}, model {about['model']}{held}"
     lines = [f"{printable(device.name)}: {plane}, {which}", computer_text(device.controller)]
     linear = any(dataset[name].attrs["linear"] for name in names)

@@ -54,7 +54,10 @@ class ShowCommand(Command):
 
         unknown = unknown_numbers(case.device.document)
         missing = [{"path": path, "needed_for": one.needed_for} for one in unknown for path in one.paths]
-        return result.document() | {"missing": missing, "sources": case.device.sources}
+        own = result.document() | {"missing": missing, "sources": case.device.sources}
+        if case.device.load is not None:
+            own["equilibrium"] = case.point.equilibrium.document(case.point.drives.names)
+        return own
 
     def table(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> dict[str, list[Any]]:
         from zwidth.measures.description import entries
@@ -65,6 +68,10 @@ class ShowCommand(Command):
         values = json_value(document)
         if result.effective is not None:
             yield two_columns(_felt(values))
+        if case.device.load is not None:
+            from zwidth.show.load_text import balance_rows, drive_rows
+
+            yield two_columns([*balance_rows(case.point), *drive_rows(case.point)])
         if case.device.mechanism is not None:
             with speaking_of_moments(False):  # the mechanism's own lengths are none of the rendered axis
                 yield from _mechanism_pages(case.device.mechanism, result, values)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.circumstances import load_text
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
@@ -89,6 +90,7 @@ class SweepCommand(Command):
             "device": device.label,
             "study": case.question.name,
             "operator": device.operator_name,
+            **({} if device.load is None else {"load": device.document["load"]}),
             "sampling_period_s": device.controller.sampling_period,
             "left_out": list(device.linear_omissions),
         }
@@ -126,7 +128,9 @@ class SweepCommand(Command):
         shape = str(count) if sampling.kind != "grid" else " x ".join(map(str, sampling.shape))
         over = f"{shape} design{'s' * (count != 1)}"
         axes = ", ".join(axis.key for axis in sampling.axes)
-        yield f"{printable(document['name'])}: {over} over {axes}"
+        load, varied = case.device.load, any(axis.key.startswith("load.") for axis in sampling.axes)
+        under = "" if load is None or varied else f", under {load_text(load)}"
+        yield f"{printable(document['name'])}: {over} over {axes}{under}"
         if document["left_out"]:
             yield f"linear: leaves out {', '.join(document['left_out'])}"
         if result.study.document.get("optimise"):

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-from zwidth.device.load_choice import table_of_load
+from zwidth.device.load_choice import load_of_table, table_of_load
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.show.circumstances import AS_GIVEN, computer_text, load_text, omission_text, operator_text
 from zwidth.show.figures.style import FAMILY, context, wrapped
@@ -100,7 +100,7 @@ def caption_of_result(result: Any) -> list[str]:
 def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
     """Facts of an operating point for a caption; without position and direction where there are many."""
     facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": at.linear_omissions if linear else ()}
-    if at.model != "motor-mass" and at.operator is not None:
+    if at.model != "motor-mass" and (at.operator is not None or at.arm is not None):
         facts["operator"] = at.operator_name or AS_GIVEN
     if at.load is not None:
         facts["load"] = table_of_load(at.load)
@@ -127,6 +127,8 @@ def facts_of_study(study: Any) -> dict[str, Any]:
         facts["assembly"] = study.assembly or device.reference_assembly
         facts["direction"] = device.direction(study.direction)
         facts["position_m"] = None if isinstance(study.at, Mapping) else device.position(study.at)
+    if device.load is not None and not any(key.startswith("load.") for key in keys):
+        facts["load"] = table_of_load(device.load)
     varied_facts = {"at": "position_m"}
     fixed = {key: value for key, value in facts.items() if key not in {varied_facts.get(k, k) for k in keys}}
     return fixed | {"varied": keys, "left_out": device.linear_omissions}
@@ -164,7 +166,7 @@ def _place(facts: Mapping[str, Any]) -> Iterator[str]:
     if facts.get("operator") not in (None, "none"):
         yield f"held by {operator_text(facts['operator'])}"
     if facts.get("load"):
-        yield f"under {load_text(facts['load'])}"
+        yield f"under {load_text(load_of_table(dict(facts['load'])))}"
     yield _environment(facts)
 
 

@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import BEYOND_LIMIT, FAILED, NO_VALUE, SINGULAR, UNDECIDED
+from zwidth.measures.definition import BEYOND_LIMIT, FAILED, NO_EQUILIBRIUM, NO_VALUE, SINGULAR, UNDECIDED
 from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
 from zwidth.show.figures.mechanism import drawn_links, joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
@@ -33,6 +33,7 @@ ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links
 MARKS: Final = {
     SINGULAR: ("singular", "xxxx"),
     BEYOND_LIMIT: ("beyond a joint limit", "----"),
+    NO_EQUILIBRIUM: ("no equilibrium", "||||"),
     NO_VALUE: ("no value", "////"),
     UNDECIDED: ("undecided", "...."),
     FAILED: ("failed", "\\\\\\\\"),
@@ -240,11 +241,12 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism
     """Strokes of the links, the joints and the handle in the reference posture, on the plane; None for none."""
     if device is None or device.mechanism is None:
         return None
+    from zwidth.model.equilibrium import EquilibriumError
     from zwidth.model.posture import PostureError, link_points
 
     try:
         posture = device.at(assembly=str(dataset.attrs["assembly"]) or None).posture
-    except PostureError:
+    except (PostureError, EquilibriumError):
         return None
     mechanism = device.mechanism
     assert posture is not None

@@ -88,6 +88,13 @@ def _polar(ax: Axes, by_direction: Any) -> None:
     )
 
 
+def _load_path(ax: Axes, path: Any) -> None:
+    """The outlines; `zwidth load --output` draws stiffness and growth beside them."""
+    from zwidth.show.figures.load_path import draw_outlines
+
+    draw_outlines(ax, path)
+
+
 def _bounds(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.bounds import draw_bounds
 
@@ -241,6 +248,7 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "RobustChart": _robust,
     "RobustStudy": _robust_study,
     "ByDirection": _polar,
+    "LoadPath": _load_path,
     "BoundsComparison": _bounds,
     "Guarantees": _guarantees,
     "Sensitivities": _sensitivities,

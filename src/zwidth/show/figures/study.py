@@ -16,7 +16,16 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import AutoLocator, MaxNLocator
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import BEYOND_LIMIT, FAILED, NO_VALUE, OUT_OF_REACH, SINGULAR, STATUS, UNDECIDED
+from zwidth.measures.definition import (
+    BEYOND_LIMIT,
+    FAILED,
+    NO_EQUILIBRIUM,
+    NO_VALUE,
+    OUT_OF_REACH,
+    SINGULAR,
+    STATUS,
+    UNDECIDED,
+)
 from zwidth.show.figures.colour_bands import bands_of, colour_bar
 from zwidth.show.figures.map import MARKS
 from zwidth.show.figures.parallel_coordinates import draw_parallel
@@ -28,7 +37,15 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-SYMBOLS: Final = {OUT_OF_REACH: "x", SINGULAR: "+", BEYOND_LIMIT: "_", NO_VALUE: "o", UNDECIDED: "d", FAILED: "v"}
+SYMBOLS: Final = {
+    OUT_OF_REACH: "x",
+    SINGULAR: "+",
+    BEYOND_LIMIT: "_",
+    NO_EQUILIBRIUM: "s",
+    NO_VALUE: "o",
+    UNDECIDED: "d",
+    FAILED: "v",
+}
 SAME: Final = 1e-9  # share by which the values of a constant column differ
 MOST_PANELS: Final = 12
 POINTS: Final = ("o", "s", "^", "D", "v", "P")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.edge_by_eigenvalues import ChartError
@@ -18,10 +19,13 @@ from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
+from zwidth.study.load_path import PUSH, LoadPath, load_path
 from zwidth.study.sensitivity import sensitivities
 from zwidth.study.sensitivity_result import Sensitivities
 from zwidth.study.validity import Validity, validity
 from zwidth.study.what_if import BASE, Variant, find_variant, what_if
+
+PUSHES: Final = 5  # charts along the path of pushes
 
 
 @dataclass(frozen=True)
@@ -105,8 +109,19 @@ class Facts:
             return None
 
     @cached_property
+    def load_path(self) -> LoadPath | None:
+        """Charts under pushes as large as the hand's, or of 5 N, to both sides; None of a device without load."""
+        if self.point.load is None:
+            return None
+        push = self.point.load.along(self.point.equilibrium.screw)
+        return load_path(self.device, PUSH if push is None else abs(push), PUSHES, self.point)
+
+    @cached_property
     def felt(self) -> FeltChart | None:
-        """The chart at the static stiffness at the handle; None without a handle."""
+        """The chart at the static stiffness at the handle; None without a handle, and under load, where the
+        impedance at the handle is not known."""
+        if self.point.load is not None:
+            return None
         alone = self.point.ungripped_plant
         return None if alone.handle is None else felt_chart(self.chart, alone)
 

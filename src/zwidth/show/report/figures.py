@@ -10,10 +10,11 @@ from matplotlib.axes import Axes
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.measures.felt_chart import FeltChart
-from zwidth.show.figures.caption import caption_of_facts, facts_of_point, write_caption
+from zwidth.show.figures.caption import caption_of_facts, caption_of_result, facts_of_point, write_caption
 from zwidth.show.figures.decay import draw_decay_contours
 from zwidth.show.figures.felt import draw_felt_chart
 from zwidth.show.figures.frequency import draw_frequency
+from zwidth.show.figures.load_path import load_path_figure
 from zwidth.show.figures.mechanism import draw_mechanism
 from zwidth.show.figures.plant import as_chain, draw_chain
 from zwidth.show.figures.sensitivity import draw_sensitivities
@@ -48,6 +49,7 @@ def svg_figures(facts: Facts) -> dict[str, str]:
         if chart.regions
         else "",
         "device": "",
+        "load": _load_path(facts),
         "felt": _felt(facts, facts.felt) if facts.renders else "",
         "sensitivities": _sensitivities(facts),
         "validity": _validity(facts, facts.validity),
@@ -64,6 +66,21 @@ def svg_figures(facts: Facts) -> dict[str, str]:
     elif (chain := as_chain(plant)) is not None:
         drawn["device"] = _svg(facts, "device", "The plant", lambda ax: draw_chain(ax, plant, chain), 2.0)
     return drawn
+
+
+def _load_path(facts: Facts) -> str:
+    """Only of a device under load."""
+    path = facts.load_path
+    if path is None:
+        return ""
+    drawings = []
+    for kind, width in WIDTHS.items():
+        with context():
+            made = load_path_figure(path, width, 4.6)
+            write_caption(made, caption_of_result(path))
+            description = "Charts under pushes of the hand to both sides"
+            drawings.append(f'<div class="{kind}">{inline_svg(made, f"load-{kind}", description)}</div>')
+    return "\n".join(drawings)
 
 
 def _felt(facts: Facts, felt: FeltChart | None) -> str:

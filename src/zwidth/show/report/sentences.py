@@ -19,6 +19,7 @@ from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference
 from zwidth.loop.motion_names import group_names
 from zwidth.model.mechanism import Floats
+from zwidth.show.circumstances import load_text
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, way
@@ -461,6 +462,7 @@ def setting(facts: Facts) -> str:
     late = f"a delay of {delay_name(controller)}" if controller.delay else "no delay"
     period = as_written(controller.sampling_period, "s")
     held = "" if facts.operator is None else f", held by {facts.operator}"
+    held += "" if facts.point.load is None else f", under {load_text(facts.point.load).replace('-', MINUS)}"
     return f"{model}{held}; sampled every {period}, {late}, {velocity_and_force_text(controller)}."
 
 

@@ -7,6 +7,7 @@ from math import isnan
 from typing import Any
 
 from zwidth.conditions import Bound
+from zwidth.show.output import json_value
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import NONE, SPACE, UNKNOWN, number, quantity
@@ -147,6 +148,7 @@ def document(facts: Facts) -> dict[str, Any]:
             for number in facts.sensitivities.numbers
         ],
         "models": facts.validity and facts.validity.document(),
+        **_load(facts),
         "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
         "bounds": [
             {
@@ -163,6 +165,18 @@ def document(facts: Facts) -> dict[str, Any]:
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
     return {key: _known(value) for key, value in {**values, **reason}.items()}
+
+
+def _load(facts: Facts) -> dict[str, Any]:
+    """The equilibrium, the motions along the surface and the charts under other pushes; {} without load."""
+    path, found = facts.load_path, facts.point
+    if path is None:
+        return {}
+    return {
+        "equilibrium": found.equilibrium.document(found.drives.names),
+        "sideways_motions": [motion.document() for motion in facts.loop.sideways_motions],
+        "load_path": json_value(path.document()),
+    }
 
 
 def _walls(variant: Variant) -> dict[str, Any]:

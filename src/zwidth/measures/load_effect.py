@@ -1,0 +1,62 @@
+"""What a load does to a device at one operating point: to the stiffest wall, and to the motions along the surface.
+
+    relative change of the largest stiffness = (K_max under load - K_max without it) / K_max without it
+
+both in the posture that the device has under load. A motion that no wall moves without load grows or decays under
+one (`loop.sideways`); the fastest-growing one counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from zwidth.chart.chart import largest_stiffness
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.sideways import SidewaysMotion
+from zwidth.model.loaded_plant import moved_motions
+
+NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
+
+
+class NoWallError(ValueError):
+    """No wall is stable, so that there is no stiffest one; the text says with load or without."""
+
+
+def load_change(point: OperatingPoint) -> float:
+    """Relative change of the largest stiffness by all of the load, the hand's force and gravity.
+
+    point   a single one, under load
+    Raises  NoWallError  where no wall is stable, under load or without it
+    """
+    loaded, unloaded = largest_stiffness(point.loop), largest_stiffness(without_load(point).loop)
+    if unloaded is None:
+        raise NoWallError(f"{NONE_STABLE} without load")
+    if loaded is None:
+        raise NoWallError(f"{NONE_STABLE} under load")
+    return (loaded.stiffness - unloaded.stiffness) / unloaded.stiffness
+
+
+def without_load(point: OperatingPoint) -> OperatingPoint:
+    """The same posture with nothing that pushes."""
+    return point if point.load is None else replace(point, load=None)
+
+
+def fastest_sideways_motion(point: OperatingPoint) -> SidewaysMotion | None:
+    """The motion that no wall moves without load and that grows fastest, whether or not it counts for stability.
+
+    point    a single one, under load or not. Without load a free motion is neutral
+    Returns  None where a wall moves or a hand holds all motions, and none grows
+    """
+    if point.load is not None:
+        apart = point
+        if point.load.count_sideways:
+            apart = replace(point, load=replace(point.load, count_sideways=False))
+        motions = apart.loop.sideways_motions
+        return motions[0] if motions else None
+    # a reduced model has the rendered direction alone
+    whole = point.plant if point.mechanism is None else point.in_model("full").plant
+    free = moved_motions(whole)[1].squared == 0.0
+    return SidewaysMotion(0.0, 0.0) if np.any(free) else None

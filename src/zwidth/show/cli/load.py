@@ -1,0 +1,181 @@
+"""`zwidth load`: how the chart moves with the hand's load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from zwidth.show.cli.answer import table
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.heading import heading
+from zwidth.show.cli.options import Finite
+from zwidth.show.moment_units import spoken_unit
+from zwidth.show.units import amount, as_written, seconds, signed, typed, vector
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from zwidth.device.device import Device
+    from zwidth.study.load_path import LoadPath, PushedChart
+
+
+def _check_push(ctx: click.Context, param: click.Parameter, push: float) -> float:
+    if push <= 0.0:
+        raise click.BadParameter(f"must be positive, got {push:g}; pushes to both sides are charted")
+    return push
+
+
+def _check_count(ctx: click.Context, param: click.Parameter, count: int) -> int:
+    if count % 2 == 0:
+        raise click.BadParameter(f"must be odd, so that the chart without a push is among them, got {count}")
+    return count
+
+
+class LoadCommand(Command):
+    """Find how the walls that DEVICE renders stably change with the force by which the hand leans on them.
+
+    Charts at pushes of the hand to both sides along the rendered direction, about one posture. All else of the
+    [load] is kept: gravity, and how the hand's force goes with the handle.
+    """
+
+    name = "load"
+    summary = "Find how the chart moves with the hand's load."
+    examples = (
+        "zwidth load my-device.toml --push 10",
+        "zwidth load my-device.toml --gravity 0,0,-9.81 --count 5 --output load.svg",
+    )
+    options = (
+        click.option(
+            "--push",
+            metavar="N",
+            type=Finite(),
+            callback=_check_push,
+            default=5.0,
+            show_default=True,
+            help="Largest push to either side [N], about an axis [N m].",
+        ),
+        click.option(
+            "--count",
+            metavar="N",
+            type=click.IntRange(3, 201),
+            callback=_check_count,
+            default=9,
+            show_default=True,
+            help="Number of pushes, odd.",
+        ),
+    )
+    keys = (
+        "push_N",
+        "status",
+        "stiffness_max_N_per_m",
+        "damping_at_stiffness_max_Ns_per_m",
+        "frequency_at_stiffness_max_Hz",
+        "damping_max_Ns_per_m",
+        "stable_area_N2s_per_m2",
+        "wall_force_N",
+        "sideways_force_N",
+        "one_sided_amplitude_m",
+        "growth_rate_1_per_s",
+        "time_to_double_s",
+        "sideways_frequency_Hz",
+        "stiffness_max_hand_neglected_N_per_m",
+        "stiffness_max_fixed_surface_N_per_m",
+        "fixed_surface_status",
+    )
+    size = (7.6, 5.4)
+    takes_responses = True  # which it refuses like every device without a mechanism
+
+    def check(self, case: CommandLine) -> None:
+        if case.question.load is not None:
+            raise BadInput(
+                "--load: does not apply where the push is what changes; use --push for how large it gets"
+            )
+
+    def compute(self, case: CommandLine) -> LoadPath:
+        if case.device.mechanism is None:
+            raise BadInput(
+                f"{case.question.name}: has no [mechanism], whose forces turn as it moves; use zwidth chart"
+            )
+        # without the load, under which there may be no equilibrium
+        point = case.question.point(_bare(case))
+        return case.device.load_path(case["push"], case["count"], point=point, progress=case.progress)
+
+    def reason(self, case: CommandLine, result: LoadPath) -> str | None:
+        return result.reason
+
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        return case.question.linear_circumstances(_unpushed(case))
+
+    def heading(self, case: CommandLine) -> str:
+        return heading(case.question, _unpushed(case))
+
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        return super().caption_facts(case, document) | {"varied": ["the hand's push"]}
+
+    def pages(self, case: CommandLine, result: LoadPath, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.show.load_text import path_sentences
+
+        free = result.unpushed.stiffness_max
+        charted = ["largest stiffness", "change", "at damping", "oscillates at"]
+        yield table(
+            ["push", *charted, "hand neglected", "fixed surface"],
+            [_chart_row(step, free) for step in result.steps],
+        )
+        yield table(
+            ["push", "wall", "hand across", "sideways growth", "doubles in", "one-sided below F/K"],
+            [_balance_row(step) for step in result.steps],
+        )
+        yield from map(typed, path_sentences(result))
+
+    def draw(self, case: CommandLine, result: LoadPath) -> Figure:
+        from zwidth.show.figures.load_path import load_path_figure
+
+        return load_path_figure(result, *self.size)
+
+
+def _bare(case: CommandLine) -> Device:
+    from zwidth.study.load_path import device_without_load
+
+    return device_without_load(case.device)
+
+
+def _unpushed(case: CommandLine) -> Device:
+    """The device with what is kept of its load."""
+    from zwidth.study.load_path import without_push
+
+    kept = without_push(case.device.load)
+    return _bare(case) if kept is None else case.device.under(kept)
+
+
+def _chart_row(step: PushedChart, free: float) -> list[str]:
+    """free: the largest stiffness without a push."""
+    chart = step.chart
+    if chart is None or not chart.frequencies_at_stiffness_max:
+        return [typed(as_written(step.push, "N")), "none", *[""] * 5]
+    change = 100.0 * (chart.stiffness_max - free) / free
+    return [
+        typed(as_written(step.push, "N")),
+        amount(chart.stiffness_max, "N/m"),
+        typed(f"{signed(change)} %") if step.push and change == change else "",
+        amount(chart.damping_at_stiffness_max, "Ns/m"),
+        amount(min(chart.frequencies_at_stiffness_max), "Hz"),
+        amount(step.hand_neglected, "N/m"),
+        amount(step.fixed_surface, "N/m"),
+    ]
+
+
+def _balance_row(step: PushedChart) -> list[str]:
+    if step.wall_force != step.wall_force:
+        return [typed(as_written(step.push, "N")), *[""] * 5]
+    motion = step.sideways
+    return [
+        typed(as_written(step.push, "N")),
+        amount(step.wall_force, "N"),
+        vector(step.sideways_force, spoken_unit("N")),
+        "none" if motion is None else amount(motion.growth_rate, "1/s"),
+        "" if motion is None or motion.growth_rate <= 0.0 else typed(seconds(motion.time_to_double)),
+        amount(step.one_sided_amplitude, "m") if step.push else "",
+    ]

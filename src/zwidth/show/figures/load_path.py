@@ -1,0 +1,262 @@
+"""How the chart moves with the hand's load: outlines by push, largest stiffness and sideways growth over push."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import pi
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from zwidth.chart.chart import StabilityChart
+from zwidth.chart.rings import window_of
+from zwidth.chart.tracer import tracer_of
+from zwidth.show.figures.stability import Window, edges_of, frame
+from zwidth.show.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    VERMILION,
+    context,
+    draw_empty,
+    figure,
+    label,
+    legend_above,
+)
+from zwidth.show.moment_units import spoken_unit
+from zwidth.show.units import as_written, quantity
+from zwidth.study.load_path import LoadPath, PushedChart
+
+Floats = NDArray[np.float64]
+
+# From blue over black to vermilion: the farther from no push the lighter, either side in its own colour.
+COLOURS: Final = LinearSegmentedColormap.from_list(
+    "push", ["#9CCBE8", BLUE, "#00304D", BLACK, "#5C2800", VERMILION, "#F5B68C"]
+)
+MOST_TICKS: Final = 9
+NARROW: Final = 5.0  # inches of a figure below which panels stand under each other
+FOOT: Final = 0.06  # of the height of a panel, for marks of pushes without an answer
+LEAST: Final = 1e-6  # share of the largest stiffness that a close-up shows, where all are alike
+BELOW: Final = 1.5  # how far a close-up goes below the largest stiffnesses, in shares of their range
+ABOVE: Final = 0.4  # and above
+POINTS: Final = 300  # of a curve in a close-up
+
+
+def load_path_figure(path: LoadPath, width: float = 7.6, height: float = 5.4) -> Figure:
+    """The outlines and a close-up at the stiffest walls; beside them, or below, what changes over the push.
+
+    height  of a figure of two columns; one of a single column is 1.8 times as high [inches]
+    """
+    narrow = width < NARROW
+    made, outlines = figure(width, 1.8 * height if narrow else height)
+    with context():
+        shape = (4, 1) if narrow else (2, 2)
+        grid = made.add_gridspec(*shape, height_ratios=(1.4, 1.2, 1.0, 1.0) if narrow else (1.1, 1.0))
+        cells = [(0, 0), (1, 0), (2, 0), (3, 0)] if narrow else [(0, 0), (1, 0), (0, 1), (1, 1)]
+        places = [grid[cell] for cell in cells]
+        outlines.set_subplotspec(places[0])
+        close, stiffness, growth = (made.add_subplot(place) for place in places[1:])
+        _draw_edges(outlines, path)
+        draw_close_up(close, path)
+        draw_stiffness(stiffness, path)
+        draw_growth(growth, path)
+        _bar(made, [outlines, close, stiffness, growth], path)
+    return made
+
+
+def draw_outlines(ax: Axes, path: LoadPath) -> None:
+    """The edges of the stable sets by the colour of the push, with the colours above."""
+    _draw_edges(ax, path)
+    assert ax.figure is not None
+    _bar(ax.figure, [ax], path)
+
+
+def _draw_edges(ax: Axes, path: LoadPath) -> None:
+    """The edges of the stable sets: that without a push on top, and pushes against the direction dashed."""
+    drawn = [(step, step.chart) for step in path.steps if step.chart is not None and step.chart.regions]
+    for step, chart in drawn:
+        for ring in edges_of(chart.regions):
+            ax.plot(*ring.T, **_line(step, path))
+    frame(ax, _window([chart for _, chart in drawn]), empty=not drawn)
+
+
+def draw_close_up(ax: Axes, path: LoadPath) -> None:
+    """The same edges about the stiffest walls, which often differ too little to be seen in the whole chart."""
+    stiffest = path.stiffness_max[np.isfinite(path.stiffness_max)]
+    if not len(stiffest):
+        draw_empty(ax)
+        return
+    low, high = float(stiffest.min()), float(stiffest.max())
+    span = max(high - low, LEAST * high)
+    window = low - BELOW * span, high + ABOVE * span
+    dampings = []
+    for step in path.steps:
+        if step.chart is None:
+            continue
+        for K, B in _curves(step.chart, window[0]):
+            ax.plot(K, B, **_line(step, path))
+            dampings.append(B[(window[0] <= K) & (B >= 0.0)])
+        if step.stiffness_max == step.stiffness_max:
+            at = step.chart.stiffness_max, step.chart.damping_at_stiffness_max
+            ax.plot(*at, marker="o", markersize=3.6, color=_colour(step, path), zorder=5.0)
+    seen = np.concatenate([np.zeros(0), *dampings])
+    ax.set_xlim(*window)
+    if len(seen):
+        margin = 0.05 * float(np.ptp(seen)) or 1.0
+        ax.set_ylim(float(seen.min()) - margin, float(seen.max()) + margin)
+    ax.xaxis.set_major_locator(_few_ticks())
+    label(ax.xaxis, "K about the stiffest walls", "N/m")
+    label(ax.yaxis, "Virtual damping B", "Ns/m")
+
+
+def _few_ticks() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=4, steps=[1, 2, 5, 10])  # of numbers with many digits
+
+
+def _curves(chart: StabilityChart, low: float) -> Iterator[tuple[Floats, Floats]]:
+    """Pieces of a chart's edge with K above `low`, from its exact curve."""
+    tracer, hertz = tracer_of(chart.loop), 1.0 / (2.0 * pi * chart.loop.period)
+    for arc in chart.boundary:
+        near = np.flatnonzero(arc.stiffness >= low)
+        if not len(near):
+            near = np.array([int(np.argmax(arc.stiffness))])
+        first, last = max(int(near[0]) - 1, 0), min(int(near[-1]) + 1, len(arc.frequency) - 1)
+        ends = arc.frequency[first], arc.frequency[last]
+        if ends[0] == ends[1]:  # a straight line of real roots
+            yield arc.stiffness[first : last + 1], arc.damping[first : last + 1]
+            continue
+        K, B = tracer.walls(np.linspace(*ends, POINTS) / hertz)
+        if np.max(K) < low:
+            continue
+        kept = low - (np.max(K) - low) <= K  # a little beyond what is seen
+        yield np.where(kept, K, np.nan), B
+
+
+def draw_stiffness(ax: Axes, path: LoadPath) -> None:
+    """The largest stiffness over the push, as a change from that without one where there is one: with the posture
+    kept, without the change of the hand's force, and on a fixed surface."""
+    free = path.unpushed.stiffness_max
+    relative = free == free
+    if not np.isfinite(path.stiffness_max).any():
+        draw_empty(ax)
+        return
+
+    def shown(values: Floats) -> Floats:
+        return 100.0 * (values - free) / free if relative else values
+
+    lines: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
+        ("posture kept", path.stiffness_max, {"color": BLACK, "linewidth": 2.0}),
+        ("change of the hand's force neglected", path.hand_neglected, {"color": BLUE, "linestyle": (0, (4, 4))}),
+        ("fixed surface", path.fixed_surface, {"color": VERMILION, "linestyle": (0, (1.2, 1.2))}),
+    )
+    for n, (name, values, style) in enumerate(lines):
+        if np.isfinite(values).any():
+            ax.plot(path.pushes, shown(values), label=name, zorder=2.5 + 0.1 * n, **style)
+    _dots(ax, path, shown(path.stiffness_max))
+    title = "Largest stiffness"
+    if relative:
+        ax.set_ylabel("Change of stiffness [%]")
+        title += f",\nfrom {quantity(free, 'N/m')} without a push"
+    else:
+        label(ax.yaxis, title, "N/m")
+    _over_push(ax, path, path.stiffness_max)
+    legend_above(ax, title=title)
+
+
+def draw_growth(ax: Axes, path: LoadPath) -> None:
+    """Growth of the fastest sideways motion over the push; above 0 it grows."""
+    rates = path.growth_rates
+    ax.set_ylabel("Growth sideways [1/s]")
+    if not np.isfinite(rates).any():
+        draw_empty(ax, "no motion is free along the surface")
+        return
+    ax.plot(path.pushes, rates, color=BLACK, zorder=2.9)
+    _dots(ax, path, rates)
+    ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.0)
+    if not np.any(np.nan_to_num(rates)):
+        ax.set_ylim(-1.0, 1.0)
+        ax.set_yticks([0.0])
+    _over_push(ax, path, rates)
+
+
+def _dots(ax: Axes, path: LoadPath, values: Floats) -> None:
+    """A dot for each push in its colour."""
+    for step, value in zip(path.steps, values, strict=True):
+        if np.isfinite(value):
+            ax.plot(step.push, value, marker="o", markersize=4.4, color=_colour(step, path), zorder=4.0)
+
+
+def _over_push(ax: Axes, path: LoadPath, values: Floats) -> None:
+    """The axis of the push, and crosses at its foot where there is no answer."""
+    reach = 1.06 * float(path.pushes[-1])
+    ax.set_xlim(-reach, reach)
+    for draw in (ax.axvline, ax.axhline):
+        draw(0.0, color=GREY, linewidth=0.6, zorder=1.0)
+    label(ax.xaxis, "Push of the hand", "N")
+    missing = path.pushes[~np.isfinite(values)]
+    if len(missing):
+        low, high = ax.get_ylim()
+        ax.set_ylim(low - (high - low) * 2.0 * FOOT, high)
+        style: dict[str, Any] = {"linestyle": "none", "color": GREY, "markersize": 4.0}
+        at = ax.get_xaxis_transform()
+        ax.plot(missing, np.full(len(missing), FOOT), marker="x", transform=at, label="no answer", **style)
+
+
+def _norm(path: LoadPath) -> BoundaryNorm:
+    """A band of colour for each push."""
+    pushes = path.pushes
+    half = 0.5 * (pushes[1] - pushes[0])
+    return BoundaryNorm(np.append(pushes - half, pushes[-1] + half), COLOURS.N)
+
+
+def _colour(step: PushedChart, path: LoadPath) -> Any:
+    return COLOURS(_norm(path)(step.push))
+
+
+def _line(step: PushedChart, path: LoadPath) -> dict[str, Any]:
+    """The line of one push: the weaker it is the farther in front."""
+    style: dict[str, Any] = {"color": _colour(step, path), "linewidth": 1.1}
+    style["zorder"] = 3.0 - abs(step.push) / (1.0 + 2.0 * float(path.pushes[-1]))
+    if step.push == 0.0:
+        return style | {"linewidth": 1.6}
+    return style | {"linestyle": (0, (4, 2))} if step.push < 0.0 else style
+
+
+def _bar(made: Any, axes: Sequence[Axes], path: LoadPath) -> None:
+    """The colours of the pushes above the axes."""
+    middle = len(path.steps) // 2
+    every = -(-middle // (MOST_TICKS // 2))
+    ticks = [push for k, push in enumerate(path.pushes.tolist()) if (k - middle) % every == 0]
+    bar = made.colorbar(
+        ScalarMappable(_norm(path), COLOURS),
+        ax=axes,
+        location="top",
+        ticks=ticks,
+        fraction=0.03 if len(axes) > 1 else 0.05,
+        pad=0.03,
+        aspect=40,
+    )
+    bar.minorticks_off()
+    bar.outline.set_linewidth(0.6)
+    bar.ax.set_xticks(ticks, labels=[as_written(push) for push in ticks])
+    bar.ax.tick_params(labelsize=8.0)
+    bar.set_label(f"Push of the hand [{spoken_unit('N')}], lines of negative ones dashed", fontsize=8.0)
+
+
+def _window(charts: Sequence[StabilityChart]) -> Window:
+    """The box of all outlines' part with K >= 0 and B >= 0, and 5 %; of all of them where nothing lies there."""
+    rings = [ring for chart in charts for ring in chart.regions]
+    if all(np.isnan(chart.stiffness_max) for chart in charts):
+        return window_of(rings)
+    points = np.vstack(rings)
+    K, B = np.maximum(points.max(axis=0), 0.0).tolist()
+    low = np.minimum(points.min(axis=0), 0.0)
+    K0, B0 = max(float(low[0]), -0.04 * K), max(float(low[1]), -0.1 * B)
+    return K0 - 0.01 * K, 1.05 * K, B0 - 0.01 * B, 1.05 * B

@@ -1,0 +1,163 @@
+"""What a load does to a device, in sentences and rows: of its equilibrium, and of a path of pushes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.show.units import SPACE, amount, as_written, percent, quantity, seconds, signed, vector
+
+if TYPE_CHECKING:
+    from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.model.equilibrium import Equilibrium
+    from zwidth.study.load_path import LoadPath
+
+ROUNDING: Final = 1e-9  # share of a stiffness, or of the hand's force across the direction, that is
+UNCHANGED: Final = 5e-7  # share of a stiffness that its four digits do not show
+Floats = NDArray[np.float64]
+Row = tuple[str, str]
+
+
+def balance_rows(point: OperatingPoint, stiffness_max: float | None = None) -> Iterator[Row]:
+    """Rows for people on the equilibrium of a point under load.
+
+    stiffness_max  of its chart [N/m]; None: not known
+    """
+    found = point.equilibrium
+    yield "balance", balance_text(found)
+    if stiffness_max is not None and found.load.pushes and stiffness_max > 0.0:
+        valid = amount(found.one_sided_amplitude(stiffness_max), "m")
+        yield "one-sided wall", f"as charted while the amplitude stays below F/K, {valid} at the largest stiffness"
+
+
+def balance_text(found: Equilibrium) -> str:
+    """Who pushes how hard."""
+    turns = not np.any(found.screw[:3])
+    force, unit = (found.hand_moment, "Nm") if turns else (found.hand_force, "N")
+    text = f"wall {amount(found.wall_force, 'N')}, hand {vector(force, unit)}"
+    if has_sideways_force(found):
+        across = vector(found.sideways_force, unit)
+        text += f", of which {across} across the direction, which this posture needs"
+    return text
+
+
+def has_sideways_force(found: Equilibrium) -> bool:
+    """Whether the hand pushes across the direction by more than rounding."""
+    whole = max(float(np.linalg.norm(found.hand_force)), float(np.linalg.norm(found.hand_moment)))
+    return bool(np.linalg.norm(found.sideways_force) > ROUNDING * whole)
+
+
+def drive_rows(point: OperatingPoint) -> Iterator[Row]:
+    """What each motor gives, and how far its drive is bent."""
+    found = point.equilibrium
+    torques = found.torques / found.ratio
+    torques[np.abs(torques) < ROUNDING * np.max(np.abs(torques))] = 0.0
+    for name, torque, bent in zip(point.drives.names, torques.tolist(), found.deflections.tolist(), strict=True):
+        flexible = f", its drive bent by {amount(bent, 'rad')}" if bent else ""
+        yield f"motor {name}", f"{amount(torque, 'Nm')}{flexible}"
+
+
+# --- a path of pushes -------------------------------------------------------------------------------
+
+
+def path_sentences(path: LoadPath) -> list[str]:
+    """What the charts under all pushes say."""
+    said = [_stiffness(path), _neglected(path), _fixed_surface(path), _sideways(path), *_unanswered(path)]
+    return [sentence for sentence in said if sentence]
+
+
+def _stiffness(path: LoadPath) -> str:
+    values, pushes, free = path.stiffness_max, path.pushes, path.unpushed.stiffness_max
+    have = np.isfinite(values)
+    if not have.any():
+        return ""
+    low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
+    if have.sum() == 1:
+        return (
+            f"A wall is stable under {as_written(pushes[high], 'N')} alone, up to {quantity(values[high], 'N/m')}."
+        )
+    if values[high] - values[low] <= UNCHANGED * values[high]:
+        return f"The largest stiffness is {quantity(values[high], 'N/m')} under every push{_that_has_one(have)}."
+    ends = " to ".join(f"{quantity(values[k], 'N/m')} under {as_written(pushes[k], 'N')}" for k in (low, high))
+    if np.isnan(free):
+        return f"The largest stiffness goes from {ends}; without a push no wall is stable."
+    changes = " to ".join(f"{signed(100.0 * (values[k] - free) / free)}{SPACE}%" for k in (low, high))
+    return f"The largest stiffness goes from {ends}: {changes} of the {quantity(free, 'N/m')} without a push."
+
+
+def _that_has_one(have: NDArray[np.bool_]) -> str:
+    return "" if have.all() else " that has one"
+
+
+def _sideways(path: LoadPath) -> str:
+    rates, pushes = path.growth_rates, path.pushes
+    known = np.isfinite(rates)
+    if not known.any():
+        return "" if path.reason else "No free motion stands apart from the walls: the charts count every one."
+    growing = known & (rates > 0.0)
+    if not growing.any():
+        return "No motion along the surface grows."
+    fastest = int(np.argmax(np.where(growing, rates, 0.0)))
+    motion = path.steps[fastest].sideways
+    assert motion is not None
+    shape = f", as a vibration of {quantity(motion.frequency, 'Hz')}" if motion.frequency else ""
+    doubles = f"{as_written(pushes[fastest], 'N')}, where it doubles in {seconds(motion.time_to_double)}{shape}"
+    where = pushes_text(pushes, growing)
+    return f"Along the surface, where no wall acts, a motion grows under {where}: fastest under {doubles}."
+
+
+def _neglected(path: LoadPath) -> str:
+    off = _largest_difference(path, path.hand_neglected)
+    if off is None or path.hand == "neglected":
+        return ""
+    if off[0] < ROUNDING:
+        return "Whether the change of the hand's force is neglected makes no difference to these stiffnesses."
+    share, push = percent(off[0]), as_written(off[1], "N")
+    return f"Neglecting the change of the hand's force changes it by {share} at most, under {push}."
+
+
+def _fixed_surface(path: LoadPath) -> str:
+    sinks = "On a fixed surface, into which the handle sinks by F/K,"
+    off = _largest_difference(path, path.fixed_surface)
+    if off is None:
+        pushed = [step for step in path.steps if step.push and step.stiffness_max == step.stiffness_max]
+        reasons = sorted({step.fixed_surface_status for step in pushed})
+        return f"{sinks} there is no answer: {'; '.join(reasons)}." if reasons else ""
+    if off[0] < ROUNDING:
+        return f"{sinks} the largest stiffness is the same."
+    share, push = percent(off[0]), as_written(off[1], "N")
+    return f"{sinks} it differs from that with the posture kept by {share} at most, under {push}."
+
+
+def _largest_difference(path: LoadPath, others: Floats) -> tuple[float, float] | None:
+    """The largest relative difference of other largest stiffnesses from the path's, and under which push; None
+    where no push has both."""
+    values, pushes = path.stiffness_max, path.pushes
+    both = np.isfinite(values) & np.isfinite(others) & (pushes != 0.0)
+    if not both.any():
+        return None
+    share = np.where(both, np.abs(others - values) / np.where(both, values, 1.0), -1.0)
+    k = int(np.argmax(share))
+    return float(share[k]), float(pushes[k])
+
+
+def _unanswered(path: LoadPath) -> Iterator[str]:
+    """Under which pushes there is no largest stiffness, and why: of each kind the reason of the weakest push."""
+    missing = [step for step in path.steps if step.stiffness_max != step.stiffness_max]
+    for kind in dict.fromkeys(step.status.partition(":")[0] for step in missing):
+        own = [step for step in missing if step.status.partition(":")[0] == kind]
+        here = np.array([step in own for step in path.steps])
+        weakest = min(own, key=lambda step: abs(step.push))
+        yield f"Without an answer, {pushes_text(path.pushes, here)}: {weakest.status.rstrip('.')}."
+
+
+def pushes_text(pushes: Floats, chosen: NDArray[np.bool_]) -> str:
+    """Some of the pushes in words: each stretch of neighbours from its first to its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
+    stretches = [(float(pushes[a]), float(pushes[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return " and ".join(
+        as_written(a, "N") if a == b else f"{as_written(a, 'N')} to {as_written(b, 'N')}" for a, b in stretches
+    )

@@ -1,0 +1,685 @@
+"""The haptic equilibrium: closed forms of small devices, MuJoCo's forces, and what cannot be meant."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from tests.device.test_device_zoo_engines import completed
+from tests.loop.loaded_cases import random_points
+from tests.model.joints_apart import FOURTH, Joints
+from tests.model.model_engines import mjcf, moving_links, quaternion
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import from_document
+from zwidth.device.load import load as load_device
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import OperatingPointError, SeveralDirectionsError
+from zwidth.model.equilibrium import EquilibriumError
+from zwidth.model.load import Load, LoadError
+from zwidth.model.mechanism import BALL_X
+from zwidth.model.posture import NO_EQUILIBRIUM, OK, OUT_OF_REACH
+from zwidth.model.reduction import ModelError
+
+# --- an arm on one joint ----------------------------------------------------------------------------------
+
+LENGTH, MASS, CENTRE, INERTIA = 0.2, 0.3, 0.12, 0.002  # of the arm [m], [kg], [m], [kg m^2]
+RATIO = 10.0
+
+ARM = f"""
+name = "arm"
+[[mechanism.links]]
+name = "arm"
+joint = "revolute"
+length_m = {LENGTH}
+mass_kg = {MASS}
+center_of_mass_m = [{CENTRE}]
+inertia_kg_m2 = {INERTIA}
+[[mechanism.drives]]
+name = "motor"
+joint = "arm"
+motor_inertia_kg_m2 = 2e-6
+transmission_ratio = {RATIO}
+[mechanism.handle]
+link = "arm"
+[mechanism.assemblies.only]
+joints_rad = {{ arm = 1.0 }}
+[mechanism.reference]
+position_m = [{LENGTH * np.cos(1.0)}, {LENGTH * np.sin(1.0)}]
+direction = [1.0, 0.0]
+[loop]
+sampling_period_s = 0.001
+"""
+
+
+def arm(mechanism=None, link=None, drive=None):
+    """The arm with more keys, or other ones."""
+    document = tomllib.loads(ARM)
+    document["mechanism"] |= mechanism or {}
+    document["mechanism"]["links"][0] |= link or {}
+    document["mechanism"]["drives"][0] |= drive or {}
+    return from_document(document)
+
+
+UPRIGHT = {"arm": np.pi / 2}
+WHOLE = INERTIA + MASS * CENTRE**2 + RATIO**2 * 2e-6  # about the joint, with the rotor [kg m^2]
+TOPPLING = MASS * 9.81 * CENTRE  # m g l [N m/rad]
+
+
+@pytest.mark.parametrize("share", [0.4, 0.999, 1.001, 3.0])
+def test_an_inverted_pendulum_on_a_spring_buckles_at_m_g_l(share):
+    """I q'' + (k - m g l) q = 0: a frequency below the spring's own, or a growth rate."""
+    k = share * TOPPLING
+    device = arm(link={"joint_stiffness_Nm_per_rad": k})
+    plant = device.at(UPRIGHT, load=Load(gravity=[0.0, -9.81], count_sideways=True)).plant
+    squared = float(plant.stiffness[0, 0] / plant.mass[0, 0])
+    assert squared == pytest.approx((k - TOPPLING) / WHOLE, rel=1e-9)
+    hanging = device.at(UPRIGHT, load=Load(gravity=[0.0, 9.81], count_sideways=True)).plant
+    assert float(hanging.stiffness[0, 0] / hanging.mass[0, 0]) == pytest.approx((k + TOPPLING) / WHOLE, rel=1e-9)
+
+
+def test_gravity_that_is_compensated_leaves_what_sampling_leaves():
+    """By masses nothing is left; by the computer's torques the half that acts all the time and the sampled one."""
+    load = Load(gravity=[0.0, -9.81], count_sideways=True)
+    none, computed, weights = (
+        arm({"gravity_compensation": kind}).at(UPRIGHT, load=load)
+        for kind in ("none", "computed", "counterweight")
+    )
+    assert none.plant.sampled_forces == weights.plant.sampled_forces == ()
+    own = [float(each.plant.stiffness[0, 0] / each.plant.mass[0, 0]) for each in (none, computed, weights)]
+    assert own == pytest.approx([-TOPPLING / WHOLE, -TOPPLING / WHOLE, 0.0], rel=1e-9)
+    (force,) = computed.plant.sampled_forces
+    sampled = float(force.along[0] * force.reading[0] / computed.plant.mass[0, 0])
+    assert sampled == pytest.approx(-TOPPLING / WHOLE)
+    tilted = {"arm": 1.0}
+    torque = MASS * 9.81 * CENTRE * np.cos(1.0)
+    found = [
+        arm({"gravity_compensation": kind}).at(tilted, load=load).equilibrium for kind in ("none", "computed")
+    ]
+    assert found[0].torques == pytest.approx([0.0], abs=1e-15)
+    assert found[1].torques == pytest.approx([torque], rel=1e-12)
+    hand = [each.hand_force @ [-np.sin(1.0), np.cos(1.0), 0.0] for each in found]
+    assert hand == pytest.approx([torque / LENGTH, 0.0], abs=1e-12)  # along the only way that the handle has
+
+
+@pytest.mark.parametrize("push", [-8.0, -0.5, 3.0, 9.0])
+@pytest.mark.parametrize("hardening", [None, 0.3])
+def test_motors_that_stand_where_they_are_asked_to_let_the_arm_sag(push, hardening):
+    """The hand pushes along the arm's own way t(q), u . F = push: the spring's torque is push L/(u . t(q))."""
+    k, q_motor, u = 0.5, 1.0, np.array([1.0, 0.0])
+    drive = {"stiffness_Nm_per_rad": k} | ({"hardening_Nm_per_rad3": hardening} if hardening else {})
+    device = arm({"damping": {"mode_ratio": 0.02}}, drive=drive)
+    point = device.at({"arm": q_motor}, u, load=Load(push=push, posture_of="motors"))
+    cubic = RATIO**4 * (hardening or 0.0)
+
+    def off(q):
+        bent = q_motor - q
+        return RATIO**2 * k * bent + cubic * bent**3 + push * LENGTH / (u @ [-np.sin(q), np.cos(q)])
+
+    q = brentq(off, q_motor - 0.5, q_motor + 0.5, xtol=1e-15)
+    assert point.posture.angles == pytest.approx([q], rel=1e-10)
+    assert point.equilibrium.deflections == pytest.approx([q_motor - q], rel=1e-8)
+    # the computer asks for u f where it sees the arm
+    way = u @ [-np.sin(q_motor), np.cos(q_motor)]
+    assert point.equilibrium.wall_force == pytest.approx(point.equilibrium.torques[0] / (LENGTH * way), rel=1e-9)
+    assert point.equilibrium.hand_force[:2] @ u == pytest.approx(push, rel=1e-11)
+    handle = device.at({"arm": q_motor}, u, load=Load(push=push))
+    assert handle.posture.angles == pytest.approx([q_motor], rel=1e-12)
+
+
+def test_the_stiffness_of_a_hardening_spring_is_its_tangent():
+    drive = {"stiffness_Nm_per_rad": 0.5, "hardening_Nm_per_rad3": 0.4, "backward_stiffness_Nm_per_rad": 0.3}
+    device = arm({"damping": {"mode_ratio": 0.0}}, drive=drive)
+    for push, k in ((-6.0, 0.5), (6.0, 0.3)):
+        point = device.at({"arm": np.pi / 2}, (-1.0, 0.0), load=Load(push=push))
+
+        def off(bent, k=k, push=push):
+            return 100.0 * k * bent + 1e4 * 0.4 * bent**3 + push * LENGTH
+
+        bent = brentq(off, -1.0, 1.0, xtol=1e-15)
+        assert point.equilibrium.deflections == pytest.approx([bent], rel=1e-9)
+        tangent = 100.0 * k + 3.0 * 1e4 * 0.4 * bent**2
+        assert point.loaded_plants.unloaded.stiffness[1, 1] == pytest.approx(tangent, rel=1e-9)
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_a_force_across_an_arm_has_no_lever_arm_to_lose(gravity):
+    """F . x'' = -F . L e_r = 0, whether the hand's force turns with the arm or not; gravity has one."""
+    q, stiffness = 0.8, {}
+    for hand in ("dead", "follower", "neglected"):
+        load = Load(push=-2.0, hand=hand, gravity=[0.0, -gravity])
+        plants = arm().at({"arm": q}, (-np.sin(q), np.cos(q)), load=load).loaded_plants
+        stiffness[hand] = float((plants.loaded.stiffness - plants.unloaded.stiffness)[0, 0])
+    falls = -MASS * gravity * CENTRE * np.sin(q)
+    assert stiffness == pytest.approx(dict.fromkeys(stiffness, falls), abs=1e-12)
+
+
+TWO_LINKS = {
+    "name": "two links",
+    "mechanism": {
+        "links": [
+            {"name": "one", "joint": "revolute", "length_m": LENGTH, "mass_kg": MASS, "inertia_kg_m2": INERTIA}
+            | {"center_of_mass_m": [CENTRE]},
+            {"name": "two", "parent": "one", "joint": "revolute", "length_m": LENGTH, "mass_kg": MASS}
+            | {"inertia_kg_m2": INERTIA, "center_of_mass_m": [CENTRE]},
+        ],
+        "drives": [
+            {"name": f"{name}-motor", "joint": name, "motor_inertia_kg_m2": 2e-6, "transmission_ratio": RATIO}
+            for name in ("one", "two")
+        ],
+        "handle": {"link": "two"},
+        "assemblies": {"only": {"joints_rad": {"one": 0.1, "two": 0.5}}},
+        "reference": {
+            "position_m": [LENGTH * (np.cos(0.1) + np.cos(0.6)), LENGTH * (np.sin(0.1) + np.sin(0.6))],
+            "direction": [1.0, 0.0],
+        },
+    },
+    "loop": {"sampling_period_s": 0.001},
+}
+
+
+def test_two_links_pulled_at_their_tip():
+    """A dead pull F along x turns each joint against F times the way along x from there to the tip, as the weight
+    of a pendulum does. A follower turns by q_1 + q_2 to F (0, 1), whose torques are these ways again: less by
+    them."""
+    place, push = {"one": 0.0, "two": 0.4}, 3.0
+    from_two = LENGTH * np.cos(0.4)
+    from_one = LENGTH + from_two
+    dead = push * np.array([[from_one, from_two], [from_two, from_two]])
+    turned = push * np.outer([from_one, from_two], [1.0, 1.0])
+    for hand, expected in (("dead", dead), ("follower", dead - turned), ("neglected", 0.0 * dead)):
+        plants = from_document(copy.deepcopy(TWO_LINKS)).at(place, (1.0, 0.0), load=Load(push=push, hand=hand))
+        plants = plants.loaded_plants
+        own = plants.loaded.stiffness - plants.unloaded.stiffness
+        if hand == "follower":
+            own = own + plants.loaded.circulatory
+        assert own == pytest.approx(expected, abs=1e-12)
+
+
+# --- two sliders: von Mises' truss ------------------------------------------------------------------------
+
+
+def truss(half_span, height, k):
+    """Two struts from (-a, 0) and (a, 0) to their tip (0, h), each driven in and out by a flexible drive."""
+    rest = float(np.hypot(half_span, height))
+
+    def strut(name, side):
+        angle = float(np.arctan2(height, -side * half_span))
+        links = [
+            {
+                "name": f"{name}-base",
+                "joint": "revolute",
+                "origin_m": [side * half_span, 0.0, 0.0],
+                "length_m": 0.0,
+                "mass_kg": 0.0,
+                "inertia_kg_m2": 0.0,
+            },
+            {
+                "name": name,
+                "parent": f"{name}-base",
+                "joint": "prismatic",
+                "axis": [1.0, 0.0, 0.0],
+                "origin_m": [0.0, 0.0, 0.0],
+                "length_m": 0.0,
+                "mass_kg": 0.2,
+                "center_of_mass_m": [0.0],
+                "inertia_kg_m2": 0.0,
+            },
+        ]
+        drive = {
+            "name": f"{name}-motor",
+            "joint": name,
+            "motor_inertia_kg_m2": 1e-5,
+            "transmission_ratio": 50.0,
+            "stiffness_Nm_per_rad": k / 50.0**2,
+        }
+        return links, drive, {f"{name}-base": angle}, {name: rest}
+
+    (one, drive, turn, way), (other, second, turned, slid) = strut("left", -1.0), strut("right", 1.0)
+    return from_document(
+        {
+            "name": "truss",
+            "mechanism": {
+                "links": one + other,
+                "loops": [
+                    {"name": "tip", "links": ["left", "right"], "points_m": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]}
+                ],
+                "drives": [drive, second],
+                "handle": {"link": "left", "point_m": [0.0, 0.0, 0.0]},
+                "assemblies": {"up": {"joints_rad": turn | turned, "joints_m": way | slid}},
+                "reference": {"position_m": [0.0, height], "direction": [0.0, 1.0]},
+                "damping": {"mode_ratio": 0.0},
+            },
+            "loop": {"sampling_period_s": 0.001},
+        }
+    )
+
+
+@pytest.mark.parametrize("push", [-30.0, -3.0, 20.0])
+def test_a_truss_has_the_stiffness_of_its_struts(push):
+    """Each strut under a tension N along n, of length L, gives k n n^T + N/L (1 - n n^T), its motor held. With the
+    load at the tip N = F/(2 sin alpha)."""
+    a, h, k = 0.3, 0.1, 2000.0
+    point = truss(a, h, k).at(load=Load(push=push))
+    L, tension = np.hypot(a, h), 0.5 * push / (h / np.hypot(a, h))
+    expected = np.zeros((2, 2))
+    for side in (-1.0, 1.0):
+        n = np.array([-side * a, h]) / L
+        expected += k * np.outer(n, n) + tension / L * (np.eye(2) - np.outer(n, n))
+    K = point.loaded_plants.loaded.stiffness[:2, :2]
+    lever = np.linalg.inv(point.jacobian[:2])
+    assert lever.T @ K @ lever == pytest.approx(expected, rel=1e-9, abs=1e-9 * k)
+    # the motors pull less by what the springs are longer
+    assert point.equilibrium.deflections * k == pytest.approx([-tension, -tension], rel=1e-3)
+
+
+def test_a_truss_snaps_through_where_its_stiffness_is_gone():
+    """2 k sin^2 alpha = 2 |N|/L cos^2 alpha with the motors held."""
+    a, h, k = 0.3, 0.05, 4000.0
+    device, L = truss(a, h, k), float(np.hypot(0.3, 0.05))
+    critical = 2.0 * k * (h / L) ** 3 / (a / L) ** 2 * L
+
+    def upward(push):
+        point = device.at(load=Load(push=push))
+        lever = np.linalg.inv(point.jacobian[:2])
+        return float((lever.T @ point.loaded_plants.loaded.stiffness[:2, :2] @ lever)[1, 1])
+
+    assert upward(-0.999 * critical) > 0.0 > upward(-1.001 * critical)
+    assert upward(-critical) == pytest.approx(0.0, abs=1e-9 * k)
+
+
+# --- free joints that hang --------------------------------------------------------------------------------
+
+HANGING = f"""
+name = "carriage"
+[[mechanism.links]]
+name = "carriage"
+joint = "prismatic"
+axis = [1, 0, 0]
+mass_kg = 0.4
+inertia_kg_m2 = 0
+length_m = 0.0
+[[mechanism.links]]
+name = "bob"
+parent = "carriage"
+joint = "revolute"
+free = true
+length_m = 0.1
+mass_kg = {MASS}
+center_of_mass_m = [{CENTRE}]
+inertia_kg_m2 = {INERTIA}
+[[mechanism.drives]]
+name = "motor"
+joint = "carriage"
+motor_inertia_kg_m2 = 1e-5
+transmission_ratio = 100.0
+[mechanism.handle]
+link = "carriage"
+point_m = [0, 0, 0]
+[mechanism.assemblies.only]
+joints_m = {{ carriage = 0.0 }}
+joints_rad = {{ bob = -1.2 }}
+[mechanism.reference]
+position_m = [0, 0]
+direction = [1, 0]
+[loop]
+sampling_period_s = 0.001
+"""
+
+
+def hanging(k=None, q=-1.2):
+    """A driven carriage with a bob that hangs from it, on a spring that is at rest at q or on none."""
+    document = tomllib.loads(HANGING)
+    document["mechanism"]["assemblies"]["only"]["joints_rad"]["bob"] = q
+    if k is not None:
+        document["mechanism"]["links"][1]["joint_stiffness_Nm_per_rad"] = k
+    return from_document(document)
+
+
+def test_a_bob_hangs_down():
+    point = hanging().at(load=Load(push=3.0, gravity=[0.0, -9.81], count_sideways=True))
+    assert point.posture.angles[1] == pytest.approx(-np.pi / 2, abs=1e-10)
+    plant = point.loaded_plants.loaded
+    assert plant.stiffness == pytest.approx(np.diag([0.0, TOPPLING]), abs=1e-12)
+
+
+@pytest.mark.parametrize("k", [0.05, 0.5, 5.0])
+@pytest.mark.parametrize("q", [-1.2, -1.9])
+def test_a_bob_on_a_spring_hangs_where_both_balance(k, q):
+    """k (q - q_0) = -m g l cos q, and K = k - m g l sin q."""
+    point = hanging(k, q).at(load=Load(gravity=[0.0, -9.81], count_sideways=True))
+    at = brentq(lambda x: k * (x - q) + TOPPLING * np.cos(x), *sorted((-np.pi / 2, q)), xtol=1e-15)
+    assert point.posture.angles[1] == pytest.approx(at, abs=1e-9)
+    assert point.loaded_plants.loaded.stiffness[1, 1] == pytest.approx(k - TOPPLING * np.sin(at), rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99, 1.01, 2.0])
+def test_a_bob_that_stands_on_its_spring_falls_where_the_spring_is_too_weak(share):
+    k = share * TOPPLING
+    point = hanging(k, np.pi / 2).at(load=Load(gravity=[0.0, -9.81], count_sideways=True))
+    assert point.posture.angles[1] == pytest.approx(np.pi / 2, abs=1e-12)
+    plant = point.loaded_plants.loaded
+    assert plant.stiffness[1, 1] == pytest.approx(k - TOPPLING, rel=1e-9)
+    grows = np.abs(np.linalg.eigvals(point.loop.transition_matrix(500.0, 5.0))).max() > 1.0 + 1e-9
+    assert grows == (share < 1.0)
+
+
+def test_a_bob_that_nothing_holds_has_no_place():
+    """Gravity along the joint's axis leaves it anywhere; a sideways pull on the carriage does not reach it."""
+    anywhere = hanging().at(load=Load(push=3.0, gravity=[0.0, 0.0, -9.81]))
+    assert anywhere.posture.angles[1] == pytest.approx(-1.2)
+    with pytest.raises(EquilibriumError, match="no place was found where the free joint 'bob' is in balance"):
+        hanging(q=1.0).at(load=Load(gravity=[0.0, -9.81]))
+
+
+# --- settling ---------------------------------------------------------------------------------------------
+
+
+def test_a_device_settles_where_the_load_alone_is_in_balance():
+    """Under its own weight the handle slides along the surface until the hand's force is that which is given."""
+    device, force, gravity = load_device("five-bar"), [0.0, -5.0], [0.0, -9.81]
+    asked = device.at((0.02, 0.24), load=Load(push=-5.0, gravity=gravity))
+    assert abs(asked.equilibrium.hand_force[0]) > 1e-2
+    settled = device.at((0.02, 0.24), load=Load(force=force, gravity=gravity, settle=True))
+    assert settled.equilibrium.hand_force == pytest.approx([0.0, -5.0, 0.0], abs=1e-9)
+    assert settled.posture.position[1] == pytest.approx(0.24, abs=1e-12)
+    assert abs(settled.posture.position[0]) < 0.02
+    with pytest.raises(EquilibriumError, match=r"here the hand has to supply 1\.003 N more across"):
+        device.at((0.02, 0.24), load=Load(force=[1.0, -5.0], settle=True))
+
+
+@pytest.mark.parametrize("name", ["five-bar", "openwrist"])
+def test_motors_are_counted_where_they_were_asked_to_stand(name):
+    device = completed(name, np.random.default_rng(1))
+    asked = device.at()
+    load = Load(push=1.0 if name == "openwrist" else 8.0, posture_of="motors")
+    point = device.at(load=load)
+    driven = device.mechanism.driven
+    assert point.equilibrium.counted.angles[driven] == pytest.approx(asked.posture.angles[driven], abs=1e-10)
+    assert np.max(np.abs(point.posture.angles - asked.posture.angles)) > 1e-4
+
+
+# --- MuJoCo -----------------------------------------------------------------------------------------------
+
+
+class Engine:
+    """MuJoCo's generalised forces on the independent joints of a mechanism, at rest."""
+
+    def __init__(self, mechanism, gravity):
+        self.joints, self.mechanism = Joints(mechanism), mechanism
+        self.model = mujoco.MjModel.from_xml_string(mjcf(mechanism))
+        self.model.opt.gravity[:] = gravity
+        self.data = mujoco.MjData(self.model)
+        self.moved = [i for i in moving_links(mechanism) if mechanism.links.joint[i] <= BALL_X]
+        self.order = []
+        for i in self.moved:
+            first, count = int(self.model.joint(str(i)).dofadr[0]), 3 if self.is_ball(i) else 1
+            self.order += range(first, first + count)
+
+    def is_ball(self, link):
+        return self.mechanism.links.joint[link] == BALL_X
+
+    def forces(self, q, force, moment):
+        """Of gravity, and of a force (3,) and a moment (3,) on the handle, (c,)."""
+        for i in self.moved:
+            turn = quaternion(Rotation.from_rotvec(q[i : i + 3]).as_matrix()) if self.is_ball(i) else q[i]
+            self.data.joint(str(i)).qpos[:] = turn
+        mujoco.mj_forward(self.model, self.data)
+        J, W = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jacSite(self.model, self.data, J, W, self.model.site("the handle").id)
+        pushed = J.T @ force + W.T @ moment - self.data.qfrc_bias
+        return self.joints.at(q).B.T @ pushed[self.order]
+
+
+@pytest.mark.parametrize("kind", ["five-bar", "spatial arm", "spatial loop", "changing ratios", "every joint"])
+def test_mujoco_s_forces_are_in_balance_and_change_as_ours(kind):
+    """Hand, gravity and drives on the links; and the links' half of the stiffness, where torques are constant."""
+    compared = 0
+    for point in random_points(kind, seed=20, count=4):
+        gravity = np.array([0.0, 0.0, 0.0] if kind == "every joint" else [2.0, -3.0, -9.0])
+        mechanism = replace(point.mechanism, gravity_compensation="none")
+        load = replace(point.load, hand="dead", gravity=gravity, surface_radius=np.inf)
+        point = replace(point, mechanism=mechanism, load=load)
+        found, drives = point.equilibrium, point.loaded_mechanism.drives
+        engine, q = Engine(mechanism, gravity), point.posture.angles
+        wrench, c = (found.hand_force, found.hand_moment), engine.joints.count
+        springs = found.springs.torque(found.deflections)
+        handed = np.where(np.isfinite(drives.stiffness), springs, found.torques)
+        off = engine.forces(q, *wrench) + found.drives.T.T @ handed - torques_of_free_springs(mechanism, q)
+        assert np.max(np.abs(off)) <= 1e-9 * max(1.0, np.max(np.abs(found.torques)))
+        change = -np.stack(
+            [
+                sum(w / 1e-4 * engine.forces(engine.joints.moved(q, s * 1e-4 * e), *wrench) for s, w in FOURTH)
+                for e in np.eye(c)
+            ],
+            axis=1,
+        )
+        plants = point.loaded_plants
+        own = plants.loaded.stiffness - plants.unloaded.stiffness
+        own = own + (0.0 if plants.loaded.circulatory is None else plants.loaded.circulatory)
+        own = own[:c, :c] + np.tensordot(handed, found.drives.Z, 1)
+        if mechanism.free:  # the rates of a ball joint are no coordinates where a force turns it
+            own, change = (0.5 * (each + each.T) for each in (own, change))
+        assert own == pytest.approx(change, abs=1e-8 * max(1.0, np.max(np.abs(change))))
+        compared += np.max(np.abs(change)) > 0.01
+    assert compared >= 2
+
+
+def torques_of_free_springs(mechanism, q):
+    """Torques (c,) of the free joints' springs, which are at rest where the assembly has these joints."""
+    rest = next(iter(mechanism.assemblies.values()))
+    torques = np.zeros(len(mechanism.driven) + len(mechanism.free))
+    for i, link in enumerate(mechanism.free):
+        torques[len(mechanism.driven) + i] = mechanism.links.joint_stiffness[link] * (q[link] - rest[link])
+    return torques
+
+
+# --- batches ----------------------------------------------------------------------------------------------
+
+
+def test_a_batch_has_the_postures_of_each_and_marks_those_without_equilibrium():
+    device = load_device("five-bar").with_({"drives.motor-right.torque_limit_Nm": 0.034})
+    places = [(0.0, 0.25), (0.0, 0.15), (0.6, 0.6), (0.2, 0.2)]
+    load = Load(push=-6.5, posture_of="motors")
+    points = device.at(places, load=load)
+    assert points.status.tolist() == [OK, OK, OUT_OF_REACH, NO_EQUILIBRIUM]
+    for i in (0, 1):
+        alone = device.at(places[i], load=load)
+        assert points.posture.angles[i] == pytest.approx(alone.posture.angles, abs=1e-12)
+        assert points.posture.position[i] == pytest.approx(alone.posture.position, abs=1e-12)
+        assert points[i].plant.stiffness == pytest.approx(alone.plant.stiffness, rel=1e-9, abs=1e-6)
+    assert np.isnan(points.posture.angles[3]).all()
+    values = points.measure("stiffness_max")
+    assert values.status.tolist() == [OK, OK, OUT_OF_REACH, NO_EQUILIBRIUM]
+    assert np.isfinite(values.values[:2]).all()
+    assert np.isnan(values.values[2:]).all()
+    assert values.values[0] == pytest.approx(device.at(places[0], load=load).chart(decay=False).stiffness_max)
+    with pytest.raises(
+        EquilibriumError, match=r"needs 0\.05473 N m at its motor, more than its limit of 0\.034 N m"
+    ):
+        device.at(places[3], load=load)
+
+
+def test_a_batch_of_handles_with_an_orientation_has_it_under_load():
+    device = completed("openwrist", np.random.default_rng(1))
+    load = Load(push=1.0, posture_of="motors")
+    turns = [(0.1, 0.0, 0.05), (0.0, 0.1, 0.0)]
+    points = device.at(orientation=turns, load=load)
+    assert (points.status == OK).all()
+    for i, turn in enumerate(turns):
+        alone = device.at(orientation=turn, load=load)
+        assert points.posture.rotation[i] == pytest.approx(alone.posture.rotation, abs=1e-12)
+        assert points.posture.angles[i] == pytest.approx(alone.posture.angles, abs=1e-12)
+
+
+# --- what cannot be meant ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"force": [0.0, 0.0]}, "a load of 0 N leaves a one-sided wall at the edge of contact"),
+        ({"moment": [0.0, 0.0, 0.0]}, "a load of 0 N"),
+        ({"push": 0.0}, "a load of 0 N"),
+        ({"force": [1.0]}, r"force must be two or three finite numbers \[N\], got \[1.0\]"),
+        ({"force": [1.0, 2.0, 3.0, 4.0]}, "force must be two or three finite numbers"),
+        ({"force": 5.0}, r"force must be two or three finite numbers \[N\], got 5.0"),
+        ({"force": "down"}, "force must be two or three finite numbers"),
+        ({"force": [0.0, np.nan]}, "force must be two or three finite numbers"),
+        ({"moment": [0.0, np.inf]}, r"moment must be two or three finite numbers \[N m\]"),
+        ({"gravity": 9.81}, r"gravity must be two or three finite numbers \[m/s\^2\], got 9.81"),
+        ({"push": np.inf}, r"push must be a finite number \[N\], got inf"),
+        ({"push": "5"}, r"push must be a finite number \[N\], got '5'"),
+        ({"force": [1.0, 0.0], "push": 1.0}, "push is given beside force; give one of them"),
+        ({"force": [1.0, 0.0], "moment": [0.0, 1.0]}, "moment is given beside force"),
+        ({"surface_radius": 0.0}, "surface_radius must be a number but 0, or inf"),
+        ({"surface_radius": np.nan}, "surface_radius must be a number but 0"),
+        ({"surface_radius": "flat"}, "surface_radius must be a number but 0.*got 'flat'"),
+        ({"settle": True}, "settle needs a load"),
+        ({"settle": True, "push": 1.0}, "settle needs a load"),
+        ({"hand": "soft"}, "hand must be 'dead' or 'follower' or 'neglected', got the text 'soft'"),
+        ({"posture_of": "links"}, "posture_of must be 'handle' or 'motors'"),
+        ({"branch": "up"}, "branch must be 'forward' or 'backward'"),
+    ],
+)
+def test_a_load_that_cannot_be_meant_is_one_clear_error(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        Load(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"load": (0.0, 0.0)}, DeviceError, "five-bar: load: a load of 0 N"),
+        ({"load": "down"}, DeviceError, "five-bar: load: force must be two or three finite numbers"),
+        ({"gravity": (0.0, np.nan)}, DeviceError, "five-bar: load: gravity must be two or three finite numbers"),
+        ({"load": (5.0, 0.0)}, LoadError, r"the load \(5, 0, 0\) does not push along the rendered direction"),
+        ({"load": (1.0, -5.0)}, LoadError, r"has a part \(1, 0, 0\) across .* needs \(-0.00291587, 0, 0\); give"),
+        (
+            {"load": Load(moment=[0.0, 0.0, 1.0])},
+            LoadError,
+            "rendered along a direction; give the load as a force",
+        ),
+        ({"load": (0.0, 0.0, 1.0), "axis": (0.0, 0.0, 1.0)}, LoadError, "cannot push about an axis"),
+        (
+            {"load": Load(force=[0.0, -5.0], settle=True), "axis": (0.0, 0.0, 1.0)},
+            LoadError,
+            "settle is for loads on a handle whose position the drives control; leave it out",
+        ),
+        ({"load": Load(push=5e9)}, EquilibriumError, r"no equilibrium was found under a push of 5e\+09 N"),
+        (
+            {"load": (0.0, -5.0), "directions": [(1.0, 0.0), (0.0, 1.0)]},
+            SeveralDirectionsError,
+            "over several directions: a load",
+        ),
+        ({"load": (0.0, -5.0), "model": "two-mass"}, ModelError, "'two-mass' has no form under load"),
+        ({"load": (0.0, -5.0), "model": "motor-mass"}, ModelError, "use 'full' or 'rigid'"),
+    ],
+)
+def test_a_load_that_a_device_cannot_bear_is_one_clear_error(arguments, error, words):
+    with pytest.raises(error, match=words):
+        ask_all(load_device("five-bar").at(**arguments))
+
+
+def ask_all(point):
+    """What a load has to be in balance for."""
+    return point.plant_of_directions if point.direction_count > 1 else point.plant
+
+
+def test_limits_of_motors_and_computer_bound_the_load():
+    device = load_device("five-bar")
+    weak = device.with_({"drives.motor-right.torque_limit_Nm": 0.034})
+    assert weak.at(load=(0.0, -6.0)).plant.size == 3
+    with pytest.raises(
+        EquilibriumError, match=r"drive 'motor-right' needs 0\.03415 N m at its motor, more than its"
+    ):
+        weak.at(load=(0.0, -7.0))
+    limited = device.with_({"loop.saturation.force_N": 4.0})
+    assert limited.at(load=(0.0, -3.9)).plant.size == 3
+    with pytest.raises(EquilibriumError, match=r"takes 5\.00512 N of the wall, more than the force limit of 4 N"):
+        limited.at(load=(0.0, -5.0)).plant  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["published-two-mass", "hapkit-course"])
+@pytest.mark.parametrize("arguments", [{"load": (0.0, -5.0)}, {"gravity": (0.0, -9.81)}, {"load": Load(push=1.0)}])
+def test_a_device_without_a_mechanism_bears_no_load(name, arguments):
+    with pytest.raises(DeviceError, match=r"load: needs a \[mechanism\], whose forces turn as it moves"):
+        load_device(name).at(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"force_N": [0.0, 0.0]}, "load.force_N: "),
+        ({"force_N": [1.0]}, "load.force_N: must have at least 2 elements"),
+        ({"force_N": [0.0, float("nan")]}, r"load.force_N.1: must be finite"),
+        (
+            {"force_N": [0.0, -5.0], "push_N": 1.0},
+            "load.push_N: stands beside force_N; only one of them is allowed",
+        ),
+        ({"push_N": 0.0}, "load.push_N: is 0, which leaves a one-sided wall at the edge of contact"),
+        ({"push_N": "5"}, "load.push_N: must be a number"),
+        ({"settle": True}, "load.settle: needs force_N"),
+        ({"settle": True, "push_N": 1.0}, "load.settle: needs force_N"),
+        ({"surface_radius_m": 0.0}, "load.surface_radius_m: must not be 0; remove it for a plane"),
+        ({"hand": "soft"}, "load.hand: must be 'dead', 'follower' or 'neglected'"),
+        ({"force": [0.0, 5.0]}, "load.force: is not a key of a device file; did you mean 'force_N'"),
+        ({"gravity_m_per_s2": -9.81}, "load.gravity_m_per_s2: must be a list"),
+        ({"spring_branch": "back"}, "did you mean 'backward'"),
+    ],
+)
+def test_a_file_s_load_that_cannot_be_meant_is_one_fault(table, words):
+    document = copy.deepcopy(load_device("five-bar").document) | {"load": table}
+    with pytest.raises(DeviceError, match=words) as caught:
+        from_document(document)
+    assert len(caught.value.faults) == 1
+
+
+def test_a_file_s_load_and_one_that_is_given_are_the_same():
+    document = copy.deepcopy(load_device("five-bar").document)
+    document["load"] = {
+        "force_N": [0.0, -5.0],
+        "gravity_m_per_s2": [0.0, 0.0, -9.81],
+        "hand": "follower",
+        "posture_of": "motors",
+        "surface_radius_m": -0.4,
+        "count_sideways": True,
+        "spring_branch": "backward",
+    }
+    written = from_document(document)
+    load = Load(
+        force=[0.0, -5.0],
+        gravity=[0.0, 0.0, -9.81],
+        hand="follower",
+        posture_of="motors",
+        surface_radius=-0.4,
+        count_sideways=True,
+        branch="backward",
+    )
+    given = load_device("five-bar").at(load=load)
+    point = written.at()
+    for name in Load.__dataclass_fields__:
+        assert np.array_equal(getattr(point.load, name), getattr(given.load, name)), name
+    assert np.array_equal(point.plant.stiffness, given.plant.stiffness)
+    lighter = written.at(load=(0.0, -2.0), gravity=(0.0, 0.0, -1.0))
+    assert lighter.load.force.tolist() == [0.0, -2.0, 0.0]
+    assert lighter.load.weight.tolist() == [0.0, 0.0, -1.0]
+    assert (lighter.load.hand, lighter.load.posture_of) == ("follower", "motors")
+    pushed = written.under(Load(push=-1.0)).at()
+    assert (pushed.load.force, pushed.load.push, pushed.load.hand) == (None, -1.0, "dead")
+
+
+def test_a_point_without_a_load_has_no_equilibrium_and_no_device_file_needs_one():
+    with pytest.raises(OperatingPointError, match="no load is given, about which there would be an equilibrium"):
+        load_device("five-bar").at().equilibrium  # noqa: B018
+    point = load_device("five-bar").at([(0.0, 0.25), (0.6, 0.6)], load=(0.0, -5.0))
+    with pytest.raises(OperatingPointError, match="out of reach, singular or without equilibrium"):
+        point[1].equilibrium  # noqa: B018
+    with pytest.raises(ValueError, match="a load needs a mechanism"):
+        OperatingPoint(point.controller, given_plant=point[0].plant, load=Load(push=1.0))
