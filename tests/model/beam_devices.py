@@ -183,7 +183,7 @@ def spatial_loop():
         links,
         [drive("crank", 0.5)],
         joints,
-        (0.2, 1.0, 0.3),
+        (-0.5, 0.2, 1.0),
         loops=[meeting | {"points_m": [[0.25, 0.0, 0.0], (R.T @ (tip - o)).tolist()]}],
         handle={"link": "rocker", "point_m": [0.2, 0.0, 0.01]},
     )

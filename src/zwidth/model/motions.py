@@ -314,7 +314,21 @@ class Motions:
             inverse = scale[:, None] * np.linalg.pinv(rows, rcond=RANK)
         B2 = np.zeros((m + e, B.shape[1], B.shape[1]))
         B2[hanging] = -np.tensordot(inverse, B.T @ A2 @ B, 1)
-        return B, B2
+        return B, self._without_stress(B, B2) if e else B2
+
+    def _without_stress(self, B: Floats, B2: Floats) -> Floats:
+        """B2, of all that close the loops the one whose deformations no stress of the elastic motions works on.
+
+        Any of them will do where the links are not stressed. Under load they are, by K eps of eps = B xi, which would
+        do work on the deformations in B2, and be a stiffness of the order of the load.
+        """
+        motions = B[:, self.joint_count :]
+        own = np.linalg.inv(self._stiffness_of(motions))
+        stress = np.zeros((motions.shape[1], *B2.shape[1:]))
+        for link, beam in self.flexible.items():
+            bent = self._columns(link)
+            stress += np.tensordot((beam.body.stiffness @ motions[bent]).T, B2[bent], 1)
+        return np.asarray(B2 - np.tensordot(motions @ own, stress, 1))
 
     def _natural(self, motions: Floats) -> Floats:
         """The natural modes (m + e, k) among as many motions in which no drive moves, the slowest first, of a mass
