@@ -233,13 +233,6 @@ def _loaded_states(
     readings = np.array([each.reading[:n] for each in sampled]).reshape(-1, n)
     pushes = np.array([each.input[n : 2 * n] / T for each in sampled]).reshape(-1, n)
     drag = B + sum((d.damping * np.outer(V.T @ d.along, V.T @ d.along) for d in lags), np.zeros((n, n)))
-<<<<<<< HEAD
-    # a large plant's fast modes are no free motions, and many powers of ten stiffer than what a load adds
-    fast = squared * T**2 > 1.0 if n > FEW else np.zeros(n, dtype=np.bool_)
-    held, pushed = K - pushes.T @ readings, pushes.T @ readings
-    neutral = _nullity(held @ _slow(held, fast), K[~fast], pushed[~fast])
-    still = _nullity(np.vstack([K, readings, drag / T]) @ _slow(K, fast), K[~fast], drag[~fast] / T, readings)
-=======
     feedback = pushes.T @ readings
     # each mode in its own units, so that the stiff ones do not hide the free ones
     bare = np.diag(K) if plant.without_load is None else np.diag(V.T @ plant.without_load.stiffness @ V)
@@ -247,7 +240,6 @@ def _loaded_states(
     scale = 1.0 / np.sqrt(np.maximum(np.abs(bare), added))
     neutral = _nullity(scale[:, None] * (K - feedback) * scale)
     still = _nullity(np.vstack([scale[:, None] * part * scale for part in (K, feedback, drag / T)]))
->>>>>>> main
     states = PlantStates((), form, form.second_direct, np.zeros(0), (), sampled, neutral + still)
     return _without_fast(states, form, T) if n > FEW else states
 
@@ -272,22 +264,8 @@ def _without_fast(states: PlantStates, form: FirstOrderForm, period: float) -> P
     )
 
 
-<<<<<<< HEAD
-def _slow(stiffness: Floats, fast: NDArray[np.bool_]) -> Floats:
-    """Motions (n, s) of the coordinates that are not fast, whom the fast ones follow without a force of their own."""
-    motions = np.eye(len(stiffness))[:, ~fast]
-    if np.any(fast):
-        motions[fast] = -np.linalg.solve(stiffness[np.ix_(fast, fast)], stiffness[np.ix_(fast, ~fast)])
-    return motions
-
-
-def _nullity(matrix: Floats, *parts: Floats) -> int:
-    """Dimension of what a matrix (r, n) maps to 0, to rounding of its parts."""
-    scale = max((float(np.max(np.abs(part), initial=0.0)) for part in parts), default=0.0)
-=======
 def _nullity(matrix: Floats) -> int:
     """Dimension of what a matrix (r, n) with entries of the order of 1 maps to rounding."""
->>>>>>> main
     values = np.linalg.svd(matrix, compute_uv=False)
     return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL))
 
