@@ -112,11 +112,11 @@ def test_frequencies_of_a_pressed_or_pulled_beam(make, share):
     frame = framed(found, document, at, elements=16)
     expected, _ = modes_of(frame.under_axial_forces([force]).K, frame.M)
     own = squared(plant)
-    bends = expected[expected > 1.0][:4]
+    bends = expected[expected > 1.0][:3]
     for each in bends:
         assert np.min(np.abs(own / each - 1.0)) < 1e-4
     unloaded, _ = modes_of(frame.K, frame.M)
-    assert np.max(np.abs(bends / unloaded[unloaded > 1.0][:4] - 1.0)) > 0.02
+    assert np.max(np.abs(bends / unloaded[unloaded > 1.0][:3] - 1.0)) > 0.02
 
 
 @pytest.mark.parametrize("closes", ["axis", "point"])
@@ -200,7 +200,7 @@ def test_the_handle_stays_where_it_is_asked_for(make):
     u = free.direction
     at = found.at(load=Load(push=-1.0))
     away = at.equilibrium.handle_place - free.posture.position
-    moves = np.linalg.svd(free.posture.jacobian)
+    moves = np.linalg.svd(at.posture.jacobian)
     moves = moves[0][:, : np.count_nonzero(moves[1] > 1e-9)]
     assert np.max(np.abs(moves.T @ away)) < 1e-9
     assert at.equilibrium.handle_place == pytest.approx(at.posture.position, abs=1e-12)
