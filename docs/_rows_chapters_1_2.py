@@ -1,10 +1,11 @@
-"""Chapters 1 and 2: spring stability, several rendered directions."""
+"""Chapters 1 and 2: spring stability, the haptic equilibrium, several rendered directions."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from docs._comparison_row import Claim, Number, Row
+from docs._comparison_row import ANOTHER_QUESTION, Claim, Number, Reason, Row
+from gallery import haptic_equilibrium as equilibrium
 from gallery import rendered_directions as plane
 from gallery import spring_stability as spring
 
@@ -40,6 +41,57 @@ def spring_stability() -> list[Row]:
             "very conservative and far from practical applications",
             f"β = {beta}: p up to {spring.largest_p:.4f}, of {stable:.4f} without a spring; passive {passive:.4f}",
             passive < spring.largest_p < 0.5 * stable,
+        ),
+    ]
+
+
+def haptic_equilibrium() -> list[Row]:
+    """(2.4), (2.5)."""
+    e = equilibrium
+    across, wall = float(e.found.sideways_force[0]), e.found.wall_force
+    both = np.isclose([across, wall], [e.across, e.wall_force], rtol=1e-8)
+    return [
+        Claim(
+            "(2.4)",
+            "haptic equilibrium of the five-bar under 5 N",
+            "0 = Q_h + Q_k + Q_v + Q_o: the interaction forces and those of the operator balance via the device",
+            f"so they do, behind flexible drives with a wall that pushes with {wall:.5f} N and {1e3 * across:.4f} mN "
+            "of the hand across the direction; by circles and a solver the same",
+            bool(both.all()),
+        ),
+        Claim(
+            "(2.5)",
+            "external forces and small motions along the wall's direction",
+            "external forces contribute to the equilibrium, and have negligible effect on the perturbed dynamics",
+            f"gravity along the five-bar's plane changes its largest stiffness by {100.0 * e.change_by_gravity:.1e} %; "
+            f"a hand's push of 5 N by {100.0 * e.change:.4f} %, with the change of its lever arms neglected by "
+            f"{100.0 * e.change_neglected:.4f} %",
+            abs(e.change_by_gravity) < 1e-5 and abs(e.change) < 1e-3,
+        ),
+        Claim(
+            "(2.5)",
+            "the same along the surface, where no wall acts",
+            "external forces contribute to the equilibrium, and have negligible effect on the perturbed dynamics",
+            f"under gravity the five-bar slides away at {e.growth_by_gravity:.3f} 1/s, and pulled with 5 N at "
+            f"{e.growth:.4f} 1/s, which would be {e.growth_neglected:.2f} 1/s with the change of the hand's lever arms "
+            "neglected",
+            False,
+            Reason(
+                ANOTHER_QUESTION,
+                "the sentence is about the rendered direction, on which the row above agrees; a motion that is free "
+                "without load has nothing else to hold it",
+                e.growth_by_gravity > 1.0 and e.growth_neglected > 10.0 * e.growth > 0.0,
+            ),
+        ),
+        Number(
+            "(2.5)",
+            f"spectral radius at {e.STIFFNESS / 1e3:g} kN/m and {e.DAMPING:g} Ns/m under 5 N, motion along the surface "
+            "among the roots",
+            e.spectral_radius,
+            second_value=e.radius_by_hand,
+            tolerance=1e-9,
+            digits=9,
+            route="circles, complex steps, matrix exponential",
         ),
     ]
 
@@ -82,4 +134,4 @@ def rendered_directions() -> list[Row]:
 
 def rows() -> list[Row]:
     """Both chapters."""
-    return [*spring_stability(), *rendered_directions()]
+    return [*spring_stability(), *haptic_equilibrium(), *rendered_directions()]

@@ -25,10 +25,9 @@ Item = tuple[str, str, int]
 # What no row covers, and why.
 NOT_COVERED = (
     (
-        "(2.1)–(2.5)",
-        "The equations of motion in general form, the haptic equilibrium and its linearisation. They define "
-        "terms. zwidth linearises at rest, where nothing but the operator's and the wall's forces acts, and "
-        "these balance.",
+        "(2.1)–(2.3)",
+        "The equations of motion in general form, the kinds of forces in them, and rendered directions: they define "
+        "terms.",
     ),
     ("(2.19), (2.20)", "How the generalised forces are split, and the rigid-body model with them: definitions."),
     (
