@@ -66,8 +66,8 @@ def haptic_equilibrium() -> list[Row]:
             "(2.5)",
             "external forces and small motions along the wall's direction",
             "external forces contribute to the equilibrium, and have negligible effect on the perturbed dynamics",
-            f"gravity along its plane changes the five-bar's largest stiffness by {by_gravity:.1e} %; a hand's push "
-            f"of 5 N by {by_push:.4f} %, with the change of its lever arms neglected by {neglected:.4f} %",
+            f"gravity along its plane changes the five-bar's largest stiffness by {by_gravity:.1e} %; a hand's "
+            f"push of 5 N by {by_push:.4f} %, with the change of its lever arms neglected by {neglected:.4f} %",
             abs(e.change_by_gravity) < 1e-5 and abs(e.change) < 1e-3,
         ),
         Claim(
