@@ -49,23 +49,25 @@ def haptic_equilibrium() -> list[Row]:
     """(2.4), (2.5)."""
     e = equilibrium
     across, wall = float(e.found.sideways_force[0]), e.found.wall_force
+    by_gravity, by_push, neglected = (
+        100.0 * share for share in (e.change_by_gravity, e.change, e.change_neglected)
+    )
     both = np.isclose([across, wall], [e.across, e.wall_force], rtol=1e-8)
     return [
         Claim(
             "(2.4)",
-            "haptic equilibrium of the five-bar under 5 N",
+            "haptic equilibrium of the five-bar at (0.05, 0.2) m under 5 N",
             "0 = Q_h + Q_k + Q_v + Q_o: the interaction forces and those of the operator balance via the device",
-            f"so they do, behind flexible drives with a wall that pushes with {wall:.5f} N and {1e3 * across:.4f} mN "
-            "of the hand across the direction; by circles and a solver the same",
+            f"so they do, behind flexible drives with {wall:.5f} N of the wall and {1e3 * across:.4f} mN of the "
+            "hand across the direction; by circles and a solver the same",
             bool(both.all()),
         ),
         Claim(
             "(2.5)",
             "external forces and small motions along the wall's direction",
             "external forces contribute to the equilibrium, and have negligible effect on the perturbed dynamics",
-            f"gravity along the five-bar's plane changes its largest stiffness by {100.0 * e.change_by_gravity:.1e} %; "
-            f"a hand's push of 5 N by {100.0 * e.change:.4f} %, with the change of its lever arms neglected by "
-            f"{100.0 * e.change_neglected:.4f} %",
+            f"gravity along its plane changes the five-bar's largest stiffness by {by_gravity:.1e} %; a hand's "
+            f"push of 5 N by {by_push:.4f} %, with the change of its lever arms neglected by {neglected:.4f} %",
             abs(e.change_by_gravity) < 1e-5 and abs(e.change) < 1e-3,
         ),
         Claim(
@@ -73,20 +75,20 @@ def haptic_equilibrium() -> list[Row]:
             "the same along the surface, where no wall acts",
             "external forces contribute to the equilibrium, and have negligible effect on the perturbed dynamics",
             f"under gravity the five-bar slides away at {e.growth_by_gravity:.3f} 1/s, and pulled with 5 N at "
-            f"{e.growth:.4f} 1/s, which would be {e.growth_neglected:.2f} 1/s with the change of the hand's lever arms "
-            "neglected",
+            f"{e.growth:.4f} 1/s, which would be {e.growth_neglected:.2f} 1/s with the change of the hand's lever "
+            "arms neglected",
             False,
             Reason(
                 ANOTHER_QUESTION,
-                "the sentence is about the rendered direction, on which the row above agrees; a motion that is free "
-                "without load has nothing else to hold it",
+                "the sentence is about the rendered direction, on which the row above agrees; nothing else holds "
+                "a motion that is free without load",
                 e.growth_by_gravity > 1.0 and e.growth_neglected > 10.0 * e.growth > 0.0,
             ),
         ),
         Number(
             "(2.5)",
-            f"spectral radius at {e.STIFFNESS / 1e3:g} kN/m and {e.DAMPING:g} Ns/m under 5 N, motion along the surface "
-            "among the roots",
+            f"spectral radius at {e.STIFFNESS / 1e3:g} kN/m and {e.DAMPING:g} Ns/m under 5 N, motion along the "
+            "surface among the roots",
             e.spectral_radius,
             second_value=e.radius_by_hand,
             tolerance=1e-9,

@@ -26,8 +26,8 @@ Item = tuple[str, str, int]
 NOT_COVERED = (
     (
         "(2.1)–(2.3)",
-        "The equations of motion in general form, the kinds of forces in them, and rendered directions: they define "
-        "terms.",
+        "The equations of motion in general form, the kinds of forces in them, and rendered directions: they "
+        "define terms.",
     ),
     ("(2.19), (2.20)", "How the generalised forces are split, and the rigid-body model with them: definitions."),
     (

@@ -1,4 +1,4 @@
-"""Write the documentation's pictures: the README's chart, pushes of a hand, and two of the thesis's figures."""
+"""Write the pictures of the documentation: the README's chart, a hand's pushes, two of the thesis's figures."""
 
 from __future__ import annotations
 

@@ -4,9 +4,9 @@ The thesis has external forces contribute to the equilibrium and neglects what t
 of first order is kept: the links feel the hand's force all the time, with lever arms that change as they move, and
 the computer turns the wall's force with the motors that it counts, once per sample and held.
 
-Second route: both arms by circles that meet (as in `five_bar`, whose mass matrix this takes), derivatives by complex
-steps, the balance by scipy, and the period by a matrix exponential. The motion along the surface is among the
-roots, and is the slowest of them.
+Second route: both arms by circles that meet (as in `five_bar`, whose mass matrix this takes), derivatives by
+complex steps, the balance by scipy, and the period by a matrix exponential. The motion along the surface is among
+the roots, and is the slowest of them.
 
 Run `python -m gallery.haptic_equilibrium` to see both.
 """

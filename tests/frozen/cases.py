@@ -99,6 +99,7 @@ _SHARE = {
     "simulate": 1,
     "polar": 1,
     "map": 1,
+    "load": 4,
     "move": 1,
     "sensitivity": 3,
     "robust": 3,
@@ -210,6 +211,9 @@ def _lines(
         case "polar" if in_space:
             yield "", ("--count", "8")
             yield "line", ("--count", "5", "--plane", "xz")
+        case "load" if in_space:
+            yield "", ("--count", "3")
+            yield "weight", ("--count", "3", "--push", "0.5", "--gravity", "0,-9.81")
         case "map" if in_space:
             yield "stiffness", ("--measure", "stiffness_max", "--measure", "isotropy", "--cells", "5,4")
             yield "worst", ("--measure", "rigid_mass", "--direction", "worst", "--cells", "4,4")

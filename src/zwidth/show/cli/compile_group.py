@@ -36,6 +36,8 @@ COMMANDS: Final = (
         "chart linkage.toml --with-direction 1,0",
         "chart linkage.toml --model two-mass --operator thesis-arm",
         "show arm.toml --at upper=0.7,lower=1.4",
+        "load linkage.toml --count 3",
+        "chart arm.toml --set load.force_N=[0,-2] --set load.settle=true",
         "simulate masses.toml --stiffness 4000 --damping 10 --duration 0.05",
     ),
     (
