@@ -102,8 +102,8 @@ def squared(plant):
 @pytest.mark.parametrize("make", [column, strut])
 @pytest.mark.parametrize("share", [-0.8, -0.2, 0.3, 2.0])
 def test_frequencies_of_a_pressed_or_pulled_beam(make, share):
-    """Bending modes of both planes, against elements under the same axial force, of any size: the load is along the
-    beam and shifts nothing."""
+    """Bending modes of both planes, against elements under the same axial force, of any size: the load is along
+    the beam and shifts nothing."""
     document = with_beams(make(), modes=6)
     found = from_document(document)
     force = share * (EULER if make is strut else EULER / 4.0)

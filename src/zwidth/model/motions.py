@@ -319,8 +319,8 @@ class Motions:
     def _without_stress(self, B: Floats, B2: Floats) -> Floats:
         """B2, of all that close the loops the one whose deformations no stress of the elastic motions works on.
 
-        Any of them will do where the links are not stressed. Under load they are, by K eps of eps = B xi, which would
-        do work on the deformations in B2, and be a stiffness of the order of the load.
+        Any of them will do where the links are not stressed. Under load they are, by K eps of eps = B xi, which
+        would do work on the deformations in B2, and be a stiffness of the order of the load.
         """
         motions = B[:, self.joint_count :]
         own = np.linalg.inv(self._stiffness_of(motions))
