@@ -38,6 +38,8 @@ def arm_inconsistencies(document: dict[str, Any], checks: tuple[Check, ...]) -> 
                 yield ("arm", "links", i, key), "is missing; give it, 0 for a massless link"
         if "free" in link:
             yield ("arm", "links", i, "free"), "does not apply: all joints of an arm are free; remove it"
+        if "beam" in link:
+            yield ("arm", "links", i, "beam"), "does not apply: the links of an arm do not bend; remove it"
     names = {link["name"] for _, link in tables(arm, "links") if isinstance(link.get("name"), str)}
     hand = table(arm, "hand").get("link")
     if isinstance(hand, str) and names and hand not in names:

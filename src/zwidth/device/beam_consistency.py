@@ -9,6 +9,7 @@ from zwidth.device.faults import KeyPath, comma_list
 from zwidth.device.legs import members
 from zwidth.device.toml_access import is_number, table
 
+METHODS: Final = ("assumed-modes", "finite-elements", "lumped")
 KeyMessages = Iterator[tuple[KeyPath, str]]
 
 NUMBERS: Final = (
@@ -55,12 +56,16 @@ def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
             at,
             f"lacks {comma_list(lacks)}; give all of them (large numbers for what hardly gives), or a section",
         )
-    bending = beam.get("bending_stiffness_Nm2")
-    if isinstance(bending, list) and len(bending) != 2:
-        yield (*at, "bending_stiffness_Nm2"), f"must be one number or two, got {len(bending)}"
+    method = beam.get("method", "assumed-modes")
     for key, methods in (("elements", ("finite-elements",)), ("modes", ("finite-elements", "assumed-modes"))):
-        if key in beam and beam.get("method", "assumed-modes") not in methods:
-            yield (*at, key), f"does not go with method {beam.get('method')!r}; remove it"
+        if key in beam and method in METHODS and method not in methods:
+            yield (*at, key), f"does not go with method = {method!r}; remove it"
+    if "center_of_mass_m" in link and "mass_kg" not in link and "inertia_kg_m2" not in link:
+        yield (
+            (*place, "center_of_mass_m"),
+            "stands without mass_kg and inertia_kg_m2; give those of the whole link too, or remove it for the "
+            "beam's own",
+        )
     if ("mass_kg" in link) != ("inertia_kg_m2" in link):
         lacking = "inertia_kg_m2" if "mass_kg" in link else "mass_kg"
         yield (
@@ -74,7 +79,7 @@ def _wall(place: KeyPath, section: dict[str, Any]) -> KeyMessages:
     """A wall that is thicker than half of what it is the wall of."""
     across = [section[key] for key in ("outer_diameter_m", "width_m", "height_m") if is_number(section.get(key))]
     wall = section.get("wall_m")
-    if is_number(wall) and across and wall > 0.5 * min(across) * (1.0 + 1e-12):
+    if is_number(wall) and across and min(across) > 0.0 and wall > 0.5 * min(across) * (1.0 + 1e-12):
         solid = "rod" if "outer_diameter_m" in section else "rectangle"
         yield (
             (*place, "wall_m"),

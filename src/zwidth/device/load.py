@@ -15,6 +15,7 @@ from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
+from zwidth.device.legs import members
 from zwidth.device.load_choice import document_under, load_of_table
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.plausibility import warn_of_implausible
@@ -163,7 +164,7 @@ def build_device(
     surplus  its drives beyond the mechanism's freedom; None: to be found, of one design
     """
     section, controller = checked.mechanism, build.controller(checked.loop)
-    mechanism = _mechanism(section, label, surplus) if section else None
+    mechanism = _mechanism(section, document, label, surplus) if section else None
     reference, held = section.reference if section else None, checked.operator or checked.arm
     return Device(
         name=checked.name,
@@ -204,14 +205,18 @@ def _arm(section: ArmSection) -> Arm:
     return arm(section)
 
 
-def _mechanism(section: MechanismSection, label: str, surplus: tuple[int, ...] | None) -> Mechanism:
+def _mechanism(
+    section: MechanismSection, document: dict[str, Any], label: str, surplus: tuple[int, ...] | None
+) -> Mechanism:
     from zwidth.device.build_mechanism import mechanism  # compiled code, which a plant does without
     from zwidth.device.mechanism_check import surplus_drives
 
     try:
         made = mechanism(section)
     except BeamError as error:
-        raise fail(label, f"mechanism.links.{error.link}.{error.key}", str(error)) from None
+        place = next(each.path for each in members(section, "links") if each.entry.name == error.link)
+        path = dotted(("mechanism", *place, *error.key.split(".")), document)
+        raise fail(label, path, str(error)) from None
     beyond = surplus_drives(made) if surplus is None else surplus
     return replace(made, drives=replace(made.drives, surplus=beyond)) if beyond else made
 

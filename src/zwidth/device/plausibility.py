@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from zwidth.device.beam_plausibility import implausible_beams
 from zwidth.device.faults import Fault, KeyPath, dotted
 from zwidth.device.legs import written
 from zwidth.device.ratio_consistency import largest_ratio
@@ -66,6 +67,7 @@ def implausible(device: Device) -> list[Fault]:
     if mechanism:
         size = _size(mechanism)
         numbers += [*_lengths(mechanism), *_angles(mechanism), *_links(mechanism, size), *_drives(mechanism, size)]
+        numbers += implausible_beams(device)
     if device.response is not None:
         numbers += _response(device.response)
     return [Fault(device.label, dotted(path, document), message) for path, message in numbers]

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from math import pi, sqrt
+from typing import Final
+
+SINGLY: Final = 6  # modes that are named one by one
+# a mode, unless it grows by itself
+MODE: Final = re.compile(r"mode at ([\d.e+-]+) Hz(?! \(damping ratio -)")
 
 
 def motion_name(squared: float, decay: float) -> str:
@@ -35,6 +41,25 @@ def group_names(names: Sequence[str]) -> list[str]:
     ['2 rigid motions (0 Hz)', 'mode at 101 Hz']
     """
     return [_plural(name, count) if count > 1 else name for name, count in Counter(names).items()]
+
+
+def listed_names(names: Sequence[str]) -> list[str]:
+    """Names of motions for a line of text: equal ones together, and many modes, as links that bend have, by their
+    number and range.
+
+    >>> listed_names(["rigid motion (0 Hz)", *(f"mode at {100 * k} Hz" for k in range(1, 200))])
+    ['rigid motion (0 Hz)', '199 modes from 100 Hz to 19.9 kHz']
+    """
+    frequencies = [float(match[1]) for name in names if (match := MODE.match(name))]
+    if len(frequencies) <= SINGLY:
+        return group_names(names)
+    low, high = (_rounded_frequency(frequency) for frequency in (min(frequencies), max(frequencies)))
+    others = group_names([name for name in names if not MODE.match(name)])
+    return [*others, f"{len(frequencies)} modes from {low} to {high}"]
+
+
+def _rounded_frequency(frequency: float) -> str:
+    return f"{frequency / 1e3:.3g} kHz" if frequency >= 999.5 else f"{frequency:.3g} Hz"
 
 
 def _plural(name: str, count: int) -> str:

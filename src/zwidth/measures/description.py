@@ -12,10 +12,39 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.bindings import dexterity
 from zwidth.model.argument_checks import require
 from zwidth.model.effective_parameters import EffectiveParameters
+from zwidth.model.flexible_link import FlexibleLink, Method
 from zwidth.model.mechanism import FIXED, Floats, Mechanism
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant
 from zwidth.result import Result
+
+
+@dataclass(frozen=True)
+class BeamDescription:
+    """A link that bends.
+
+    method           by which it is modelled;   modes  kept beside its static deflections
+    mass             of the beam;   carried_mass  of what it carries of the link's mass [kg]
+    first_frequency  of the beam alone, clamped at its base [Hz]
+    """
+
+    link: str
+    method: Method
+    modes: int
+    mass: float
+    carried_mass: float
+    first_frequency: float
+
+    def document(self) -> dict[str, Any]:
+        """Its numbers by their keys."""
+        return {
+            "link": self.link,
+            "method": self.method,
+            "modes": self.modes,
+            "mass_kg": self.mass,
+            "carried_mass_kg": self.carried_mass,
+            "first_clamped_frequency_Hz": self.first_frequency,
+        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,6 +60,7 @@ class Description(Result):
     jacobian             (3, c)  [m/rad];   angular_jacobian  (3, c)  of the handle's orientation [rad/rad]
     mass_matrix          (c, c)  of the links [kg m^2]
     manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
+    beams                of the links that bend
     """
 
     effective: EffectiveParameters | None
@@ -43,6 +73,7 @@ class Description(Result):
     manipulability: float | None = None
     dynamic_manipulability: float | None = None
     isotropy: float | None = None
+    beams: tuple[BeamDescription, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The numbers by key and unit; None where inapplicable."""
@@ -61,6 +92,7 @@ class Description(Result):
             "manipulability": self.manipulability,
             "dynamic_manipulability": self.dynamic_manipulability,
             "isotropy": self.isotropy,
+            "beams": [beam.document() for beam in self.beams] if self.joints is not None else None,
         }
 
     def table(self) -> dict[str, list[Any]]:
@@ -110,6 +142,19 @@ def describe(point: OperatingPoint) -> Description:
         manipulability=float(dexterity.manipulability(point)),
         dynamic_manipulability=float(dexterity.dynamic_manipulability(point)) if known else None,
         isotropy=float(dexterity.isotropy(point)),
+        beams=tuple(_describe_beam(each, point.mechanism) for each in point.mechanism.flexible),
+    )
+
+
+def _describe_beam(link: FlexibleLink, mechanism: Mechanism) -> BeamDescription:
+    beam = link.beam
+    return BeamDescription(
+        mechanism.links.names[link.link],
+        link.method,
+        link.modes,
+        beam.mass_per_length * beam.length,
+        link.carried_mass,
+        float(link.frequencies[0]),
     )
 
 

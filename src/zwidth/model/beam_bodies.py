@@ -182,8 +182,8 @@ def _craig_bampton(M: Floats, K: Floats, interface: int, modes: int) -> Floats:
     e, inner = len(K), slice(interface, None)
     if modes > e - interface:
         raise ValueError(
-            f"modes must be at most {e - interface}, all that the beam's elements have, got {modes}; "
-            "give more elements, or None for everything"
+            f"must be at most {e - interface} modes, all that the elements have beside the static deflections, "
+            f"got {modes}; give more elements"
         )
     T = np.zeros((e, interface + modes))
     T[:interface, :interface] = np.eye(interface)

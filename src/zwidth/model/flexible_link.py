@@ -20,7 +20,7 @@ Method = Literal["assumed-modes", "finite-elements", "lumped"]
 class BeamError(ValueError):
     """A beam that its link cannot be.
 
-    link  its name;   key  of its table that is wrong: "mass_kg" or "inertia_kg_m2"
+    link  its name;   key  of its table that is wrong: "mass_kg", "inertia_kg_m2" or "beam.modes"
     """
 
     def __init__(self, link: str, key: str, message: str) -> None:
@@ -34,7 +34,7 @@ class FlexibleLink:
 
     link           index of the link
     beam           its properties;   body  the beam, with a station at each place where something is fixed to it
-    method         by which it is modelled
+    method         by which it is modelled;   modes  that it keeps beside its static deflections, as asked for
     damping_time   damping of the beam's own, this times its stiffness [s]
     carried_mass, carried_center (3,), carried_inertia (3, 3)  of the rest of the link, in its frame, the inertia
                    about the centre [kg], [m], [kg m^2]
@@ -44,6 +44,7 @@ class FlexibleLink:
     beam: BeamProperties
     body: FlexibleBody
     method: Method
+    modes: int = 0
     damping_time: float = 0.0
     carried_mass: float = 0.0
     carried_center: Floats = field(default_factory=lambda: np.zeros(3))

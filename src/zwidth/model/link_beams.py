@@ -36,7 +36,7 @@ def flexible_link(
               static deflections
     elements  of finite elements
     planar    (3,)  axis about which alone the link's inertia is known; None: all of it is
-    Raises    BeamError  for a beam that is heavier than its link
+    Raises    BeamError  for a beam that is heavier than its link, or has more modes than its elements
     """
     links = mechanism.links
     mass, centre, inertia = (np.asarray(each)[link] for each in (links.mass, links.center_of_mass, links.inertia))
@@ -67,7 +67,8 @@ def flexible_link(
         )
     stations = np.unique([min(max(x, 0.0), L) for x in _fixed_places(mechanism, link, carried if left else None)])
     body = _body(mechanism, link, beam, method, modes, elements, stations)
-    return FlexibleLink(link, beam, body, method, damping_time, left, carried, rest)
+    kept = 0 if method == "lumped" else modes
+    return FlexibleLink(link, beam, body, method, kept, damping_time, left, carried, rest)
 
 
 def _body(
@@ -82,7 +83,10 @@ def _body(
     if method == "lumped":
         return lumped_tip(beam, stations)
     if method == "finite-elements":
-        return finite_elements(beam, stations, elements, modes)
+        try:
+            return finite_elements(beam, stations, elements, modes)
+        except ValueError as error:  # all but the number of modes is known to fit
+            raise BeamError(mechanism.links.names[link], "beam.modes", str(error)) from None
     driven = [int(joint) for joint in mechanism.drives.joint]
     hub = mechanism.links.joint[link] == FIXED or link in driven or link in mechanism.free
     return assumed_modes(beam, stations, modes, "clamped" if hub else "pinned")

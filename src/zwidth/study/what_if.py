@@ -139,7 +139,9 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     obstacle = only(
         flexible, f"its {'drives are' if point.mechanism is not None else 'structure is'} rigid already"
     )
-    name = "rigid drives" if point.mechanism is not None else "rigid structure"
+    bends = point.mechanism is not None and bool(point.mechanism.flexible)
+    drives = "rigid drives and links" if bends else "rigid drives"
+    name = drives if point.mechanism is not None else "rigid structure"
     yield "rigid-drives", name, obstacle, lambda: point.in_model("rigid").loop
     faster = half_period(device, point)
     yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)

@@ -2,45 +2,54 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
-from zwidth.device.schema.value_types import Number, Section, WholeNumber, documented_key
+from zwidth.device.schema import magnitudes
+from zwidth.device.schema.value_types import Few, Number, Section, WholeNumber, documented_key
 
 Positive = Annotated[Number, Field(gt=0.0)]
+Length = Annotated[Positive, magnitudes.within(magnitudes.THINNEST, magnitudes.THICKEST, "m")]
+Stiffness = Annotated[Positive, magnitudes.within(magnitudes.SOFTEST, magnitudes.STIFFEST, "")]
+Modulus = Annotated[Positive, magnitudes.within(magnitudes.LEAST_MODULUS, magnitudes.LARGEST_MODULUS, "Pa")]
+MassPerLength = Annotated[Positive, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg/m")]
+InertiaPerLength = Annotated[
+    Positive, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m")
+]
+Density = Annotated[Positive, magnitudes.within(magnitudes.LEAST_DENSITY, magnitudes.LARGEST_DENSITY, "kg/m^3")]
 
 
 class RodShape(Section):
     """A solid round rod."""
 
     shape: Literal["rod"] = documented_key("a solid round rod")
-    diameter_m: Positive = documented_key("its diameter", "m")
+    diameter_m: Length = documented_key("its diameter", "m")
 
 
 class TubeShape(Section):
     """A round tube."""
 
     shape: Literal["tube"] = documented_key("a round tube")
-    outer_diameter_m: Positive = documented_key("its outer diameter", "m")
-    wall_m: Positive = documented_key("thickness of its wall", "m")
+    outer_diameter_m: Length = documented_key("its outer diameter", "m")
+    wall_m: Length = documented_key("thickness of its wall", "m")
 
 
 class RectangleShape(Section):
     """A solid rectangle."""
 
     shape: Literal["rectangle"] = documented_key("a solid rectangle")
-    width_m: Positive = documented_key("its side along the link's y axis", "m")
-    height_m: Positive = documented_key("its side along the link's z axis", "m")
+    width_m: Length = documented_key("its side along the link's y axis", "m")
+    height_m: Length = documented_key("its side along the link's z axis", "m")
 
 
 class RectangularTubeShape(Section):
     """A rectangular tube."""
 
     shape: Literal["rectangular-tube"] = documented_key("a rectangular tube")
-    width_m: Positive = documented_key("its outer side along the link's y axis", "m")
-    height_m: Positive = documented_key("its outer side along the link's z axis", "m")
-    wall_m: Positive = documented_key("thickness of its wall", "m")
+    width_m: Length = documented_key("its outer side along the link's y axis", "m")
+    height_m: Length = documented_key("its outer side along the link's z axis", "m")
+    wall_m: Length = documented_key("thickness of its wall", "m")
 
 
 Shape = Annotated[RodShape | TubeShape | RectangleShape | RectangularTubeShape, Field(discriminator="shape")]
@@ -49,9 +58,22 @@ Shape = Annotated[RodShape | TubeShape | RectangleShape | RectangularTubeShape, 
 class MaterialSection(Section):
     """A material by its numbers."""
 
-    youngs_modulus_Pa: Positive = documented_key("Young's modulus, along the beam", "Pa")
-    shear_modulus_Pa: Positive = documented_key("shear modulus, of twist about its axis", "Pa")
-    density_kg_per_m3: Positive = documented_key("density", "kg/m^3")
+    youngs_modulus_Pa: Modulus = documented_key("Young's modulus, along the beam", "Pa")
+    shear_modulus_Pa: Modulus = documented_key("shear modulus, of twist about its axis", "Pa")
+    density_kg_per_m3: Density = documented_key("density", "kg/m^3")
+
+
+def _given_by(value: Any) -> str:
+    """Whether a material is given by its numbers or by its name."""
+    return "numbers" if isinstance(value, dict | MaterialSection) else "name"
+
+
+MaterialName = Literal[
+    "aluminium-6061", "steel", "stainless-steel", "titanium", "brass", "carbon-fibre-tube", "abs", "pla"
+]
+GivenMaterial = Annotated[
+    Annotated[MaterialName, Tag("name")] | Annotated[MaterialSection, Tag("numbers")], Discriminator(_given_by)
+]
 
 
 class BeamSection(Section):
@@ -60,20 +82,16 @@ class BeamSection(Section):
     section: Shape | None = documented_key(
         "its cross section, with material; or the stiffnesses and masses below", default=None
     )
-    material: (
-        Literal[
-            "aluminium-6061", "steel", "stainless-steel", "titanium", "brass", "carbon-fibre-tube", "abs", "pla"
-        ]
-        | MaterialSection
-        | None
-    ) = documented_key("typical values of a material by its name, or its own numbers", default=None)
-    bending_stiffness_Nm2: Positive | tuple[Positive, ...] | None = documented_key(
+    material: GivenMaterial | None = documented_key(
+        "typical values of a material by its name, or its own numbers", default=None
+    )
+    bending_stiffness_Nm2: Annotated[Few[Stiffness], Field(max_length=2)] | None = documented_key(
         "E I; or two, of bending in the link's x-z and in its x-y plane", "N m^2", default=None
     )
-    torsion_stiffness_Nm2: Positive | None = documented_key("G J", "N m^2", default=None)
-    axial_stiffness_N: Positive | None = documented_key("E A", "N", default=None)
-    mass_per_length_kg_per_m: Positive | None = documented_key("mass per length", "kg/m", default=None)
-    torsional_inertia_per_length_kg_m: Positive | None = documented_key(
+    torsion_stiffness_Nm2: Stiffness | None = documented_key("G J", "N m^2", default=None)
+    axial_stiffness_N: Stiffness | None = documented_key("E A", "N", default=None)
+    mass_per_length_kg_per_m: MassPerLength | None = documented_key("mass per length", "kg/m", default=None)
+    torsional_inertia_per_length_kg_m: InertiaPerLength | None = documented_key(
         "moment of inertia about its axis per length", "kg m", default=None
     )
     damping_time_s: Number = documented_key(

@@ -6,7 +6,7 @@ stand for a vector or a matrix (one number for n = 1, three moments for an inert
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -251,7 +251,9 @@ Vector = Annotated[
     magnitudes.largest_share_within(magnitudes.LEAST_SHARE, magnitudes.LARGEST_SHARE),
     WithJsonSchema({"anyOf": [_NUMBER, _LIST]}),
 ]
-Frictions = Annotated[tuple[DryFriction, ...], BeforeValidator(_few), WithJsonSchema({"anyOf": [_NUMBER, _LIST]})]
+Item = TypeVar("Item")
+Few = Annotated[tuple[Item, ...], BeforeValidator(_few), WithJsonSchema({"anyOf": [_NUMBER, _LIST]})]
+Frictions = Few[DryFriction]
 SymmetricMatrix = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_matrix),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.loop.motion_names import group_names
+from zwidth.loop.motion_names import listed_names
 from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
@@ -125,7 +125,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
         from zwidth.chart.chart import StabilityChart
         from zwidth.loop.unobserved_instability import unobserved_instability
 
-        names = ", ".join(group_names(chart.unobserved_modes))
+        names = ", ".join(listed_names(chart.unobserved_modes))
         warned = "; WARNING: this motion is unstable, whatever the wall"
         # several directions are those of a mechanism, whose springs and dampers feed no motion
         runs_away = isinstance(chart, StabilityChart) and unobserved_instability(chart.loop)

@@ -9,7 +9,7 @@ import click
 
 from zwidth.device.read import LARGEST_FILE
 from zwidth.device.text_file import UnreadableFileError, read_text
-from zwidth.loop.motion_names import group_names
+from zwidth.loop.motion_names import listed_names
 from zwidth.show.circumstances import operator_text
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
@@ -238,7 +238,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     if study.violation is not None:
         yield "unseen members", _violation(study.violation)
     if chart.unobserved_modes:
-        yield "not affected by a wall", ", ".join(group_names(chart.unobserved_modes))
+        yield "not affected by a wall", ", ".join(listed_names(chart.unobserved_modes))
 
 
 def _member(study: RobustStudy, member: int) -> str:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import DATA, json_value
-from zwidth.show.units import amount, percent, typed
+from zwidth.show.units import NONE, amount, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
-    from zwidth.measures.description import Description
+    from zwidth.measures.description import BeamDescription, Description
     from zwidth.model.mechanism import Mechanism
 
+MODES_SHOWN: Final = 10
 SMALLEST: Final = 1e-12
 """Joint coordinates below it are shown as 0 [rad], [m]."""
 
@@ -42,6 +43,7 @@ class ShowCommand(Command):
         "manipulability",
         "dynamic_manipulability",
         "isotropy",
+        "beams",
         "missing",
         "sources",
     )
@@ -92,6 +94,18 @@ def _mechanism_pages(mechanism: Mechanism, result: Description, values: Mapping[
         ]
     )
     yield _joint_table(mechanism, values["joints_rad"])
+    if result.beams:
+        yield _beam_table(result.beams)
+
+
+def _beam_table(beams: Sequence[BeamDescription]) -> Any:
+    """The links that bend."""
+    rows = []
+    for beam in beams:
+        how = beam.method.replace("-", " ") + (f", {beam.modes}" if beam.method != "lumped" else "")
+        masses = amount(beam.mass, "kg"), amount(beam.carried_mass, "kg") if beam.carried_mass else NONE
+        rows.append((beam.link, how, *masses, amount(beam.first_frequency, "Hz")))
+    return table(["beam", "modelled by", "mass", "carries", "first alone, clamped"], rows)
 
 
 def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -151,9 +165,14 @@ def _dexterity_units(mechanism: Mechanism, result: Description) -> tuple[str, st
 
 
 def _modes(document: Mapping[str, Any]) -> Iterator[str]:
+    """Each natural frequency with its damping; of many, as links that bend have, the highest of the rest alone."""
     frequencies = document["natural_frequencies_Hz"]
-    for frequency, ratio in zip(frequencies, document["damping_ratios"] or [None] * len(frequencies), strict=True):
+    ratios = document["damping_ratios"] or [None] * len(frequencies)
+    rest = frequencies[MODES_SHOWN:] if len(frequencies) > MODES_SHOWN + 2 else []
+    for frequency, ratio in zip(frequencies[: len(frequencies) - len(rest)], ratios, strict=False):
         if frequency is None:
             yield "unstable"
         else:
             yield amount(frequency, "Hz") + (f" ({typed(percent(ratio))})" if ratio is not None else "")
+    if rest:
+        yield f"{len(rest)} more up to {amount(rest[-1], 'Hz')}"

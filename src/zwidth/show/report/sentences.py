@@ -17,7 +17,7 @@ import numpy as np
 from zwidth.chart.decay import FastestDecay
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference
-from zwidth.loop.motion_names import group_names
+from zwidth.loop.motion_names import listed_names
 from zwidth.model.mechanism import Floats
 from zwidth.show.circumstances import load_text
 from zwidth.show.figures.decay import tenfold_time
@@ -28,6 +28,7 @@ from zwidth.study.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, li
 
 # Gains of the actuator and the sensor are scales of the description, not parts to be changed.
 SCALES: Final = ("plant.actuator", "plant.sensor", "plant.handle")
+MOST_FREQUENCIES: Final = 6  # natural frequencies that are listed one by one
 SECOND_PEAK_SHARE: Final = 0.9  # of the largest stiffness, from which another peak is mentioned
 ONE_PERCENT: Final = f"1{SPACE}%"
 LEAST_SLOPE: Final = 1e-6  # per cent for one per cent, below which a number has no influence
@@ -64,7 +65,7 @@ def warning(facts: Facts) -> str:
     """Which motion is unstable with any wall; "" where none is."""
     if not facts.runs_away:
         return ""
-    names = join_words(group_names(facts.chart.unobserved_modes))
+    names = join_words(listed_names(facts.chart.unobserved_modes))
     return (
         f"Warning: this device is unstable with any wall, by a motion that no wall affects: {names}; "
         "the numbers below leave that motion out."
@@ -139,9 +140,9 @@ def limit(facts: Facts) -> str:
 
 def _cause(facts: Facts, best: Variant) -> str:
     controller = facts.loop.controller
-    flexible = [hertz(f) for f in facts.natural_frequencies if f > 0.0]
+    flexible = frequency_list(facts)
     if best.key == "rigid-drives":
-        what = "the flexibility of the drives" if facts.device.mechanism is not None else "its flexibility"
+        what = f"the flexibility of {_gives(facts)}" if facts.device.mechanism is not None else "its flexibility"
         return f"{what}, at {join_words(flexible)}" if flexible else what
     if best.key == "no-delay":
         return f"the delay of {delay_name(controller)}"
@@ -156,8 +157,25 @@ def _cause(facts: Facts, best: Variant) -> str:
     return "its low structural damping" if flexible else "its low friction"
 
 
+def _gives(facts: Facts) -> str:
+    """What of a mechanism is not rigid: "the drives", or "drives and links"."""
+    mechanism = facts.device.mechanism
+    return "drives and links" if mechanism is not None and mechanism.flexible else "the drives"
+
+
+def frequency_list(facts: Facts) -> list[str]:
+    """The natural frequencies of the ungripped device, rigid motions left out; of many, as links that bend have,
+    the lowest, and the highest of the rest."""
+    flexible = [f for f in facts.natural_frequencies.tolist() if f > 0.0]
+    shown = flexible if len(flexible) <= MOST_FREQUENCIES + 2 else flexible[:MOST_FREQUENCIES]
+    rest = len(flexible) - len(shown)
+    return [*map(hertz, shown), *([f"{rest} more up to {hertz(flexible[-1])}"] if rest else [])]
+
+
 def _change_text(facts: Facts, best: Variant) -> str:
-    rigid = "rigid drives" if facts.device.mechanism is not None else "a rigid structure"
+    rigid = (
+        f"rigid {_gives(facts)}".replace("the ", "") if facts.device.mechanism is not None else "a rigid structure"
+    )
     return {
         "rigid-drives": f"with {rigid}, which cannot be built,",
         "half-period": "sampled twice as fast",
@@ -210,7 +228,7 @@ def regions(facts: Facts) -> str:
 
 def unobserved(facts: Facts) -> str:
     """Which motions the stability test leaves out; "" where it leaves out none."""
-    names = group_names(facts.chart.unobserved_modes)
+    names = listed_names(facts.chart.unobserved_modes)
     if not names or facts.runs_away:  # the warning has named them
         return ""
     the = "" if names[0][0].isdigit() else "the "
@@ -357,7 +375,8 @@ def _obstacle(facts: Facts, best: Variant) -> str:
     if best.key == "no-delay":
         return "a delay can be shortened but not removed"
     if best.key == "rigid-drives":
-        return "no drives are rigid" if facts.device.mechanism is not None else "no structure is rigid"
+        rigid = _gives(facts).removeprefix("the ") if facts.device.mechanism is not None else "structure"
+        return f"no {rigid} {'is' if rigid == 'structure' else 'are'} rigid"
     return ""
 
 

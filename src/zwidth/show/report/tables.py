@@ -19,7 +19,7 @@ Row = tuple[str, ...]
 def parameters(facts: Facts) -> list[Row]:
     """Name, symbol and value of each effective parameter that this device has."""
     e = facts.effective
-    flexible = [sentences.hertz(f) for f in facts.natural_frequencies if f > 0.0]
+    flexible = sentences.frequency_list(facts)
     zero = f"0{SPACE}Hz"
     rigid = int((facts.natural_frequencies == 0.0).sum())
     modes = ", ".join([*([zero if rigid == 1 else f"{zero} ({rigid} rigid motions)"] if rigid else []), *flexible])
