@@ -23,9 +23,11 @@ def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
     given = [key for key in FORCES if load.get(key) is not None]
     if len(given) > 1:
         yield ("load", given[1]), f"stands beside {given[0]}; only one of them is allowed: remove one"
-    if is_number(load.get("push_N")) and load["push_N"] == 0:
+    for key in given:
+        if not _is_zero(load[key]):
+            continue
         yield (
-            ("load", "push_N"),
+            ("load", key),
             "is 0, which leaves a one-sided wall at the edge of contact, where nothing is linear; remove it for "
             "the chart of the two-sided wall, or give the force with which the hand leans on the wall",
         )
@@ -33,3 +35,9 @@ def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
         yield ("load", "settle"), "needs force_N, under which the device slides to where it is in balance"
     if is_number(load.get("surface_radius_m")) and load["surface_radius_m"] == 0:
         yield ("load", "surface_radius_m"), "must not be 0; remove it for a plane"
+
+
+def _is_zero(force: Any) -> bool:
+    """Whether a number is 0, or all of a list are."""
+    numbers = force if isinstance(force, list) and force else [force]
+    return all(is_number(number) and number == 0 for number in numbers)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from zwidth.device.schema.value_types import Direction, Number, NumberOrInfinity, Position, Section, documented_key
+from zwidth.device.schema.value_types import Number, NumberOrInfinity, Position, Section, documented_key
 
 
 class LoadSection(Section):
     """The forces about whose balance the device is linearised: the hand's, and gravity."""
 
-    force_N: Direction | None = documented_key(
+    force_N: Position | None = documented_key(
         "force of the hand on the handle, x, y or x, y, z, with a part along the rendered direction; or push_N; "
         "omitted, with push_N and moment_Nm: the wall is at rest, without force",
         "N",
@@ -22,7 +22,7 @@ class LoadSection(Section):
         "N",
         default=None,
     )
-    moment_Nm: Direction | None = documented_key(
+    moment_Nm: Position | None = documented_key(
         "moment of the hand on the handle, where moments about an axis are rendered", "N m", default=None
     )
     gravity_m_per_s2: Position | None = documented_key(
