@@ -175,7 +175,7 @@ def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balanc
             f"where the free ball joint {names[0]!r} would hang under this load is not searched for; place its "
             "centre of mass at the joint, or leave gravity out"
         )
-    found = _newton(mechanism, at, off, np.arange(k, k + count), SETTLED)
+    found = _newton(mechanism, at, off, np.arange(k, k + count), SETTLED, downhill=True)
     if found is None:
         raise EquilibriumError(
             f"no place was found where the free joint {names[0]!r} is in balance under this load; give it a "
@@ -190,9 +190,14 @@ def _newton(
     off: Callable[[Posture], Floats],
     moved: NDArray[np.int64],
     settled: float,
+    *,
+    downhill: bool = False,
 ) -> Posture | None:
     """The posture near `at` in which `off` (m,) is 0, as m of the independent coordinates move; None if there is
-    none to be found."""
+    none to be found.
+
+    downhill  off are the forces on these coordinates: they are followed as far as it takes, to where they hold
+    """
     c = at.jacobian.shape[-1]
     for _ in range(STEPS):
         try:
@@ -207,14 +212,28 @@ def _newton(
                 / (2.0 * PROBE)
                 for i in moved
             ]
-            step = np.zeros(c)
-            step[moved] = -np.linalg.solve(np.array(columns).T, value)
-            if not np.max(np.abs(step)) < LARGEST_STEP:
+            change, step = np.array(columns).T, np.zeros(c)
+            step[moved] = _downhill(change, value) if downhill else -np.linalg.solve(change, value)
+            if not (downhill or np.max(np.abs(step)) < LARGEST_STEP):
                 return None
             at = _moved(mechanism, at, step)
         except (EquilibriumError, np.linalg.LinAlgError):
             return None
     return None
+
+
+def _downhill(change: Floats, forces: Floats) -> Floats:
+    """Newton's step (m,) where the forces (m,) hold against small motions, else one along them that is as large as
+    their stiffness would have it with the other sign; none longer than LARGEST_STEP.
+
+    change  (m, m)  derivatives of the forces
+    """
+    stiffness, ways = np.linalg.eigh(-(change + change.T) / 2.0)
+    if stiffness[0] > 0.0:
+        step = -np.linalg.solve(change, forces)
+    else:
+        step = ways @ (ways.T @ forces / np.maximum(np.abs(stiffness), np.finfo(float).eps))
+    return np.asarray(step * min(1.0, LARGEST_STEP / float(np.max(np.abs(step)))))
 
 
 def _moved(mechanism: Mechanism, at: Posture, step: Floats) -> Posture:
