@@ -38,6 +38,19 @@ def flexible_link(
     planar    (3,)  axis about which alone the link's inertia is known; None: all of it is
     Raises    BeamError  for a beam that is heavier than its link, or has more modes than its elements
     """
+    left, carried, rest = carried_body(mechanism, link, beam, planar)
+    places = _fixed_places(mechanism, link, carried if left else None)
+    stations = np.unique([min(max(x, 0.0), beam.length) for x in places])
+    body = _body(mechanism, link, beam, method, modes, elements, stations)
+    kept = 0 if method == "lumped" else modes
+    return FlexibleLink(link, beam, body, method, kept, damping_time, left, carried, rest)
+
+
+def carried_body(
+    mechanism: Mechanism, link: int, beam: BeamProperties, planar: Floats | None = None
+) -> tuple[float, Floats, Floats]:
+    """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m^2] of what a link has beside a beam; arguments and
+    errors are those of `flexible_link`."""
     links = mechanism.links
     mass, centre, inertia = (np.asarray(each)[link] for each in (links.mass, links.center_of_mass, links.inertia))
     L, m = beam.length, beam.mass_per_length * beam.length
@@ -65,10 +78,7 @@ def flexible_link(
             f"leaves {least:.4g} kg m^2 for what the beam carries, whose own moment is {float(np.max(own)):.4g} "
             "kg m^2 about its centre; give the inertia of the whole link, or another section or material",
         )
-    stations = np.unique([min(max(x, 0.0), L) for x in _fixed_places(mechanism, link, carried if left else None)])
-    body = _body(mechanism, link, beam, method, modes, elements, stations)
-    kept = 0 if method == "lumped" else modes
-    return FlexibleLink(link, beam, body, method, kept, damping_time, left, carried, rest)
+    return left, carried, rest
 
 
 def _body(

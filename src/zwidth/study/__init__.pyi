@@ -1,3 +1,5 @@
+from .bending import Bending as Bending
+from .bending import bending as bending
 from .common_area import common_area as common_area
 from .experiment import measure_boundary as measure_boundary
 from .experiment_plan import Plan as Plan

@@ -19,6 +19,7 @@ from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
+from zwidth.study.bending import Bending, bending
 from zwidth.study.load_path import PUSH, LoadPath, load_path
 from zwidth.study.sensitivity import sensitivities
 from zwidth.study.sensitivity_result import Sensitivities
@@ -107,6 +108,12 @@ class Facts:
             return validity(self.point)
         except ChartError:
             return None
+
+    @cached_property
+    def bending(self) -> Bending | None:
+        """The device beside the same with rigid links, or its rigid links as typical tubes; None without links that
+        could bend."""
+        return bending(self.device, self.point)
 
     @cached_property
     def load_path(self) -> LoadPath | None:

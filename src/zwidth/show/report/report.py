@@ -15,7 +15,7 @@ from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.progress import Progress
 from zwidth.show.output import write_text
-from zwidth.show.report import load, sentences, tables
+from zwidth.show.report import bending, load, sentences, tables
 from zwidth.show.report.facts import Facts, gather
 from zwidth.show.report.figures import svg_figures
 from zwidth.show.units import SPACE
@@ -44,7 +44,7 @@ def write_report(
     say("report", 1, PARTS)
     _ = facts.sensitivities  # each is computed at its first use, and kept
     say("report", 2, PARTS)
-    _ = facts.validity, facts.load_path
+    _ = facts.validity, facts.load_path, facts.bending
     say("report", 3, PARTS)
     target = Path(path)
     write_text(target, page(facts))
@@ -66,6 +66,7 @@ def page(facts: Facts) -> str:
         device=facts.device,
         say=sentences,
         load=load,
+        bending=bending,
         tables=tables,
         picture={name: Markup(svg) for name, svg in svg_figures(facts).items()},
         version=__version__,

@@ -149,6 +149,7 @@ def document(facts: Facts) -> dict[str, Any]:
         ],
         "models": facts.validity and facts.validity.document(),
         **_load(facts),
+        "bending": facts.bending and facts.bending.document(),
         "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
         "bounds": [
             {
