@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from docs._comparison_row import ANOTHER_QUESTION, Claim, Number, Reason, Row
+from gallery import flexible_link as bent
 from gallery import haptic_equilibrium as equilibrium
 from gallery import rendered_directions as plane
 from gallery import spring_stability as spring
@@ -98,6 +99,55 @@ def haptic_equilibrium() -> list[Row]:
     ]
 
 
+def flexible_link() -> list[Row]:
+    """(2.22), (2.23)."""
+    size = f"aluminium tube of {1e3 * bent.OUTER:g} by {1e3 * bent.WALL:g} mm, {bent.LENGTH:g} m long, on a motor"
+    lumped, modes, elements = (bent.largest[method] for method in bent.METHODS)
+    return [
+        Claim(
+            "(2.22)",
+            "a flexible link by a lump at its tip on a massless bending spring",
+            "the lumped parameters model considers the static deflection of the flexible link",
+            f"with 3 E I/L³ and 33/140 of the mass the first vibration of a clamped link is "
+            f"{100 * bent.too_high:.2f} % too high, on the motor's inertia {100 * (1 - bent.first_by_hand / bent.first_exact):.2f} % too low",
+            0.0 < bent.too_high < 0.02 and abs(bent.first_by_hand / bent.first_exact - 1.0) < 0.02,
+        ),
+        Number(
+            "(2.22)",
+            f"k_e of an {size}: what an infinitely stiff wall is felt as at rest",
+            bent.felt,
+            "N/m",
+            second_value=bent.k_e,
+            route="3 E I/L³",
+        ),
+        Number(
+            "(2.23)",
+            "natural frequency of the same, lumped",
+            bent.first["lumped"],
+            "Hz",
+            second_value=float(bent.first_by_hand),
+            route="two inertias on a spring",
+        ),
+        Number(
+            "(2.23)",
+            f"largest stiffness of the same, lumped, with {100 * bent.DAMPING_RATIO:g} % of damping at "
+            f"{1e3 * bent.PERIOD:g} ms",
+            lumped,
+            "N/m",
+            second_value=bent.largest_by_hand,
+        ),
+        Claim(
+            "(2.23)",
+            "the form of a flexible-jointed system, in which the spring stands for the link, too",
+            "the localized structural stiffness representation also embeds effects of link flexibility",
+            f"of the first mode, {bent.first['lumped']:.1f} Hz where the beam has {bent.first_exact:.1f} Hz; its "
+            f"largest stiffness is {lumped:.0f} N/m where more modes give {modes:.0f} N/m and elements "
+            f"{elements:.0f} N/m",
+            abs(bent.first["lumped"] / bent.first_exact - 1.0) < 0.02 and abs(modes / elements - 1.0) < 1e-4,
+        ),
+    ]
+
+
 def rendered_directions() -> list[Row]:
     """(2.6)-(2.17), (2.24)-(2.35)."""
     sizes = ", ".join(f"{m} of {n}" for m, n in plane.SIZES)
@@ -136,4 +186,4 @@ def rendered_directions() -> list[Row]:
 
 def rows() -> list[Row]:
     """Both chapters."""
-    return [*spring_stability(), *haptic_equilibrium(), *rendered_directions()]
+    return [*spring_stability(), *haptic_equilibrium(), *flexible_link(), *rendered_directions()]

@@ -31,11 +31,6 @@ NOT_COVERED = (
     ),
     ("(2.19), (2.20)", "How the generalised forces are split, and the rigid-body model with them: definitions."),
     (
-        "(2.22), (2.23)",
-        "A flexible link as a beam lumped at its tip. zwidth has flexible drives and no flexible links; a link "
-        "that bends like one spring at its joint can be written as a drive. The thesis gives no number for it.",
-    ),
-    (
         "Fig. 3.5",
         "Torque over deflection of both drives, and with it Table 3.3 as an identification: the measured points "
         "are not in the scan. The rows of Table 3.4 and 3.1.3 take the stiffnesses of Table 3.3 as printed.",

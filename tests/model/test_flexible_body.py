@@ -303,7 +303,7 @@ BEAM = BeamProperties(L, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
         (lambda: finite_elements(BEAM, [L], 0), "elements must be a whole number, at least 1, got 0"),
         (lambda: finite_elements(BEAM, [L], 2.5), "elements must be a whole number, at least 1, got 2.5"),
         (lambda: finite_elements(BEAM, [L], 2, -1), "modes must be a whole number, at least 0, got -1"),
-        (lambda: finite_elements(BEAM, [L], 1, 3), "modes must be at most 2, .* got 3; give more elements"),
+        (lambda: finite_elements(BEAM, [L], 1, 3), "must be at most 2 modes, .* got 3; give more elements"),
         (lambda: assumed_modes(BEAM, [L], True), "modes must be a whole number, at least 0, got True"),
         (lambda: assumed_modes(BEAM, [L], 2, "free"), "boundary must be 'clamped' or .* got the text 'free'"),
         (lambda: lumped_tip(BEAM, [L]).reduced(np.eye(3)), r"basis must have 4 rows, .* got the shape \(3, 3\)"),
