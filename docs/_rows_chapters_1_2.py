@@ -109,7 +109,8 @@ def flexible_link() -> list[Row]:
             "a flexible link by a lump at its tip on a massless bending spring",
             "the lumped parameters model considers the static deflection of the flexible link",
             f"with 3 E I/L³ and 33/140 of the mass the first vibration of a clamped link is "
-            f"{100 * bent.too_high:.2f} % too high, on the motor's inertia {100 * (1 - bent.first_by_hand / bent.first_exact):.2f} % too low",
+            f"{100 * bent.too_high:.2f} % too high, on the motor's inertia "
+            f"{100 * (1 - bent.first_by_hand / bent.first_exact):.2f} % too low",
             0.0 < bent.too_high < 0.02 and abs(bent.first_by_hand / bent.first_exact - 1.0) < 0.02,
         ),
         Number(
