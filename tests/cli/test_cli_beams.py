@@ -12,6 +12,7 @@ from tests.frozen.toml_text import toml_text
 from tests.model.beam_devices import five_bar, with_beams, without_beams
 from zwidth.device.load import from_document
 from zwidth.loop.motion_names import listed_names
+from zwidth.loop.sideways import SidewaysMotion
 
 SECTION = "links.distal-right.beam.section.wall_m"
 
@@ -194,3 +195,16 @@ def test_few_modes_and_those_that_grow_are_named_one_by_one():
     assert listed_names(many) == ["7 modes from 100 Hz to 20 kHz"]
     grows = "mode at 50 Hz (damping ratio -0.01)"
     assert listed_names([*many, grows]) == [grows, "7 modes from 100 Hz to 20 kHz"]
+
+
+def test_many_motions_along_a_surface_are_named_by_their_number_and_range():
+    growing = [SidewaysMotion(0.1 * k, 0.0).name for k in range(1, 7)]
+    other = SidewaysMotion(-0.3, 0.0).name
+    assert listed_names([*growing, other]) == [*growing, other]
+    growing.append(SidewaysMotion(2.0, 0.0).name)
+    assert listed_names([*growing, other]) == [
+        other,
+        "7 sideways motions that grow by 0.1 to 2 1/s (the fastest doubles in 0.3466 s)",
+    ]
+    decaying = [SidewaysMotion(-0.1 * k, 40.0).name for k in range(1, 10)]
+    assert listed_names(decaying) == ["9 sideways vibrations that decay by 0.1 to 0.9 1/s"]

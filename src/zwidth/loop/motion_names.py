@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from math import pi, sqrt
+from math import log, pi, sqrt
 from typing import Final
 
-SINGLY: Final = 6  # modes that are named one by one
+SINGLY: Final = 6  # motions of a kind that are named one by one
 # a mode, unless it grows by itself
 MODE: Final = re.compile(r"mode at ([\d.e+-]+) Hz(?! \(damping ratio -)")
+SIDEWAYS: Final = re.compile(
+    r"sideways (motion|vibration)(?: at [\d.e+-]+ Hz)? that (grow|decay)s by ([\d.e+-]+) 1/s"
+)
 
 
 def motion_name(squared: float, decay: float) -> str:
@@ -44,18 +47,40 @@ def group_names(names: Sequence[str]) -> list[str]:
 
 
 def listed_names(names: Sequence[str]) -> list[str]:
-    """Names of motions for a line of text: equal ones together, and many modes, as links that bend have, by their
-    number and range.
+    """Names of motions for a line of text: equal ones together, and many of a kind by their number and range, as
+    the modes of links that bend, or the motions along a surface under many pushes.
 
     >>> listed_names(["rigid motion (0 Hz)", *(f"mode at {100 * k} Hz" for k in range(1, 200))])
     ['rigid motion (0 Hz)', '199 modes from 100 Hz to 19.9 kHz']
+    >>> listed_names([f"sideways motion that grows by {k} 1/s" for k in range(1, 9)])
+    ['8 sideways motions that grow by 1 to 8 1/s (the fastest doubles in 0.08664 s)']
     """
-    frequencies = [float(match[1]) for name in names if (match := MODE.match(name))]
-    if len(frequencies) <= SINGLY:
-        return group_names(names)
-    low, high = (_rounded_frequency(frequency) for frequency in (min(frequencies), max(frequencies)))
-    others = group_names([name for name in names if not MODE.match(name)])
-    return [*others, f"{len(frequencies)} modes from {low} to {high}"]
+    kinds: dict[tuple[str, str] | None, list[str]] = {}
+    for name in names:
+        kinds.setdefault(_kind(name), []).append(name)
+    many = {kind: each for kind, each in kinds.items() if kind is not None and len(each) > SINGLY}
+    others = group_names([name for name in names if _kind(name) not in many])
+    return [*others, *(_of_many(kind, each) for kind, each in many.items())]
+
+
+def _kind(name: str) -> tuple[str, str] | None:
+    """Noun and verb of motions that can be told by their number and range; None of another one."""
+    if MODE.match(name):
+        return "mode", ""
+    match = SIDEWAYS.match(name)
+    return None if match is None else (match[1], match[2])
+
+
+def _of_many(kind: tuple[str, str], names: Sequence[str]) -> str:
+    """Motions of a kind by their number and range."""
+    noun, verb = kind
+    pattern, group = (SIDEWAYS, 3) if verb else (MODE, 1)
+    numbers = [float(match[group]) for name in names if (match := pattern.match(name))]
+    low, high = min(numbers), max(numbers)
+    if not verb:
+        return f"{len(numbers)} modes from {_rounded_frequency(low)} to {_rounded_frequency(high)}"
+    doubles = f" (the fastest doubles in {log(2.0) / high:.4g} s)" if verb == "grow" else ""
+    return f"{len(numbers)} sideways {noun}s that {verb} by {low:.4g} to {high:.4g} 1/s{doubles}"
 
 
 def _rounded_frequency(frequency: float) -> str:
