@@ -176,6 +176,19 @@ def test_a_map_of_a_device_that_holds_nothing_anywhere_is_no_answer():
     assert "in none that is reached is there an equilibrium under a push of (0, -500, 0) N" in ran.err
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("map", "--direction", "worst", "--measure", "stiffness_max", "--cells", "3,3"),
+        ("polar", "--count", "4"),
+    ],
+)
+def test_where_directions_vary_the_heading_names_the_push_along_each(words):
+    """And not the force of the file, which pushes along one of them."""
+    ran = run_command(words[0], MECHANISM, *words[1:], "--load", "0,-5")
+    assert ran.out.splitlines()[0].endswith(", under a push of 5 N along the direction")
+
+
 def test_a_measure_of_a_load_needs_one():
     (line,) = refusal_lines("map", MECHANISM, "--measure", "load_change", "--cells", "4,3")
     assert line.endswith("load_change needs a load, about which the device is linearised; give --load")

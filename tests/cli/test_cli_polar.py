@@ -38,6 +38,12 @@ def test_a_direction_that_leaves_the_plane_of_motion_is_not_the_stiffest():
     }
 
 
+def test_a_handle_that_only_turns_has_no_direction():
+    ran = run_command("polar", "openwrist", "--count", "4", "--json")
+    assert ran.code == 1
+    assert ran.document["status"] == ["out of motion: the handle cannot move along the direction"] * 4
+
+
 def test_no_stable_wall_anywhere_is_no_answer():
     unstable = ("--set", "loop.delay_samples=1", "--set", "mechanism.damping.ratio=0")
     ran = run_command("polar", MECHANISM, "--count", 4, *unstable, "--json")

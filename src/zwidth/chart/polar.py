@@ -234,9 +234,9 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
         pushed = replace(point, load=point.load.along_every_direction)
         return lambda unit: pushed.towards(unit).plant
     check_several_directions(point.mechanism, point.operator, point.encoders, None)
-    if point.model != "full":
-        return lambda unit: point.towards(unit).plant
     axes = _motions(point.jacobian)
+    if point.model != "full" or not len(axes):
+        return lambda unit: point.towards(unit).plant
     everywhere = replace(point, directions=axes, wall_matrices=None).plant_of_directions
     return lambda unit: everywhere.along(axes @ unit)
 

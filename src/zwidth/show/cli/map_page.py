@@ -52,7 +52,9 @@ def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
         plane += f" along {vector(about['plane_axes'][:3])} and {vector(about['plane_axes'][3:])}"
     plane += f" through {vector(about['plane_through_m'], 'm')}"
     held = f", held by {printable(about['operator'])}" if about["operator"] != "none" else ""
-    held += "" if device.load is None else f", under {load_text(device.load)}"
+    if device.load is not None:
+        load = device.load.along_every_direction if isinstance(towards, str) else device.load
+        held += f", under {load_text(load)}"
     which = f"{way + ', ' if along else ''}assembly {about['assembly']}, model {about['model']}{held}"
     lines = [f"{printable(device.name)}: {plane}, {which}", computer_text(device.controller)]
     linear = any(dataset[name].attrs["linear"] for name in names)

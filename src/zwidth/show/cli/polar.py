@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.circumstances import load_text
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
@@ -83,6 +84,8 @@ class PolarCommand(Command):
         facts = self.circumstances(case)
         _, rest = super().heading(case).split("\n", 1)
         where = f"at {vector(facts['position_m'], 'm')}, assembly {facts['assembly']}, model {facts['model']}"
+        if (load := case.device.load) is not None:
+            where += f", under {load_text(load.along_every_direction)}"
         return f"{printable(case.device.name)}: {where}\n{rest}"
 
     def pages(self, case: CommandLine, result: ByDirection, document: Mapping[str, Any]) -> Iterator[Any]:
