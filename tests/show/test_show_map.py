@@ -10,6 +10,7 @@ from matplotlib.patches import PathPatch
 from zwidth.device.load import load
 from zwidth.measures.definition import (
     BEYOND_LIMIT,
+    NO_EQUILIBRIUM,
     FAILED,
     NO_VALUE,
     OK,
@@ -86,12 +87,19 @@ def test_each_kind_without_a_value_has_its_own_hatch(device):
     assert {NO_VALUE, FAILED, OK} <= set(np.unique(status).tolist())
     ax = map_figure(found, "m", device).axes[0]
     assert legend(ax) == ["no value", "failed"]
-    status[:, 3], status[:, 4], status[:, 5] = SINGULAR, UNDECIDED, BEYOND_LIMIT
-    found["m"].values[:, 3:6] = np.nan
+    status[:, 3], status[:, 4], status[:, 5], status[:, 6] = SINGULAR, UNDECIDED, BEYOND_LIMIT, NO_EQUILIBRIUM
+    found["m"].values[:, 3:7] = np.nan
     ax = map_figure(found, "m", device).axes[0]
-    assert legend(ax) == ["singular", "beyond a joint limit", "no value", "undecided", "failed"]
+    assert legend(ax) == [
+        "singular",
+        "beyond a joint limit",
+        "no equilibrium",
+        "no value",
+        "undecided",
+        "failed",
+    ]
     hatches = {patch.get_hatch() for patch in ax.get_legend().get_patches()}
-    assert len(hatches) == 5 == len(MARKS)
+    assert len(hatches) == 6 == len(MARKS)
     status[:] = OUT_OF_REACH
     found["m"].values[:] = np.nan
     assert legend(map_figure(found, "m", device).axes[0]) == []
