@@ -10,8 +10,8 @@ from matplotlib.patches import PathPatch
 from zwidth.device.load import load
 from zwidth.measures.definition import (
     BEYOND_LIMIT,
-    NO_EQUILIBRIUM,
     FAILED,
+    NO_EQUILIBRIUM,
     NO_VALUE,
     OK,
     OUT_OF_REACH,
