@@ -14,7 +14,7 @@ import numpy as np
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.device.device import Device
-from zwidth.device.load import load
+from zwidth.device.load import from_document, load
 from zwidth.study.bending import BendingNumbers, bending
 
 DISTAL, DRIVEN = ("distal-right", "distal-left"), ("upper-right", "upper-left")
@@ -33,6 +33,8 @@ TUBES: dict[str, tuple[tuple[str, ...], float, float, str]] = {
     "all, 8 x 1 mm": (DISTAL + DRIVEN, 8.0, 1.0, "aluminium-6061"),
 }
 DRIVES = ("motor-right", "motor-left")
+DRIVES_DAMPING_TIME = 1.4e-4  # their dampers over their springs, where dampers are given one by one [s]
+RATIOS = (0.0, 0.001, 0.01, 0.02, 0.05)  # of the first vibration of a clamped tube
 STIFF_DRIVES: dict[str, Any] = {f"drives.{name}.stiffness_Nm_per_rad": float("inf") for name in DRIVES}
 
 
@@ -51,6 +53,28 @@ def numbers(tubes: str, changes: dict[str, Any] | None = None) -> dict[str, Bend
         both = bending(with_tubes(tubes, method, changes))
         assert both is not None
         found |= {RIGID: both.rigid, method: both.bent}
+    return found
+
+
+def largest_by_damping(tubes: str) -> dict[float | None, float]:
+    """The largest stiffness by the damping ratio of a clamped tube's first vibration, None with rigid links.
+
+    All dampers are given one by one, those of drives and tubes alike.
+    """
+    document = load("five-bar").document
+    document["mechanism"]["damping"] = {"given": True}
+    for drive in document["mechanism"]["drives"]:
+        drive["damping_Nms_per_rad"] = DRIVES_DAMPING_TIME * drive["stiffness_Nm_per_rad"]
+    found: dict[float | None, float] = {None: from_document(document).at().chart(decay=False).stiffness_max}
+    by_name = {link["name"]: link for link in document["mechanism"]["links"]}
+    bent = with_tubes(tubes, "assumed modes")
+    assert bent.mechanism is not None
+    first = 2.0 * np.pi * float(bent.mechanism.flexible[0].frequencies[0])
+    beams = {link["name"]: link.get("beam") for link in bent.document["mechanism"]["links"]}
+    for ratio in RATIOS:
+        for name in TUBES[tubes][0]:
+            by_name[name]["beam"] = beams[name] | {"damping_time_s": 2.0 * ratio / first}
+        found[ratio] = from_document(document).at().chart(decay=False).stiffness_max
     return found
 
 
@@ -110,5 +134,15 @@ def rows() -> list[str]:
     return lines
 
 
+def damping_rows() -> list[str]:
+    """The table of damping ratios."""
+    found = largest_by_damping("distal, 8 x 0.5 mm")
+    return [f"| {_ratio_text(ratio)} | {K:.0f} N/m |" for ratio, K in found.items()]
+
+
+def _ratio_text(ratio: float | None) -> str:
+    return "(rigid links)" if ratio is None else f"{100.0 * ratio:g} %"
+
+
 if __name__ == "__main__":
-    print("\n".join(rows()))
+    print("\n".join([*rows(), "", *damping_rows()]))
