@@ -32,8 +32,8 @@ NOT_COVERED = (
     ("(2.19), (2.20)", "How the generalised forces are split, and the rigid-body model with them: definitions."),
     (
         "(2.22), (2.23)",
-        "A flexible link as a beam lumped at its tip. zwidth has flexible drives and no flexible links; a link "
-        "that bends like one spring at its joint can be written as a drive. The thesis gives no number for it.",
+        "A flexible link as a beam lumped at its tip. The thesis gives no number for it. [Links that "
+        "bend](flexible-links.md) have it as one of three methods, and a test holds the lump with a hub against (2.23).",
     ),
     (
         "Fig. 3.5",
@@ -79,7 +79,8 @@ NOT_COVERED_ELSEWHERE = (
     ),
     (
         "2.1.2",
-        "Finite elements and assumed modes for flexible links are named as methods and not used.",
+        "Finite elements and assumed modes for flexible links are named as methods and not used; "
+        "[here](flexible-links.md#three-methods) they are.",
     ),
     ("5.1", "Global measures over the workspace and dynamic isotropy are defined in words, without a number."),
     (
