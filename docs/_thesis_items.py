@@ -33,7 +33,8 @@ NOT_COVERED = (
     (
         "(2.22), (2.23)",
         "A flexible link as a beam lumped at its tip. The thesis gives no number for it. [Links that "
-        "bend](flexible-links.md) have it as one of three methods, and a test holds the lump with a hub against (2.23).",
+        "bend](flexible-links.md) have it as one of three methods, and a test holds the lump with a hub against "
+        "(2.23).",
     ),
     (
         "Fig. 3.5",
