@@ -1,4 +1,5 @@
-"""Write the pictures of the documentation: the README's chart, a hand's pushes, two of the thesis's figures."""
+"""Write the pictures of the documentation: the README's chart, a hand's pushes, two of the thesis's figures, links
+that bend."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from gallery import fig_5_4_common_area, fig_5_10_eigenvalues
+from gallery import beam_convergence, fig_5_4_common_area, fig_5_10_eigenvalues, slender_links
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.show.figures.caption import caption_of_result, write_caption
@@ -35,6 +36,8 @@ def main() -> None:
     print(save(made, IMAGES / "load-five-bar.svg"))
     page(fig_5_4_common_area.draw, "fig-5-4-common-area", 6.4, 4.8)
     page(fig_5_10_eigenvalues.draw, "fig-5-10-eigenvalues", 7.4, 4.6)
+    page(slender_links.draw, "slender-links", 4.6, 7.6)
+    page(beam_convergence.draw, "beam-convergence", 4.6, 6.2)
 
 
 def page(draw: Callable[..., None], name: str, width: float, height: float) -> None:

@@ -42,7 +42,7 @@ ANSWERS = {
     "energy leak": "a sampled spring makes energy",
     "equilibrium": "the hand's force on the handle",
     "flexible joint": "stiffness_Nm_per_rad",
-    "flexible link": "links that bend",
+    "flexible link": "finite elements",
     "friction": "breakaway_N",
     "gravity": "gravity",
     "grip": "580 N/m",

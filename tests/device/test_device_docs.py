@@ -38,6 +38,8 @@ TABLES = {
     "`[arm.hand]`": ("arm", "hand"),
     "`[load]`": ("load",),
     "`[[mechanism.links]]`": ("mechanism", "links", 0),
+    "`[mechanism.links.beam]`": ("mechanism", "links", 0, "beam"),
+    "`[mechanism.links.beam.material]`": ("mechanism", "links", 0, "beam", "material"),
     "`[[mechanism.loops]]`": ("mechanism", "loops", 0),
     "`[[mechanism.legs]]`": ("mechanism", "legs", 0),
     "`[mechanism.handle]`": ("mechanism", "handle"),
@@ -91,6 +93,19 @@ def test_the_page_has_an_example_of_either_kind():
         tomllib.loads(text) for text in re.findall(r"^```toml\n(name.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
     ]
     assert {"plant", "mechanism"} <= {key for example in examples for key in example}
+
+
+def test_the_page_has_every_shape_of_a_beam_with_its_keys():
+    (text,) = re.findall(r"^### `\[mechanism.links.beam.section\]`\n(.*?)^#", PAGE, re.MULTILINE | re.DOTALL)
+    shown = {
+        row[0]: set(row[1:]) for row in ([*re.findall(r"`([^`]+)`", line)] for line in text.splitlines()) if row
+    }
+    del shown["shape"]
+    known = {}
+    for found in schema.subschemas(("mechanism", "links", 0, "beam", "section")):
+        if "properties" in found:
+            known[f'"{found["properties"]["shape"]["const"]}"'] = found["properties"].keys() - {"shape"}
+    assert shown == known
 
 
 def test_the_page_says_what_is_not_supported_yet():
