@@ -50,7 +50,6 @@ LEAST_SHARE: Final = 1.0 / 32.0
 THICKEST: Final = 0.25  # of the length
 DAMPING: Final = 0.01  # of a tube's first vibration, clamped at its base
 FIRST_ROOT: Final = 1.8751040687  # of a cantilever
-MODES: Final = 1  # of a tube in each plane, of twist and of stretch, beside its static deflections
 MOVED: Final = 1e-3  # share of all motion that a wall makes, from which it moves a mode
 BENDING_JOINTS: Final = ("revolute", "prismatic", "fixed")
 
@@ -237,7 +236,6 @@ def with_tubes(device: Device, tubes: tuple[Tube, ...]) -> Device:
             link["beam"] = {
                 "section": section,
                 "material": MATERIAL,
-                "modes": MODES,
                 "damping_time_s": size.damping_time,
             }
     return from_document(document, device.label, skip_assembly_check=True)

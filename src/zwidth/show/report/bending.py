@@ -16,12 +16,11 @@ SAME = 5e-4  # relative change below which a number is said to stay
 
 
 def sentences(facts: Facts) -> list[str]:
-    """What is said of bending; [] for a device without links that could bend."""
+    """What bending changes; [] for a device without links that could bend."""
     found = facts.bending
     if found is None:
         return []
     said = [
-        beginning(found),
         stiffness(found),
         felt(found, loaded=facts.point.load is not None),
         first_mode(found, held=facts.operator is not None),
@@ -57,7 +56,7 @@ def damping(found: Bending) -> str:
     if not any(tube.damping_time for tube in found.tubes):
         return ""
     return (
-        "The file's damping is none of bending, so that each tube has a damping ratio of "
+        "The file gives bending no damping: here each tube has a damping ratio of "
         f"{as_written(100.0 * DAMPING)}{SPACE}% in its own first vibration, clamped at its base. "
     )
 
