@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.progress import Progress
     from zwidth.result import Result
+    from zwidth.study.bending import Bending
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.load_path import LoadPath
     from zwidth.study.measured_boundary import Experiment
@@ -75,6 +76,12 @@ def device_load_path(
     from zwidth.study.load_path import load_path
 
     return load_path(device, push, count, point, progress)
+
+
+def device_bending(device: Device, point: OperatingPoint | None) -> Bending | None:
+    from zwidth.study.bending import bending
+
+    return bending(device, point)
 
 
 def device_report(device: Device, path: Any, point: OperatingPoint) -> dict[str, Any]:

@@ -174,6 +174,23 @@ def test_a_load_has_a_section_with_its_numbers(report_of):
     assert text.count('<figure id="load">') == 1
 
 
+def test_links_that_could_bend_have_a_section_with_its_numbers(report_of):
+    _, found, text = report_of("five-bar")
+    shown, bent = Page(text).text, found["bending"]["bent"]
+    assert (
+        text.count("<h2>Links that bend</h2>") == text.count("<caption>The tubes that are assumed</caption>") == 1
+    )
+    assert "The file takes its links as rigid." in shown
+    assert f"Bending raises the largest stiffness from {found['stiffness_max_N_per_m'] / 1e3:.3f} kN/m" in shown
+    assert f"no wall is felt stiffer than {bent['static_stiffness_N_per_m'] / 1e3:.2f} kN/m" in shown
+    assert found["bending"]["rigid"]["stiffness_max_N_per_m"] == found["stiffness_max_N_per_m"]
+    limit = pytest.approx(found["static_stiffness_limit_N_per_m"], rel=1e-12)
+    assert found["bending"]["rigid"]["static_stiffness_N_per_m"] == limit
+    _, found, text = report_of("two-mass")
+    assert found["bending"] is None
+    assert "Links that bend" not in text
+
+
 def test_nothing_stable_has_a_reason_and_nulls(report_of):
     _, found, _ = report_of("nothing stable")
     assert found["stiffness_max_N_per_m"] is None

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
     from zwidth.progress import Progress
+    from zwidth.study.bending import Bending
     from zwidth.study.load_path import LoadPath
     from zwidth.study.sensitivity_result import Sensitivities
 
@@ -329,6 +330,14 @@ class Device:
         point  where, and under which load otherwise: `device.at(...)`; left out: the reference, and the file's
         """
         return _verbs.device_load_path(self, push, count, point, progress)
+
+    def bending(self, point: OperatingPoint | None = None) -> Bending | None:
+        """What it changes that links bend: this device beside the same with rigid links or, where the file gives
+        no beams, with its links as typical tubes; see `study.bending.bending`. None where no link could bend.
+
+        point  where: `device.at(...)`; left out: the reference
+        """
+        return _verbs.device_bending(self, point)
 
     def report(self, path: str | os.PathLike[str], point: OperatingPoint | None = None) -> dict[str, Any]:
         """Write everything about the device into one HTML file; returns the numbers in it. See `write_report`.

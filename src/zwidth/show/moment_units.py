@@ -27,8 +27,13 @@ ENDINGS: Final = (
 )
 KEPT: Final = re.compile(r"[xyz]_m|plane_through_m|characteristic_length_m")
 """Keys that are lengths whatever is rendered."""
-OF_SPACE: Final = {"equilibrium": frozenset({"hand_force_N", "position_m", "counted_position_m"})}
-"""Table -> those of its keys that keep their units: forces and places in space, whatever is rendered."""
+OF_SPACE: Final = {
+    "equilibrium": frozenset({"hand_force_N", "position_m", "counted_position_m"}),
+    "beams": frozenset({"mass_kg", "carried_mass_kg"}),
+    "tubes": frozenset({"length_m", "outer_diameter_m", "wall_m"}),
+}
+"""Table, or list of tables -> those of its keys that keep their units whatever is rendered: forces and places in
+space, and the sizes and masses of links."""
 
 _moments: ContextVar[bool] = ContextVar("moments", default=False)
 
@@ -44,7 +49,7 @@ def keys_of_moments(value: Any, table: str = "") -> Any:
     if isinstance(value, Mapping):
         kept = OF_SPACE.get(table, frozenset())
         return {(key if key in kept else _key(key)): keys_of_moments(inner, key) for key, inner in value.items()}
-    return [keys_of_moments(inner) for inner in value] if isinstance(value, list | tuple) else value
+    return [keys_of_moments(inner, table) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def _key(key: Any) -> Any:

@@ -14,31 +14,34 @@ from __future__ import annotations
 
 import copy
 from contextlib import suppress
-from dataclasses import dataclass
-from math import inf, nan, pi, sqrt
+from dataclasses import dataclass, replace
+from math import isnan, nan, pi, sqrt
 from typing import Any, Final
 
 import numpy as np
 
+from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.build_beams import own_body
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
 from zwidth.device.legs import members, written
 from zwidth.device.load import from_document
 from zwidth.device.schema.beam import BeamSection
 from zwidth.device.toml_access import is_number, table
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sections import UnresolvedError
+from zwidth.measures.load_effect import NONE_STABLE
 from zwidth.model.argument_checks import require
 from zwidth.model.beam_section import beam_properties, typical_material
 from zwidth.model.beam_section import tube as tube_section
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
+from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.flexible_link import BeamError
 from zwidth.model.link_beams import carried_body
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
+from zwidth.result import Result
 
 MATERIAL: Final = "aluminium-6061"
 WALL: Final = 0.1  # of the diameter
@@ -66,40 +69,63 @@ class Tube:
     share: float
     damping_time: float = 0.0
 
+    def document(self) -> dict[str, Any]:
+        """Its numbers by their keys."""
+        return {
+            "link": self.link,
+            "length_m": self.length,
+            "outer_diameter_m": self.outer_diameter,
+            "wall_m": self.wall,
+            "share_of_mass": self.share,
+            "damping_time_s": self.damping_time,
+        }
+
 
 @dataclass(frozen=True)
 class BendingNumbers:
     """Of a device with bending or with rigid links.
 
-    stiffness_max     largest stiffness [N/m]; nan where no wall is stable, or the chart cannot be computed
-    static_stiffness  at the handle, of a wall without end, the motors held [N/m]; inf where nothing gives
-    first_mode        lowest natural frequency of a mode that the wall moves [Hz]; nan where there is none
+    chart             its stable walls; None where they could not be computed
+    static_stiffness  at the handle, of a wall without end, the motors held and no load [N/m]; inf where nothing
+                      gives; nan where there is no equilibrium
+    first_mode        lowest natural frequency of a mode that the wall moves, nobody at the handle [Hz]; nan where
+                      there is none
+    reason            why there is no largest stiffness; "" where there is one
     """
 
-    stiffness_max: float
+    chart: StabilityChart | None
     static_stiffness: float
     first_mode: float
+    reason: str = ""
 
-    def document(self) -> dict[str, float]:
+    @property
+    def stiffness_max(self) -> float:
+        """[N/m]; nan where no wall is stable, or the chart cannot be computed."""
+        return nan if self.chart is None else self.chart.stiffness_max
+
+    def document(self) -> dict[str, Any]:
         """Its numbers by their keys."""
         return {
             "stiffness_max_N_per_m": self.stiffness_max,
             "static_stiffness_N_per_m": self.static_stiffness,
             "first_mode_Hz": self.first_mode,
+            **({"reason": self.reason} if self.reason else {}),
         }
 
 
-@dataclass(frozen=True)
-class Bending:
+@dataclass(frozen=True, repr=False)
+class Bending(Result):
     """A device beside the same with rigid links.
 
-    links        names of those that bend
+    links        names of those that bend, of legs as they are written
     tubes        what they are taken to be; () where the file gives their beams
+    kept         names of the links that have a length and room for no tube; () where the file gives beams
     bent, rigid  its numbers
     """
 
     links: tuple[str, ...]
     tubes: tuple[Tube, ...]
+    kept: tuple[str, ...]
     bent: BendingNumbers
     rigid: BendingNumbers
 
@@ -113,20 +139,30 @@ class Bending:
         return {
             "links": list(self.links),
             "given": self.given,
-            "tubes": [
-                {
-                    "link": each.link,
-                    "length_m": each.length,
-                    "outer_diameter_m": each.outer_diameter,
-                    "wall_m": each.wall,
-                    "share_of_mass": each.share,
-                    "damping_time_s": each.damping_time,
-                }
-                for each in self.tubes
-            ],
+            "tubes": [tube.document() for tube in self.tubes],
+            "kept_rigid": list(self.kept),
             "bent": self.bent.document(),
             "rigid": self.rigid.document(),
         }
+
+    def table(self) -> dict[str, Any]:
+        """The numbers with rigid and with bending links as columns."""
+        rows = (self.rigid, self.bent)
+        return {
+            "links": ["rigid", "bending"],
+            "stiffness_max_N_per_m": [each.stiffness_max for each in rows],
+            "static_stiffness_N_per_m": [each.static_stiffness for each in rows],
+            "first_mode_Hz": [each.first_mode for each in rows],
+        }
+
+    def __repr__(self) -> str:
+        what = "beams of the file" if self.given else "typical tubes"
+        rows = (
+            f"{name} links: largest stiffness {each.stiffness_max:.6g} N/m, static stiffness "
+            f"{each.static_stiffness:.6g} N/m, first mode {each.first_mode:.6g} Hz"
+            for name, each in (("rigid", self.rigid), ("bending", self.bent))
+        )
+        return "\n  ".join([f"Bending: {len(self.links)} links as {what}", *rows])
 
 
 def bending(device: Device, point: OperatingPoint | None = None) -> Bending | None:
@@ -134,22 +170,46 @@ def bending(device: Device, point: OperatingPoint | None = None) -> Bending | No
 
     Returns  None of a device without links that could bend: given by a plant or a response, without lengths, with
              masses that are not known, or asked for in its rigid model
-    Raises   what `Device.at` raises
+    Raises   what `Device.at`, and `OperatingPoint.loop` of this point raise
     """
     require("device", device, Device)
     point = point or device.at()
     if device.mechanism is None or point.model == "rigid" or "dynamics" in device.missing:
         return None
-    flexible = tuple(device.mechanism.links.names[each.link] for each in device.mechanism.flexible)
-    tubes = () if flexible else typical_tubes(device)
-    if not (tubes or flexible):
+    beams = tuple(link["name"] for link in _links(device) if "beam" in link)
+    tubes = () if beams else typical_tubes(device)
+    if not (beams or tubes):
         return None
-    other = with_rigid_links(device) if flexible else with_tubes(device, tubes)
-    if device.load is None and point.load is not None:
+    own = _numbers(point)
+    other = with_rigid_links(device) if beams else with_tubes(device, tubes)
+    try:
+        changed = _numbers(_there(other, device, point))
+    except EquilibriumError as error:
+        changed = BendingNumbers(None, nan, nan, f"no equilibrium: {error}")
+    if beams:
+        return Bending(beams, (), (), own, changed).about(point)
+    links = tuple(tube.link for tube in tubes)
+    kept = tuple(link["name"] for link in _links(device) if _length(link) > 0.0 and link["name"] not in links)
+    return Bending(links, tubes, kept, changed, own).about(point)
+
+
+def _there(other: Device, device: Device, point: OperatingPoint) -> OperatingPoint:
+    """Another device at an operating point of a device, in the same hands and under the same load. Raises
+    EquilibriumError where it has no equilibrium there."""
+    if point.load is not None and point.load is not device.load:
         other = other.under(point.load)
-    own, changed = _numbers(point), _numbers(other.at_point(point))
-    bent, rigid = (own, changed) if flexible else (changed, own)
-    return Bending(flexible or tuple(tube.link for tube in tubes), tubes, bent, rigid)
+    found = other.at_point(point)
+    return replace(found, operator=point.operator, operator_name=point.operator_name, arm=point.arm)
+
+
+def _links(device: Device) -> list[dict[str, Any]]:
+    """The tables of a device's links, those of a leg once."""
+    return [link for _, link in written(table(device.document, "mechanism"), "links")]
+
+
+def _length(link: dict[str, Any]) -> float:
+    length = link.get("length_m", 0.0)
+    return float(length) if is_number(length) else 0.0
 
 
 def with_rigid_links(device: Device) -> Device:
@@ -173,7 +233,11 @@ def with_tubes(device: Device, tubes: tuple[Tube, ...]) -> Device:
     for _, link in written(document["mechanism"], "links"):
         if (size := sizes.get(link["name"])) is not None:
             section = {"shape": "tube", "outer_diameter_m": size.outer_diameter, "wall_m": size.wall}
-            link["beam"] = {"section": section, "material": MATERIAL, "damping_time_s": size.damping_time}
+            link["beam"] = {
+                "section": section,
+                "material": MATERIAL,
+                "damping_time_s": size.damping_time,
+            }
     return from_document(document, device.label, skip_assembly_check=True)
 
 
@@ -202,8 +266,8 @@ def _tube(mechanism: Mechanism, name: str, link: dict[str, Any], ratio: float) -
 
     ratio  of damping that the tube has in its first vibration, clamped at its base
     """
-    length, mass = link.get("length_m", 0.0), link.get("mass_kg", 0.0)
-    if not (is_number(length) and length > 0.0 and mass > 0.0 and link["joint"] in BENDING_JOINTS):
+    length, mass = _length(link), link.get("mass_kg", 0.0)
+    if not (length > 0.0 and mass > 0.0 and link["joint"] in BENDING_JOINTS):
         return None
     index, material = mechanism.links.names.index(name), typical_material(MATERIAL)
     share = SHARE
@@ -230,11 +294,16 @@ def _known_axis(link: dict[str, Any]) -> Floats | None:
 
 
 def _numbers(point: OperatingPoint) -> BendingNumbers:
-    stiffness = nan
-    with suppress(ChartError, UnresolvedError, DeviceError):
-        stiffness = point.chart(decay=False).stiffness_max
-    static = float(point.effective.stiffness)
-    return BendingNumbers(stiffness, static if np.isfinite(static) else inf, _first_moved(point.ungripped_plant))
+    """Raises what `OperatingPoint.loop` raises."""
+    first = _first_moved(point.ungripped_plant)
+    chart, reason = None, ""
+    try:
+        chart = stability_chart(point.loop, decay=False).about(point)
+    except (ChartError, UnresolvedError) as error:
+        reason = str(error)
+    if chart is not None and isnan(chart.stiffness_max):
+        reason = NONE_STABLE
+    return BendingNumbers(chart, float(point.effective.stiffness), first, reason)
 
 
 def _first_moved(plant: Plant) -> float:

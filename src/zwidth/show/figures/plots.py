@@ -95,6 +95,19 @@ def _load_path(ax: Axes, path: Any) -> None:
     draw_outlines(ax, path)
 
 
+def _bending(ax: Axes, result: Any) -> None:
+    """The charts with bending and with rigid links over each other."""
+    from zwidth.show.figures.stability import draw_models
+    from zwidth.show.figures.style import draw_empty
+
+    charts = {"bending links": result.bent.chart, "rigid links": result.rigid.chart}
+    known = {name: chart for name, chart in charts.items() if chart is not None}
+    if known:
+        draw_models(ax, known)
+    else:
+        draw_empty(ax, result.bent.reason)
+
+
 def _bounds(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.bounds import draw_bounds
 
@@ -249,6 +262,7 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "RobustStudy": _robust_study,
     "ByDirection": _polar,
     "LoadPath": _load_path,
+    "Bending": _bending,
     "BoundsComparison": _bounds,
     "Guarantees": _guarantees,
     "Sensitivities": _sensitivities,

@@ -111,8 +111,8 @@ class Facts:
 
     @cached_property
     def bending(self) -> Bending | None:
-        """The device beside the same with rigid links, or its rigid links as typical tubes; None without links that
-        could bend."""
+        """The device beside the same with rigid links, or with its rigid links as typical tubes; None where no
+        link could bend."""
         return bending(self.device, self.point)
 
     @cached_property

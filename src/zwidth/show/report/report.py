@@ -20,7 +20,7 @@ from zwidth.show.report.facts import Facts, gather
 from zwidth.show.report.figures import svg_figures
 from zwidth.show.units import SPACE
 
-PARTS: Final = 4  # that take about as long as each other: the facts, two of them at length, the page
+PARTS: Final = 5  # the facts, three of them at length, and the page
 BLANK_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Hz|N|J|s|m|g)|Ns|samples?)(?![\w-]))")
 
 
@@ -44,8 +44,10 @@ def write_report(
     say("report", 1, PARTS)
     _ = facts.sensitivities  # each is computed at its first use, and kept
     say("report", 2, PARTS)
-    _ = facts.validity, facts.load_path, facts.bending
+    _ = facts.validity, facts.load_path
     say("report", 3, PARTS)
+    _ = facts.bending
+    say("report", 4, PARTS)
     target = Path(path)
     write_text(target, page(facts))
     return {"file": str(target), **tables.document(facts)}
