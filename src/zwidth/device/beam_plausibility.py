@@ -23,7 +23,6 @@ from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.legs import members
 from zwidth.device.toml_access import is_number, table
 from zwidth.loop.controller import NotKnown
-from zwidth.model.posture import OK, PostureError
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
@@ -111,6 +110,7 @@ def _first_frequencies(device: Device) -> dict[int, float]:
     reference; {} where that is no posture."""
     from zwidth.model.mechanism_arrays import pack
     from zwidth.model.motions import Motions
+    from zwidth.model.posture import OK, PostureError
 
     assert device.mechanism is not None
     with suppress(DeviceError, PostureError):
