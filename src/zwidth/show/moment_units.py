@@ -29,6 +29,8 @@ KEPT: Final = re.compile(r"[xyz]_m|plane_through_m|characteristic_length_m")
 """Keys that are lengths whatever is rendered."""
 OF_SPACE: Final = {"equilibrium": frozenset({"hand_force_N", "position_m", "counted_position_m"})}
 """Table -> those of its keys that keep their units: forces and places in space, whatever is rendered."""
+OF_FILES: Final = frozenset({"load"})
+"""Tables that are those of the device file, with its keys."""
 
 _moments: ContextVar[bool] = ContextVar("moments", default=False)
 
@@ -42,6 +44,8 @@ def keys_of_moments(value: Any, table: str = "") -> Any:
     {'stiffness_max_Nm_per_rad': 2.0, 'x_m': [0.1], 'inner': [{'rigid_mass_kg_m2': 1.0}]}
     """
     if isinstance(value, Mapping):
+        if table in OF_FILES:
+            return value
         kept = OF_SPACE.get(table, frozenset())
         return {(key if key in kept else _key(key)): keys_of_moments(inner, key) for key, inner in value.items()}
     return [keys_of_moments(inner) for inner in value] if isinstance(value, list | tuple) else value
