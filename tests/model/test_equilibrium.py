@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.device.test_device_zoo_engines import completed
 from tests.loop.loaded_cases import random_points
+from tests.model.beam_devices import device, drive, link
 from tests.model.joints_apart import FOURTH, Joints
 from tests.model.model_engines import mjcf, moving_links, quaternion
 from zwidth.device.load import from_document
@@ -517,3 +518,36 @@ def test_a_batch_of_handles_with_an_orientation_has_it_under_load():
         alone = device.at(orientation=turn, load=load)
         assert points.posture.rotation[i] == pytest.approx(alone.posture.rotation, abs=1e-12)
         assert points.posture.angles[i] == pytest.approx(alone.posture.angles, abs=1e-12)
+
+
+# --- springs without torque -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+def test_a_spring_with_no_torque_but_rounding_is_at_its_kink(tilt):
+    """A column that turns about the plane in which the hand pushes: the branch asked for decides, not rounding."""
+    joints = {"column": 0.3, "upper": 0.5, "lower": 1.0}
+    body = {"mass_kg": 0.1, "inertia_kg_m2": [1e-4, 1e-4, 1e-4]}
+    found = from_document(
+        device(
+            [
+                link("column", "base", orientation_rad=[tilt, 0.0, 0.0], **body),
+                link("upper", "column", orientation_rad=[np.pi / 2, 0.0, 0.0], length_m=0.2, **body),
+                link("lower", "upper", length_m=0.15, **body),
+            ],
+            [drive(name, 0.5, backward_stiffness_Nm_per_rad=0.3) for name in joints],
+            joints,
+            (0.0, 0.0, 1.0),
+        )
+    )
+    axis = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    across = found.at().jacobian[:, 0]
+    radial = np.cross(across, axis) / np.linalg.norm(across)
+    ahead, behind = (
+        found.at(direction=radial, load=Load(push=-3.0, branch=branch)) for branch in ("forward", "backward")
+    )
+    assert ahead.equilibrium.kinked == behind.equilibrium.kinked == (0,)
+    assert not np.allclose(ahead.loaded_plants.loaded.stiffness, behind.loaded_plants.loaded.stiffness)
+    assert ahead.other_branch.loaded_plants.loaded.stiffness == pytest.approx(
+        behind.loaded_plants.loaded.stiffness, rel=1e-9, abs=1e-9
+    )
