@@ -520,6 +520,31 @@ def test_a_batch_of_handles_with_an_orientation_has_it_under_load():
         assert points.posture.angles[i] == pytest.approx(alone.posture.angles, abs=1e-12)
 
 
+# --- a free joint on a spring ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)])
+def test_a_free_joint_s_spring_gives_way_to_a_push(gravity):
+    """Gravity across the plane changes nothing, and is not needed to find where the joint then is."""
+    joints, stiffness, length = {"upper": 0.4, "lower": 1.2, "tip": 0.5}, 1.0, 0.01
+    body = {"mass_kg": 0.1, "inertia_kg_m2": [1e-4, 1e-4, 1e-4]}
+    sprung = link("tip", "lower", length_m=length, free=True, joint_stiffness_Nm_per_rad=stiffness, **body)
+    found = from_document(
+        device(
+            [link("upper", "base", length_m=0.02, **body), link("lower", "upper", length_m=0.015, **body), sprung],
+            [drive(name, 0.5) for name in ("upper", "lower")],
+            joints,
+            (0.0, 1.0, 0.0),
+        )
+    )
+    at = found.at(load=Load(push=-1.0, gravity=gravity))
+    turn, pointing = at.posture.angles[2] - joints["tip"], at.posture.angles.sum()
+    x, y, force = length * np.cos(pointing), length * np.sin(pointing), at.equilibrium.hand_force
+    assert turn == pytest.approx((x * force[1] - y * force[0]) / stiffness, rel=1e-7)
+    assert abs(turn) > 1e-3
+    assert np.max(np.abs(at.equilibrium.unbalanced)) < 1e-10
+
+
 # --- springs without torque -------------------------------------------------------------------------------
 
 

@@ -380,15 +380,18 @@ class Balance:
         self._check_torques(found.torques)
         self._check_across(found)
 
-    def _check_balance(self, found: Equilibrium) -> None:
-        """Raise EquilibriumError where the hand cannot balance a coordinate."""
-        left, count, mech = found.unbalanced, self.joints, self.motions.mech
-        scale = max(
+    def largest_part(self, found: Equilibrium) -> float:
+        """The largest generalised force of weight, drives and free joints' springs, to judge a balance by."""
+        return max(
             float(np.max(self.heaviest, initial=0.0)),
             float(np.max(np.abs(self.motion.T) @ np.abs(found.torques), initial=0.0)),
             float(np.max(np.abs(self.free_springs), initial=0.0)),
         )
-        loose = np.flatnonzero(np.abs(left) > UNBALANCED * scale)
+
+    def _check_balance(self, found: Equilibrium) -> None:
+        """Raise EquilibriumError where the hand cannot balance a coordinate."""
+        left, count, mech = found.unbalanced, self.joints, self.motions.mech
+        loose = np.flatnonzero(np.abs(left) > UNBALANCED * self.largest_part(found))
         if not len(loose):
             return
         unknowns = self.motions.unknowns[len(self.motions.unknowns) - count :]

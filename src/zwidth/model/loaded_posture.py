@@ -163,12 +163,12 @@ def _settled(
 
 def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balance]) -> Posture:
     """The posture with free joints where gravity, their springs and the load leave them."""
-    k, count = len(mechanism.driven), len(mechanism.free)
+    k, count, here = len(mechanism.driven), len(mechanism.free), balance(at)
+    # the same in every posture, so that what is searched for are forces
+    scale = here.largest_part(here.solve()) or 1.0
 
     def off(there: Posture) -> Floats:
-        own = balance(there)
-        scale = max(float(np.max(own.heaviest[k:])), float(np.max(np.abs(own.free_springs))))
-        return np.asarray(own.solve().unbalanced[k:] / (scale or 1.0))
+        return np.asarray(balance(there).solve().unbalanced[k:] / scale)
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
         return at
