@@ -34,6 +34,17 @@ def test_each_push_is_a_chart_of_its_own():
     assert "load" not in document  # the push is what changes
 
 
+def test_an_arm_that_does_not_reach_is_refused(tmp_path):
+    own = tmp_path / "arm.toml"
+    own.write_text(
+        '[arm]\ngrasp = "rigid"\nshoulder_m = [2.0, 0.0, 0.0]\nhand.link = "arm"\n'
+        "posture.joints_rad = { arm = 0.3 }\n"
+        '[[arm.links]]\nname = "arm"\njoint = "revolute"\nlength_m = 0.1\nmass_kg = 1.0\ninertia_kg_m2 = 1e-3\n'
+    )
+    (line,) = refusal_lines("chart", MECHANISM, "--operator", str(own))
+    assert line.startswith(f"{MECHANISM}: the arm does not reach the handle from its shoulder")
+
+
 def test_gravity_stays_and_is_named():
     ran = run_command("load", MECHANISM, *FEW, "--gravity", "0,-9.81", "--json")
     assert ran.document["load"] == {"gravity_m_per_s2": [0.0, -9.81, 0.0]}

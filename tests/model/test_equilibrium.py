@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.device.test_device_zoo_engines import completed
 from tests.loop.loaded_cases import random_points
+from tests.model.beam_devices import device, drive, link
 from tests.model.joints_apart import FOURTH, Joints
 from tests.model.model_engines import mjcf, moving_links, quaternion
 from zwidth.device.load import from_document
@@ -517,3 +518,61 @@ def test_a_batch_of_handles_with_an_orientation_has_it_under_load():
         alone = device.at(orientation=turn, load=load)
         assert points.posture.rotation[i] == pytest.approx(alone.posture.rotation, abs=1e-12)
         assert points.posture.angles[i] == pytest.approx(alone.posture.angles, abs=1e-12)
+
+
+# --- a free joint on a spring ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gravity", [None, (0.0, 0.0, -9.81)])
+def test_a_free_joint_s_spring_gives_way_to_a_push(gravity):
+    """Gravity across the plane changes nothing, and is not needed to find where the joint then is."""
+    joints, stiffness, length = {"upper": 0.4, "lower": 1.2, "tip": 0.5}, 1.0, 0.01
+    body = {"mass_kg": 0.1, "inertia_kg_m2": [1e-4, 1e-4, 1e-4]}
+    sprung = link("tip", "lower", length_m=length, free=True, joint_stiffness_Nm_per_rad=stiffness, **body)
+    found = from_document(
+        device(
+            [link("upper", "base", length_m=0.02, **body), link("lower", "upper", length_m=0.015, **body), sprung],
+            [drive(name, 0.5) for name in ("upper", "lower")],
+            joints,
+            (0.0, 1.0, 0.0),
+        )
+    )
+    at = found.at(load=Load(push=-1.0, gravity=gravity))
+    turn, pointing = at.posture.angles[2] - joints["tip"], at.posture.angles.sum()
+    x, y, force = length * np.cos(pointing), length * np.sin(pointing), at.equilibrium.hand_force
+    assert turn == pytest.approx((x * force[1] - y * force[0]) / stiffness, rel=1e-7)
+    assert abs(turn) > 1e-3
+    assert np.max(np.abs(at.equilibrium.unbalanced)) < 1e-10
+
+
+# --- springs without torque -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+def test_a_spring_with_no_torque_but_rounding_is_at_its_kink(tilt):
+    """A column that turns about the plane in which the hand pushes: the branch asked for decides, not rounding."""
+    joints = {"column": 0.3, "upper": 0.5, "lower": 1.0}
+    body = {"mass_kg": 0.1, "inertia_kg_m2": [1e-4, 1e-4, 1e-4]}
+    found = from_document(
+        device(
+            [
+                link("column", "base", orientation_rad=[tilt, 0.0, 0.0], **body),
+                link("upper", "column", orientation_rad=[np.pi / 2, 0.0, 0.0], length_m=0.2, **body),
+                link("lower", "upper", length_m=0.15, **body),
+            ],
+            [drive(name, 0.5, backward_stiffness_Nm_per_rad=0.3) for name in joints],
+            joints,
+            (0.0, 0.0, 1.0),
+        )
+    )
+    axis = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    across = found.at().jacobian[:, 0]
+    radial = np.cross(across, axis) / np.linalg.norm(across)
+    ahead, behind = (
+        found.at(direction=radial, load=Load(push=-3.0, branch=branch)) for branch in ("forward", "backward")
+    )
+    assert ahead.equilibrium.kinked == behind.equilibrium.kinked == (0,)
+    assert not np.allclose(ahead.loaded_plants.loaded.stiffness, behind.loaded_plants.loaded.stiffness)
+    assert ahead.other_branch.loaded_plants.loaded.stiffness == pytest.approx(
+        behind.loaded_plants.loaded.stiffness, rel=1e-9, abs=1e-9
+    )

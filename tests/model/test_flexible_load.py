@@ -209,6 +209,25 @@ def test_the_handle_stays_where_it_is_asked_for(make):
     assert float(at.equilibrium.hand_force @ u) == pytest.approx(-1.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("posture_of", ["handle", "motors"])
+def test_a_handle_on_bent_links_settles_on_the_surface(posture_of):
+    """Where a force is in balance 4 mm along the surface, the handle slides there and stays on the surface."""
+    found = from_document(planar_arm())
+    start = found.at(load=Load(push=-3.0, posture_of=posture_of)).equilibrium
+    way = np.array([0.004, 0.0, 0.0])
+    force = found.at(start.handle_place + way, load=Load(push=-3.0)).equilibrium.hand_force
+    at = found.at(load=Load(force=force, settle=True, posture_of=posture_of))
+    assert at.equilibrium.hand_force == pytest.approx(force, abs=1e-9)
+    assert at.posture.position == pytest.approx(at.equilibrium.handle_place, abs=1e-12)
+    if posture_of == "handle":
+        assert at.equilibrium.handle_place == pytest.approx(start.handle_place + way, abs=1e-9)
+
+
+def test_the_posture_has_its_handle_where_bent_links_leave_it():
+    at = from_document(planar_arm()).at(load=Load(push=-3.0, posture_of="motors"))
+    assert at.posture.position == pytest.approx(at.equilibrium.handle_place, abs=1e-12)
+
+
 def test_bending_under_a_load_is_that_of_a_frame():
     """To the first order in the load, the motors held: of a device in space with all kinds of offsets."""
     document = with_beams(spatial_arm(), modes=4)

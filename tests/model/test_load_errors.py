@@ -37,8 +37,8 @@ from zwidth.model.reduction import ModelError
         ({"surface_radius": 0.0}, "surface_radius must be a number but 0, or inf"),
         ({"surface_radius": np.nan}, "surface_radius must be a number but 0"),
         ({"surface_radius": "flat"}, "surface_radius must be a number but 0.*got 'flat'"),
-        ({"settle": True}, "settle needs a load"),
-        ({"settle": True, "push": 1.0}, "settle needs a load"),
+        ({"settle": True}, "settle needs a force"),
+        ({"settle": True, "push": 1.0}, "settle needs a force"),
         ({"hand": "soft"}, "hand must be 'dead' or 'follower' or 'neglected', got the text 'soft'"),
         ({"posture_of": "links"}, "posture_of must be 'handle' or 'motors'"),
         ({"branch": "up"}, "branch must be 'forward' or 'backward'"),
@@ -55,6 +55,11 @@ def test_a_load_that_cannot_be_meant_is_one_clear_error(arguments, words):
         ({"load": (0.0, 0.0)}, DeviceError, "five-bar: load: a load of 0 N"),
         ({"load": "down"}, DeviceError, "five-bar: load: force must be two or three finite numbers"),
         ({"gravity": (0.0, np.nan)}, DeviceError, "five-bar: load: gravity must be two or three finite numbers"),
+        (
+            {"load": Load(push=1.0), "gravity": "down"},
+            DeviceError,
+            "five-bar: load: gravity must be two or three finite numbers .* got 'down'",
+        ),
         ({"load": (5.0, 0.0)}, LoadError, r"the load \(5, 0, 0\) does not push along the rendered direction"),
         ({"load": (1.0, -5.0)}, LoadError, r"has a part \(1, 0, 0\) across .* needs \(-0.00291587, 0, 0\); give"),
         (
@@ -102,6 +107,16 @@ def test_limits_of_motors_and_computer_bound_the_load():
         limited.at(load=(0.0, -5.0)).plant  # noqa: B018
 
 
+def test_a_moment_that_is_none_is_named_as_one():
+    with pytest.raises(DeviceError, match=r"five-bar: load: moment must be two or three finite numbers \[N m\]"):
+        load_device("five-bar").under((1.0, 2.0, 3.0, 4.0), moment=True)
+
+
+def test_a_point_without_a_model_s_name_is_that_of_the_full_model():
+    point = load_device("five-bar").at(load=(0.0, -5.0))
+    assert point.in_model(None).plant.stiffness == pytest.approx(point.plant.stiffness, rel=1e-12)
+
+
 @pytest.mark.parametrize("name", ["published-two-mass", "hapkit-course"])
 @pytest.mark.parametrize("arguments", [{"load": (0.0, -5.0)}, {"gravity": (0.0, -9.81)}, {"load": Load(push=1.0)}])
 def test_a_device_without_a_mechanism_bears_no_load(name, arguments):
@@ -125,6 +140,7 @@ def test_a_device_without_a_mechanism_bears_no_load(name, arguments):
         ({"settle": True}, "load.settle: needs force_N"),
         ({"settle": True, "push_N": 1.0}, "load.settle: needs force_N"),
         ({"surface_radius_m": 0.0}, "load.surface_radius_m: must not be 0; remove it for a plane"),
+        ({"surface_radius_m": -float("inf")}, "load.surface_radius_m: must not be -inf; remove it for a plane"),
         ({"hand": "soft"}, "load.hand: must be 'dead', 'follower' or 'neglected'"),
         ({"force": [0.0, 5.0]}, "load.force: is not a key of a device file; did you mean 'force_N'"),
         ({"gravity_m_per_s2": -9.81}, "load.gravity_m_per_s2: must be a list"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import replace
 
@@ -10,14 +11,17 @@ import pytest
 from matplotlib import pyplot
 
 import zwidth
+from tests.model.beam_devices import slides
 from zwidth.device.new_device import new_device
 from zwidth.measures.definition import MISSING, OK, OUT_OF_REACH, STATUS
 from zwidth.model.load import Load
+from zwidth.model.mechanism import PRISMATIC
 from zwidth.show import load_text
 from zwidth.show.figures.load_path import COLOURS, draw_close_up, load_path_figure
 from zwidth.show.figures.map import MARKS
 from zwidth.show.figures.study import SYMBOLS
-from zwidth.show.load_text import balance_text, pushes_text
+from zwidth.show.load_text import balance_text, drive_rows, pushes_text
+from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.report import load as section
 from zwidth.show.report.facts import gather
 from zwidth.show.units import typed
@@ -270,3 +274,21 @@ def test_nothing_is_said_without_a_load():
     of = facts("five-bar", {})
     assert section.sentences(of) == section.path(of) == []
     assert of.load_path is None
+
+
+def test_a_load_keeps_the_keys_of_its_file_about_an_axis():
+    load = {"push_N": 2.0, "gravity_m_per_s2": [0.0, 0.0, -9.81], "surface_radius_m": 0.1}
+    assert keys_of_moments({"stiffness_max_N_per_m": 1.0, "load": load}) == {
+        "stiffness_max_Nm_per_rad": 1.0,
+        "load": load,
+    }
+
+
+def test_the_drive_of_a_slide_is_bent_by_a_way():
+    at = zwidth.from_document(slides()).at(load=Load(push=-1.0))
+    slide = at.mechanism.links.joint[at.drives.joint] == PRISMATIC
+    bent = [typed(text) for _, text in drive_rows(at)]
+    assert any(slide)
+    for moves, text in zip(slide, bent, strict=True):
+        assert not moves or "bent" not in text or re.search(r"bent by [\d.]+ (m|mm|µm|um|nm)$", text)
+    assert any("bent" in text for moves, text in zip(slide, bent, strict=True) if moves)

@@ -25,18 +25,17 @@ def document_under(
     """
     if isinstance(load, Load):
         try:
-            own = load if gravity is None else load.with_gravity(gravity)
+            whole = load if gravity is None else load.with_gravity(gravity)
         except LoadError as error:
             raise fail(label, "load", str(error)) from None
-        return {**document, "load": table_of_load(own)}
+        return {**document, "load": table_of_load(whole)}
     changes: Tables = {}
     try:
         if load is not None:
-            force = Load(force=cast(Any, load)).force
-            assert force is not None
-            changes["moment_Nm" if moment else "force_N"] = force.tolist()
+            own = Load(moment=cast(Any, load)) if moment else Load(force=cast(Any, load))
+            changes |= table_of_load(own)
         if gravity is not None:
-            changes["gravity_m_per_s2"] = Load(gravity=cast(Any, gravity)).weight.tolist()
+            changes |= table_of_load(Load(gravity=cast(Any, gravity)))
     except LoadError as error:
         raise fail(label, "load", str(error)) from None
     if not changes:

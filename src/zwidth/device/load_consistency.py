@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 from typing import Any, Final
 
 from zwidth.device.faults import KeyPath
@@ -33,8 +34,9 @@ def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
         )
     if load.get("settle") is True and "force_N" not in load:
         yield ("load", "settle"), "needs force_N, under which the device slides to where it is in balance"
-    if is_number(load.get("surface_radius_m")) and load["surface_radius_m"] == 0:
-        yield ("load", "surface_radius_m"), "must not be 0; remove it for a plane"
+    radius = load.get("surface_radius_m")
+    if is_number(radius) and radius in (0, -inf):
+        yield ("load", "surface_radius_m"), f"must not be {radius:g}; remove it for a plane"
 
 
 def _is_zero(force: Any) -> bool:

@@ -113,7 +113,7 @@ class OperatingPoint(PosedDevice):
         what `equilibrium` raises, and ModelError for a model other than full and rigid."""
         self._check_single("plant")
         self.require("dynamics")
-        if self.model not in ("full", "rigid"):
+        if self.model not in ("full", "rigid", None):
             raise ModelError(
                 f"model {self.model!r} has no form under load, where drives of unlike torques are no one spring; "
                 "use 'full' or 'rigid'"
@@ -135,10 +135,10 @@ class OperatingPoint(PosedDevice):
     def _attach_arm(self, plant: Plant, force: Floats) -> Plant:
         """A full plant with the arm at its handle, which pushes with a force (3,). Raises ModelError for a reduced
         model, ArmError where the arm cannot hold the handle."""
-        if self.model != "full":
+        if self.model not in ("full", None):
             raise ModelError(
                 f"an arm that is a chain of bodies holds the full model alone, not {self.model!r}; leave the "
-                f"model out"
+                "model out"
             )
         assert self.arm is not None
         rows = np.zeros((3, plant.size))
@@ -153,7 +153,7 @@ class OperatingPoint(PosedDevice):
         none = np.zeros((0, plant.size))
         if self.operator is None or self.operator.directions != "all" or self.mechanism is None:
             return none
-        if self.model != "full" or self.turns or self.direction_count > 1:
+        if self.model not in ("full", None) or self.turns or self.direction_count > 1:
             return none
         u = self.direction[:3] / np.linalg.norm(self.direction[:3])
         handle = self.handle_rows

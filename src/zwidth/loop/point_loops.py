@@ -45,8 +45,7 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
              have no sections then either
     Returns  None where that holds of every point: a measured response, a given plant of a single design or one
              that is reduced, encoders on the links in a reduced model, a computer with fixed feedback, a load,
-             flexible links, a
-             mechanism that is not plain (`drive_side.is_plain`) in a reduced model
+             flexible links, a mechanism that is not plain (`drive_side.is_plain`) in a reduced model
     """
     point.require("dynamics", "sampling")
     model = point.model or "full"

@@ -129,7 +129,8 @@ class PosedDevice:
 
     @property
     def status(self) -> NDArray[np.uint8]:
-        """(...) OK, OUT_OF_REACH or SINGULAR (model.posture)."""
+        """(...) OK, or why there is no posture (model.posture): OUT_OF_REACH, SINGULAR, BEYOND_LIMIT,
+        NO_EQUILIBRIUM."""
         return np.full(self.shape, OK, dtype=np.uint8) if self.posture is None else self.posture.status
 
     @property

@@ -85,9 +85,8 @@ def attach_arm(plant: Plant, arm: Arm, handle: Floats, place: Floats, force: Flo
 
 
 def _together(handle: Floats, hand: Floats) -> Floats:
-    """The motions (n + a, n + a - 3 or more) in which hand and handle move together: the device's coordinates,
-    and the
-    arm's own."""
+    """The motions (n + a, n + a - 3 or more) in which hand and handle move together: the device's coordinates, and
+    the arm's own."""
     left, size, right = np.linalg.svd(hand)
     rank = int(np.count_nonzero(size > STRETCHED * size[0])) if len(size) else 0
     lost = handle.T @ left[:, rank:]

@@ -42,6 +42,13 @@ class DriveSprings:
         """Which drives are flexible."""
         return np.flatnonzero(np.isfinite(self.forward))
 
+    def settled(self, deflection: Floats, rounding: float) -> Floats:
+        """The deflections (d,), those at the kink to rounding, a torque [N m], just there: without torque, what is
+        left by a search would else decide on the stiffness."""
+        flexible = np.isfinite(self.forward) & (self.forward != self.backward)
+        near = np.where(flexible, self.forward, 0.0) * np.abs(deflection - self.kink) <= rounding
+        return np.where(flexible & near, self.kink, deflection)
+
     def at_kink(self, deflection: Floats) -> NDArray[np.bool_]:
         """(d,)  which drives are bent to just where their stiffness changes."""
         return np.asarray(np.isfinite(self.forward) & (self.forward != self.backward) & (deflection == self.kink))

@@ -24,7 +24,7 @@ import numpy as np
 from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_posture
 from zwidth.model.drive_springs import DriveSprings
 from zwidth.model.load import ALONG, Load, LoadError, vector_text
-from zwidth.model.mechanism import ORIENTATION, POSITION, Compensation, Floats, Mechanism
+from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
 from zwidth.model.posture import Posture
@@ -53,8 +53,9 @@ class Equilibrium:
     wall_force     f, that the wall pushes with along the direction [N]
     hand_force, hand_moment  (3,)  of the hand on the handle [N], [N m]
     bending        (x,)  elastic coordinates of the flexible links
-    deflections    (d,)  by which the motors are ahead of their joints, at the joint [rad]
-    torques        (d,)  of the motors, at the joint [N m];   ratio (d,) of the transmissions
+    deflections    (d,)  by which the motors are ahead of their joints, at the joint [rad], of a prismatic one [m]
+    torques        (d,)  of the motors, at the joint [N m], of a prismatic one [N]
+    ratio          (d,)  of the transmissions
     compensation   how gravity is compensated
     unbalanced     (c,)  generalised forces that neither hand nor drives balance
     """
@@ -260,7 +261,7 @@ class Balance:
             off, jacobian = self._equations(share, ahead, counted, torques, unit, s, f)
             size = float(np.max(np.abs(s), initial=0.0))
             if np.max(np.abs(off), initial=0.0) <= SETTLED * max(size, abs(f)):
-                found = self._result(ahead, counted, torques, s, f)
+                found = self._result(self.springs.settled(ahead, SETTLED * self._scale(s)), counted, torques, s, f)
                 bending = self._bending_under(share, found, s)
                 if np.max(np.abs(bending - self.bending), initial=0.0) <= BENT * np.max(
                     np.abs(bending), initial=0.0
@@ -278,6 +279,10 @@ class Balance:
             ahead[self.flexible] -= step[: len(self.flexible)]
             f -= step[-1] if self.normal is not None else 0.0
         return None
+
+    def _scale(self, s: Floats) -> float:
+        """A torque [N m] by which others are judged as rounding: that of the drives, or of the whole weight."""
+        return float(max(np.max(np.abs(s), initial=0.0), np.max(self.heaviest, initial=0.0)))
 
     def _not_held(self) -> str:
         return (
@@ -375,23 +380,27 @@ class Balance:
         self._check_torques(found.torques)
         self._check_across(found)
 
-    def _check_balance(self, found: Equilibrium) -> None:
-        """Raise EquilibriumError where the hand cannot balance a coordinate."""
-        left, count = found.unbalanced, self.joints
-        scale = max(
+    def largest_part(self, found: Equilibrium) -> float:
+        """The largest generalised force of weight, drives and free joints' springs, to judge a balance by."""
+        return max(
             float(np.max(self.heaviest, initial=0.0)),
             float(np.max(np.abs(self.motion.T) @ np.abs(found.torques), initial=0.0)),
             float(np.max(np.abs(self.free_springs), initial=0.0)),
         )
-        loose = np.flatnonzero(np.abs(left) > UNBALANCED * scale)
+
+    def _check_balance(self, found: Equilibrium) -> None:
+        """Raise EquilibriumError where the hand cannot balance a coordinate."""
+        left, count, mech = found.unbalanced, self.joints, self.motions.mech
+        loose = np.flatnonzero(np.abs(left) > UNBALANCED * self.largest_part(found))
         if not len(loose):
             return
         unknowns = self.motions.unknowns[len(self.motions.unknowns) - count :]
-        name = self.mechanism.links.names[unknowns[loose[0]]]
+        link, torque = unknowns[loose[0]], abs(float(left[loose[0]]))
+        name, unit = self.mechanism.links.names[link], "N" if mech.kind[link] == PRISMATIC else "N m"
         what = "free joint" if loose[0] >= len(self.mechanism.driven) else "joint"
         raise EquilibriumError(
-            f"nothing balances {abs(float(left[loose[0]])):.4g} N m at the {what} {name!r}, neither a drive nor "
-            "the hand at the handle; give the joint a spring, compensate gravity, or ask for another posture"
+            f"nothing balances {torque:.4g} {unit} at the {what} {name!r}, neither a drive nor the hand at the "
+            "handle; give the joint a spring, compensate gravity, or ask for another posture"
         )
 
     def _check_torques(self, torques: Floats) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from numbers import Real
-from typing import Final, Literal, get_args
+from typing import Final, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -88,7 +88,7 @@ class Load:
         if self.surface_radius == 0.0 or not (_is_finite(self.surface_radius) or self.surface_radius == inf):
             raise LoadError(f"surface_radius must be a number but 0, or inf [m], got {self.surface_radius!r}")
         if self.settle and self.force is None:
-            raise LoadError("settle needs a load, under which the device slides to where it is in balance")
+            raise LoadError("settle needs a force, under which the device slides to where it is in balance")
 
     @property
     def weight(self) -> Floats:
@@ -148,8 +148,8 @@ class Load:
         return replace(self, force=None, push=float(np.linalg.norm(self.force)), settle=False)
 
     def with_gravity(self, gravity: ArrayLike) -> Load:
-        """The same load under another gravity."""
-        return replace(self, gravity=np.asarray(gravity, dtype=np.float64))
+        """The same load under another gravity, (2,) or (3,) [m/s^2]. Raises LoadError for another one."""
+        return replace(self, gravity=cast(Floats, gravity))
 
 
 def along_text(push: float) -> str:

@@ -90,8 +90,10 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
         if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
             break
     final = balance(at)
-    final.check(final.solve())
-    return at
+    found = final.solve()
+    final.check(found)
+    # `_moved` places the handle as if the links did not bend
+    return replace(at, position=found.handle_place) if mechanism.flexible else at
 
 
 def _behind_motors(
@@ -125,7 +127,7 @@ def _ahead_of_bending(
         # what the drives cannot make up for, as bending out of a plane, stays
         step[:k] = np.linalg.pinv(at.jacobian[:, :k]) @ away
         if np.max(np.abs(step), initial=0.0) <= SETTLED:
-            return replace(at, position=found.handle_place)
+            return at
         at = _moved(mechanism, at, step)
     raise EquilibriumError("no posture was found in which the bent links have the handle where it is asked for")
 
@@ -137,15 +139,16 @@ def _settled(
     assert load.force is not None
     if mechanism.controls != POSITION or not np.any(screw[:3]) or np.any(screw[3:]):
         raise LoadError("settle is for loads on a handle whose position the drives control; leave it out")
-    k, u, force, start = len(mechanism.driven), screw[:3], load.force, at
+    k, u, force = len(mechanism.driven), screw[:3], load.force
     motions = np.linalg.svd(at.jacobian[:, :k], full_matrices=False)
     reached = motions[0][:, motions[1] > 1e-9 * motions[1][0]]
     across = reached @ np.linalg.svd((u @ reached)[None])[2][1:].T  # the ways along the surface
     size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
+    start = balance(at).solve().handle_place
 
     def off(there: Posture) -> Floats:
-        hand = balance(there).solve().hand_force
-        return np.append(across.T @ (hand - force) / strength, u @ (there.position - start.position) / size)
+        found = balance(there).solve()
+        return np.append(across.T @ (found.hand_force - force) / strength, u @ (found.handle_place - start) / size)
 
     found = _newton(mechanism, at, off, np.arange(k), SETTLED)
     if found is None:
@@ -160,12 +163,12 @@ def _settled(
 
 def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balance]) -> Posture:
     """The posture with free joints where gravity, their springs and the load leave them."""
-    k, count = len(mechanism.driven), len(mechanism.free)
+    k, count, here = len(mechanism.driven), len(mechanism.free), balance(at)
+    # the same in every posture, so that what is searched for are forces
+    scale = here.largest_part(here.solve()) or 1.0
 
     def off(there: Posture) -> Floats:
-        own = balance(there)
-        scale = max(float(np.max(own.heaviest[k:])), float(np.max(np.abs(own.free_springs))))
-        return np.asarray(own.solve().unbalanced[k:] / (scale or 1.0))
+        return np.asarray(balance(there).solve().unbalanced[k:] / scale)
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
         return at

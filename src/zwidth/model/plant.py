@@ -37,7 +37,7 @@ class SampledForce:
 
         force = along (reading . x_j),   x_j the coordinates at the sample, held and delayed as the wall's force is
 
-    It stems from the wall's constant force, which turns with the counted posture (`linearised_load`).
+    It stems from the wall's constant force, which turns with the counted posture (`loaded_plant`).
 
     along     (n,)  where it acts
     reading   (n,)  [N/m], or [N m/rad] of angles

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.mechanism import PRISMATIC
 from zwidth.show.units import SPACE, amount, as_written, percent, quantity, seconds, signed, vector
 
 if TYPE_CHECKING:
@@ -52,12 +53,20 @@ def has_sideways_force(found: Equilibrium) -> bool:
 
 def drive_rows(point: OperatingPoint) -> Iterator[Row]:
     """What each motor gives, and how far its drive is bent."""
-    found = point.equilibrium
-    torques = found.torques / found.ratio
-    torques[np.abs(torques) < ROUNDING * np.max(np.abs(torques))] = 0.0
-    for name, torque, bent in zip(point.drives.names, torques.tolist(), found.deflections.tolist(), strict=True):
-        flexible = f", its drive bent by {amount(bent, 'rad')}" if bent else ""
+    found, drives, mechanism = point.equilibrium, point.drives, point.mechanism
+    assert mechanism is not None
+    slides = mechanism.links.joint[drives.joint] == PRISMATIC
+    torques = motor_torques(found)
+    for name, torque, bent, way in zip(drives.names, torques, found.deflections.tolist(), slides, strict=True):
+        flexible = f", its drive bent by {amount(bent, 'm' if way else 'rad')}" if bent else ""
         yield f"motor {name}", f"{amount(torque, 'Nm')}{flexible}"
+
+
+def motor_torques(found: Equilibrium) -> list[float]:
+    """What each motor gives [N m], 0 where it is rounding."""
+    torques = found.torques / found.ratio
+    torques[np.abs(torques) < ROUNDING * np.max(np.abs(torques), initial=0.0)] = 0.0
+    return list(torques.tolist())
 
 
 # --- a path of pushes -------------------------------------------------------------------------------

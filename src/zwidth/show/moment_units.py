@@ -34,6 +34,8 @@ OF_SPACE: Final = {
 }
 """Table, or list of tables -> those of its keys that keep their units whatever is rendered: forces and places in
 space, and the sizes and masses of links."""
+OF_FILES: Final = frozenset({"load"})
+"""Tables that are those of the device file, with its keys."""
 
 _moments: ContextVar[bool] = ContextVar("moments", default=False)
 
@@ -47,6 +49,8 @@ def keys_of_moments(value: Any, table: str = "") -> Any:
     {'stiffness_max_Nm_per_rad': 2.0, 'x_m': [0.1], 'inner': [{'rigid_mass_kg_m2': 1.0}]}
     """
     if isinstance(value, Mapping):
+        if table in OF_FILES:
+            return value
         kept = OF_SPACE.get(table, frozenset())
         return {(key if key in kept else _key(key)): keys_of_moments(inner, key) for key, inner in value.items()}
     return [keys_of_moments(inner, table) for inner in value] if isinstance(value, list | tuple) else value

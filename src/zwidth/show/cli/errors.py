@@ -59,6 +59,7 @@ def translate_errors(question: Question) -> Iterator[None]:
     from zwidth.loop.sections import HysteresisError, UnmovedError
     from zwidth.model.equilibrium import EquilibriumError
     from zwidth.model.load import LoadError
+    from zwidth.model.operator import OperatorError
     from zwidth.model.posture import PostureError
     from zwidth.model.reduction import DirectionError, ModelError
     from zwidth.model.response import ResponseError
@@ -85,7 +86,7 @@ def translate_errors(question: Question) -> Iterator[None]:
             f"{question.name}: {error.estimate} is not linear, so it has no chart; use zwidth simulate or zwidth "
             "experiment, or another estimate with --set loop.velocity.method=backward-difference"
         ) from None
-    except (UnmovedError, HysteresisError) as error:
+    except (UnmovedError, HysteresisError, OperatorError) as error:
         raise BadInput(f"{question.name}: {error}") from None
 
 

@@ -8,7 +8,7 @@ from zwidth.loop.sideways import SidewaysMotion
 from zwidth.measures.load_effect import NoWallError, load_change
 from zwidth.model.load import Load
 from zwidth.show.circumstances import load_text
-from zwidth.show.load_text import ROUNDING, has_sideways_force, path_sentences
+from zwidth.show.load_text import ROUNDING, has_sideways_force, motor_torques, path_sentences
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import MINUS, SPACE, number, point, quantity, seconds, signed
 
@@ -35,11 +35,9 @@ def carried(facts: Facts) -> str:
     """The forces that are in balance."""
     assert facts.point.load is not None
     found = facts.point.equilibrium
-    torques = found.torques / found.ratio
-    torques[np.abs(torques) < ROUNDING * np.max(np.abs(torques), initial=0.0)] = 0.0
     motors = ", ".join(
         f"{name} {quantity(torque, 'Nm')}"
-        for name, torque in zip(facts.point.drives.names, torques.tolist(), strict=True)
+        for name, torque in zip(facts.point.drives.names, motor_torques(found), strict=True)
     )
     if np.any(found.screw[:3]):
         hand, way = point(found.hand_force, "N"), "along the direction"
