@@ -477,8 +477,8 @@ def torques_of_free_springs(mechanism, q):
     """Torques (c,) of the free joints' springs, which are at rest where the assembly has these joints."""
     rest = next(iter(mechanism.assemblies.values()))
     torques = np.zeros(len(mechanism.driven) + len(mechanism.free))
-    for i, link in enumerate(mechanism.free):
-        torques[len(mechanism.driven) + i] = mechanism.links.joint_stiffness[link] * (q[link] - rest[link])
+    for i, free in enumerate(mechanism.free):
+        torques[len(mechanism.driven) + i] = mechanism.links.joint_stiffness[free] * (q[free] - rest[free])
     return torques
 
 

@@ -13,7 +13,7 @@ from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.guarantees.coupling import Couplings, couplings, no_couplings
 from zwidth.guarantees.passive import passive_region
-from zwidth.guarantees.port import Floats
+from zwidth.guarantees.port import Floats, without_idle_motions
 from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffest_corner, stiffness_text
 from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
 from zwidth.loop.fixed_feedback import acts, describe_feedback
@@ -112,7 +112,8 @@ def find_guarantees(
     ['passive', 'spring-stable', 'nyquist-spring', 'stable']
     """
     require("loop", loop, Loop)
-    plant = loop.plant
+    moving = _without_idle_motions(loop)
+    plant = moving.plant
     guarantees = []
     apart = plant.handle is None or not _same_place(plant.actuator, plant.handle)
     if apart:
@@ -120,7 +121,7 @@ def find_guarantees(
             Guarantee(
                 "passive-at-actuator",
                 "stable whatever passive linear operator holds the actuator",
-                passive_region(loop, plant.actuator),
+                passive_region(moving, plant.actuator),
                 COLGATE,
             )
         )
@@ -129,7 +130,7 @@ def find_guarantees(
         Guarantee(
             "passive",
             "stable whatever passive linear operator holds the handle",
-            passive_region(loop) if has_handle else empty_region(NO_HANDLE),
+            passive_region(moving) if has_handle else empty_region(NO_HANDLE),
             COLGATE,
         )
     )
@@ -137,7 +138,7 @@ def find_guarantees(
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
-            _of_springs(partial(spring_stable_region, progress=progress), loop),
+            _of_springs(partial(spring_stable_region, progress=progress), moving),
             SPRINGS,
         )
     )
@@ -145,7 +146,7 @@ def find_guarantees(
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
-            _of_springs(nyquist_region, loop),
+            _of_springs(nyquist_region, moving),
             SPRINGS,
         )
     )
@@ -181,12 +182,18 @@ def guarantees_of(
     guarantees = find_guarantees(loop, progress=progress)
     if not coupling and wall is None:
         return guarantees
-    handle = loop.plant.handle
     if loop.has_fixed_feedback:
         names = [*loop.controller.feedback_names, *(["a load"] if loop.plant.is_loaded else [])]
         reason = f"no coupling is known with {', '.join(names)}"
         return replace(guarantees, couplings=no_couplings(reason))
-    return replace(guarantees, couplings=no_couplings() if handle is None else couplings(loop, handle, wall))
+    moving = _without_idle_motions(loop)
+    handle = moving.plant.handle
+    return replace(guarantees, couplings=no_couplings() if handle is None else couplings(moving, handle, wall))
+
+
+def _without_idle_motions(loop: Loop) -> Loop:
+    """The loop without the motions that change none of its guarantees."""
+    return Loop(without_idle_motions(loop.plant), loop.controller)
 
 
 def _check_wall(wall: object) -> None:

@@ -18,6 +18,10 @@ Complexes = NDArray[np.complex128]
 UNDAMPED = 1e-13
 # A motion with less than this share in a force, a reading or the damping counts as uncoupled.
 IDLE = 1e-11
+# The same of a damped vibration, for the rounding of its shape beside fast ones: its share in a response is 1e-14.
+IDLE_DAMPED = 1e-7
+# Matrix entries that a response holds at once: 64 MB of complex numbers.
+AT_ONCE = 2**22
 
 
 @dataclass(frozen=True)
@@ -83,13 +87,27 @@ class Port:
 def port(plant: Plant, held: Floats) -> Port:
     """The plant held along `held` (n,)."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    damping = shapes.T @ plant.damping @ shapes
-    damping = (damping + damping.T) / 2.0
-    # B is positive semidefinite: a mode that dissipates nothing by itself is not damped through others either
-    still = np.abs(np.diag(damping)) <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
-    damping[still, :] = damping[:, still] = 0.0
+    damping = _modal_damping(plant, shapes)
     lagged = tuple(replace(damper, along=shapes.T @ damper.along) for damper in plant.lagged_dampers)
     return Port(squared, damping, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes.T @ held, lagged)
+
+
+def _modal_damping(plant: Plant, shapes: Floats) -> Floats:
+    """The damping (n, n) in coordinates of modes, symmetric and without rounding of 0."""
+    damping = shapes.T @ plant.damping @ shapes
+    damping = (damping + damping.T) / 2.0
+    own = np.abs(np.diag(damping))
+    # B is positive semidefinite: a mode that dissipates nothing by itself is not damped through others either
+    still = own <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
+    damping[still, :] = damping[:, still] = 0.0
+    return np.where(_coupling(damping), damping, np.diag(np.diag(damping)))
+
+
+def _coupling(matrix: Floats) -> NDArray[np.bool_]:
+    """Which two modes a symmetric matrix (n, n) in modal coordinates couples by more than a share of what it does
+    to both of them."""
+    own = np.sqrt(np.abs(np.diag(matrix)))
+    return np.asarray((np.abs(matrix) > IDLE * np.outer(own, own)) & ~np.eye(len(own), dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -115,27 +133,58 @@ def port_response(held: Port, frequency: Floats) -> PortResponse:
     """Responses of a held port at angular frequencies (...) [rad/s], not zero.
 
     The dissipation is the quadratic form w^2 X^H Re(B) X of the motion X, a sum without cancellation, where the
-    real part of jw G_hh would lose its digits against the imaginary part.
+    real part of jw G_hh would lose its digits against the imaginary part. Modes whose damping does not couple them
+    are summed one by one, others solved for together.
     """
     w = np.asarray(frequency, dtype=float)
-    stiff = held.squared - w[..., None] ** 2
-    # exactly at an undamped mode the response is infinite: it is taken a rounding error beside it
-    stiff = np.where(stiff == 0.0, 1e-16 * w[..., None] ** 2, stiff)
+    n = len(held.squared)
+    coupled = bool(held.lagged) or np.count_nonzero(held.damping) > np.count_nonzero(np.diag(held.damping))
+    respond = _coupled_response if coupled else _modal_response
+    step = max(AT_ONCE // max(n * n if coupled else n, 1), 1)
+    flat = w.ravel()
+    parts = [respond(held, flat[i : i + step]) for i in range(0, max(len(flat), 1), step)]
+    return PortResponse(*(np.concatenate(each).reshape(w.shape) for each in zip(*parts, strict=True)))
+
+
+def _stiff(held: Port, w: Floats) -> Floats:
+    """w_i^2 - w^2 (k, n) at frequencies (k,); exactly at an undamped mode, where the response is infinite, it is
+    taken a rounding error beside it."""
+    stiff = held.squared - w[:, None] ** 2
+    return np.where(stiff == 0.0, 1e-16 * w[:, None] ** 2, stiff)
+
+
+def _modal_response(held: Port, w: Floats) -> tuple[Complexes | Floats, ...]:
+    """The fields of `PortResponse` at (k,) of modes that no damping couples."""
+    own = np.diag(held.damping)
+    compliance = 1.0 / (_stiff(held, w) + 1j * w[:, None] * own)
+    power = (np.abs(compliance) ** 2) @ (own * held.modal_port**2)
+    return (
+        compliance @ (held.modal_actuator * held.modal_sensor),
+        compliance @ (held.modal_port * held.modal_sensor),
+        compliance @ (held.modal_actuator * held.modal_port),
+        compliance @ held.modal_port**2,
+        w**2 * power,
+    )
+
+
+def _coupled_response(held: Port, w: Floats) -> tuple[Complexes | Floats, ...]:
+    """The fields of `PortResponse` at (k,) of modes that dampers couple."""
+    stiff = _stiff(held, w)
     damping: Complexes = np.broadcast_to(held.damping, (*w.shape, *held.damping.shape)).astype(complex)
     for damper in held.lagged:
         share = damper.damping / (1.0 + 1j * w * damper.time_constant)
-        damping = damping + share[..., None, None] * np.outer(damper.along, damper.along)
+        damping = damping + share[:, None, None] * np.outer(damper.along, damper.along)
     own = np.abs(np.diagonal(damping, axis1=-2, axis2=-1))
-    scale = 1.0 / np.sqrt(np.hypot(stiff, w[..., None] * own))
-    D = 1j * w[..., None, None] * damping
+    scale = 1.0 / np.sqrt(np.hypot(stiff, w[:, None] * own))
+    D = 1j * w[:, None, None] * damping
     index = np.arange(len(held.squared))
-    D[..., index, index] += stiff
-    D = D * scale[..., :, None] * scale[..., None, :]
-    sources = np.stack([held.modal_actuator, held.modal_port], axis=-1) * scale[..., :, None]
-    X = np.linalg.solve(D, sources.astype(complex)) * scale[..., :, None]
+    D[:, index, index] += stiff
+    D = D * scale[:, :, None] * scale[:, None, :]
+    sources = np.stack([held.modal_actuator, held.modal_port], axis=-1) * scale[:, :, None]
+    X = np.linalg.solve(D, sources.astype(complex)) * scale[:, :, None]
     pushed, pulled = X[..., 0], X[..., 1]
-    power = np.einsum("...i,...ij,...j->...", pulled.conj(), damping.real, pulled).real
-    return PortResponse(
+    power = np.einsum("ki,kij,kj->k", pulled.conj(), damping.real, pulled).real
+    return (
         pushed @ held.modal_sensor,
         pulled @ held.modal_sensor,
         pushed @ held.modal_port,
@@ -172,25 +221,41 @@ def hold_fixed(plant: Plant, held: Floats) -> Plant:
 
 
 def without_idle_motions(plant: Plant) -> Plant:
-    """The plant without free motions that no wall, reading, operator or damper couples to.
+    """The plant without motions that no wall, reading, operator or damper couples to.
 
-    Example: sliding along the wall. Coordinates become modal where there is such a motion.
+    Example: sliding along the wall, and of links that bend the vibrations out of their plane. Coordinates become
+    modal where there is such a motion.
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    free = shapes[:, squared == 0.0]
     ends = [plant.actuator, plant.sensor, *([] if plant.handle is None else [plant.handle])]
     ends += [damper.along for damper in plant.lagged_dampers]
-    if not free.shape[1]:
-        return plant
-    drag = free.T @ plant.damping
-    rows = [free.T @ end / np.linalg.norm(end) for end in ends]
-    rows += list(drag.T / max(float(np.max(np.abs(plant.damping))), 1e-300))
-    _, sizes, turns = np.linalg.svd(np.array(rows))
-    level = IDLE * np.max(np.abs(rows))
-    V = np.hstack([free @ turns[: np.count_nonzero(sizes > level)].T, shapes[:, squared != 0.0]])
+    for force in plant.sampled_forces:
+        ends += [force.along, force.reading]
+    free = shapes[:, squared == 0.0]
+    if free.shape[1]:
+        drag = free.T @ plant.damping
+        rows = [free.T @ end / np.linalg.norm(end) for end in ends]
+        rows += list(drag.T / max(float(np.max(np.abs(plant.damping))), 1e-300))
+        _, sizes, turns = np.linalg.svd(np.array(rows))
+        level = IDLE * np.max(np.abs(rows))
+        free = free @ turns[: np.count_nonzero(sizes > level)].T
+    V = np.hstack([free, shapes[:, (squared != 0.0) & _moved(plant, shapes, np.array(ends))]])
     if V.shape[1] == plant.size:
         return plant
     return _within(plant, V, plant.handle)
+
+
+def _moved(plant: Plant, shapes: Floats, ends: Floats) -> NDArray[np.bool_]:
+    """Which modes (n,), the columns of `shapes`, forces along the ends (k, n) move, by dampers of others too."""
+    part = np.abs(ends @ shapes)
+    part /= np.maximum(np.linalg.norm(part, axis=1, keepdims=True), 1e-300)
+    damping = _modal_damping(plant, shapes)
+    moved = np.any(part > np.where(np.diag(damping) > 0.0, IDLE_DAMPED, IDLE), axis=0)
+    others = [shapes.T @ M @ shapes for M in (plant.hysteresis, plant.circulatory) if M is not None]
+    coupled = np.any([_coupling(M) for M in (damping, *others)], axis=0)
+    while np.any(more := ~moved & np.any(coupled & moved[:, None], axis=0)):
+        moved |= more
+    return np.asarray(moved)
 
 
 def _within(plant: Plant, V: Floats, handle: Floats | None) -> Plant:
