@@ -22,6 +22,7 @@ from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError, solve_equilibrium
 from zwidth.model.load import Load
+from zwidth.model.loaded_posture import loaded_postures
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
@@ -187,8 +188,23 @@ class PosedDevice:
         return replace(self, directions=directions[..., None, :], wall_matrices=None)
 
     def in_model(self, model: Model | None) -> Self:
-        """The same device, reduced to another model."""
-        return self if model == self.model else replace(self, model=model)
+        """The same device, reduced to another model. Under load the posture is the one that the model has there,
+        whose drives and links bend, or do not.
+
+        Raises  EquilibriumError, LoadError  where a single posture has no equilibrium in that model
+        """
+        if model == self.model:
+            return self
+        other = replace(self, model=model)
+        stays = (model == "rigid") == (self.model == "rigid")
+        if stays or self.load is None or self._posture.asked is None:
+            return other
+        assert self.mechanism is not None
+        mechanism = self.mechanism.made_rigid if model == "rigid" else self.mechanism
+        found = loaded_postures(
+            mechanism, self._posture, screw(self.direction), self.load, self.encoders == "motor"
+        )
+        return replace(other, posture=found)
 
     @cached_property
     def without_operator(self) -> Self:
@@ -289,10 +305,8 @@ class PosedDevice:
         drives = replace(
             drives_at(self.mechanism.drives, posture), ratio_tables=self.mechanism.drives.ratio_tables
         )
-        if self.model == "rigid":
-            drives = replace(drives, stiffness=np.full(len(drives.names), np.inf))
-            return replace(self.mechanism, drives=drives, flexible=())
-        return replace(self.mechanism, drives=drives)
+        mechanism = replace(self.mechanism, drives=drives)
+        return mechanism.made_rigid if self.model == "rigid" else mechanism
 
     @cached_property
     def equilibrium(self) -> Equilibrium:

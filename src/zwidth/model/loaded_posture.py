@@ -39,13 +39,15 @@ def loaded_postures(
 ) -> Posture:
     """The postures under load of postures (...) without it, one by one; designs broadcast with them.
 
+    posture  as it is asked for; one that was found under load stands for the one that it was found from
     screws   (..., 6)  rendered directions
     Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM
     Raises   EquilibriumError, LoadError  for a single posture without one
     """
+    posture = posture.asked or posture
     if not posture.status.shape:
-        return _loaded(mechanism, posture, screws, load, counts_motors)
-    changed, shape = posture.with_axes(np.array), posture.status.shape
+        return replace(_loaded(mechanism, posture, screws, load, counts_motors), asked=posture)
+    changed, shape = replace(posture.with_axes(np.array), asked=posture), posture.status.shape
     for index in np.ndindex(shape):
         if posture.status[index] != OK:
             continue
