@@ -10,6 +10,7 @@ import pytest
 from tests.model.beam_devices import planar_arm, with_beams
 from zwidth.device.load import from_document
 from zwidth.device.load import load as load_device
+from zwidth.model import loaded_posture
 from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.load import Load
 from zwidth.study.what_if import find_variant, what_if
@@ -93,3 +94,9 @@ def test_postures_of_a_batch_keep_what_was_asked_for():
     again = five_bar.at(many.posture)
     assert again.posture.angles == pytest.approx(many.posture.angles, abs=1e-13)
     assert replace(many, load=None).in_model("rigid").posture is many.posture
+
+
+def test_a_search_that_does_not_end_is_an_error(monkeypatch):
+    monkeypatch.setattr(loaded_posture, "ROUNDS", 1)
+    with pytest.raises(EquilibriumError, match="under a push of -3 N along the direction: after 1 rounds"):
+        load_device("five-bar").at(load=MOTORS)

@@ -29,6 +29,7 @@ from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
 from zwidth.model.ratio_table import drives_at
 
 STEPS: Final = 40  # of Newton's method
+ROUNDS: Final = 40  # in which free joints, bending and sliding follow one another
 SETTLED: Final = 1e-11  # share of the largest force, or of the mechanism's size, that counts as balance
 PROBE: Final = 1e-6  # by which joints are moved for a derivative [rad], [m]
 LARGEST_STEP: Final = 0.5  # of Newton's method [rad], [m]
@@ -79,7 +80,7 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
         return Balance(posed, at, screw, load, counts_motors)
 
     at = posture
-    for _ in range(STEPS):  # each of the three hangs on the others by the load's own small changes
+    for _ in range(ROUNDS):  # each of the three hangs on the others by the load's own small changes
         before = at.angles
         if mechanism.free:
             at = _hung(mechanism, at, balance)
@@ -91,6 +92,11 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
             at = _settled(mechanism, at, screw, load, balance)
         if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
             break
+    else:
+        raise EquilibriumError(
+            f"no posture was found under {load.text}: after {ROUNDS} rounds of bending and hanging it still "
+            "changes; choose a smaller load, or stiffer drives and links"
+        )
     final = balance(at)
     found = final.solve()
     final.check(found)
