@@ -39,6 +39,10 @@ from zwidth.model.reduction import ModelError
         ({"surface_radius": "flat"}, "surface_radius must be a number but 0.*got 'flat'"),
         ({"settle": True}, "settle needs a force"),
         ({"settle": True, "push": 1.0}, "settle needs a force"),
+        (
+            {"force": [0.0, -5.0], "settle": True, "surface_radius": 0.05},
+            "surface_radius of 0.05 m is given beside settle, which slides the handle along a plane; leave one",
+        ),
         ({"hand": "soft"}, "hand must be 'dead' or 'follower' or 'neglected', got the text 'soft'"),
         ({"posture_of": "links"}, "posture_of must be 'handle' or 'motors'"),
         ({"branch": "up"}, "branch must be 'forward' or 'backward'"),
@@ -141,6 +145,10 @@ def test_a_device_without_a_mechanism_bears_no_load(name, arguments):
         ({"settle": True, "push_N": 1.0}, "load.settle: needs force_N"),
         ({"surface_radius_m": 0.0}, "load.surface_radius_m: must not be 0; remove it for a plane"),
         ({"surface_radius_m": -float("inf")}, "load.surface_radius_m: must not be -inf; remove it for a plane"),
+        (
+            {"force_N": [0.0, -5.0], "settle": True, "surface_radius_m": 0.05},
+            "load.surface_radius_m: stands beside settle, which slides the handle along a plane; remove one",
+        ),
         ({"hand": "soft"}, "load.hand: must be 'dead', 'follower' or 'neglected'"),
         ({"force": [0.0, 5.0]}, "load.force: is not a key of a device file; did you mean 'force_N'"),
         ({"gravity_m_per_s2": -9.81}, "load.gravity_m_per_s2: must be a list"),

@@ -39,12 +39,13 @@ class Load:
                   is in balance; False: the posture is kept, and the hand supplies what it needs across the
                   rendered direction
     surface_radius  of the surface about the handle [m]: positive for one that is convex towards the hand, negative
-                  for a hollow one, inf for a plane
+                  for a hollow one, inf for a plane, the only one with settle
     count_sideways  whether the motions that no wall moves without load count for stability, too
     branch        of springs whose torque is 0 where their stiffness changes: "forward", the motor ahead, or
                   "backward"
 
-    Raises  LoadError  for a force of 0, numbers that are not finite, a radius of 0, several forces
+    Raises  LoadError  for a force of 0, numbers that are not finite, a radius of 0, several forces, and a radius
+                       beside settle
             ValueError for an unknown word
     """
 
@@ -89,6 +90,11 @@ class Load:
             raise LoadError(f"surface_radius must be a number but 0, or inf [m], got {self.surface_radius!r}")
         if self.settle and self.force is None:
             raise LoadError("settle needs a force, under which the device slides to where it is in balance")
+        if self.settle and self.surface_radius != inf:
+            raise LoadError(
+                f"surface_radius of {self.surface_radius:g} m is given beside settle, which slides the handle along "
+                "a plane; leave one of the two out"
+            )
 
     @property
     def weight(self) -> Floats:
