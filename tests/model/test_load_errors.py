@@ -53,6 +53,15 @@ def test_a_load_that_cannot_be_meant_is_one_clear_error(arguments, words):
         Load(**arguments)
 
 
+def test_loads_of_the_same_numbers_are_equal():
+    one, other = (Load(force=[0.0, -5.0], gravity=[0.0, 0.0, -9.81]) for _ in range(2))
+    assert one == other
+    assert len({one, other, Load(push=1), Load(push=1.0)}) == 2
+    assert one != Load(force=[0.0, -5.0], gravity=[0.0, 0.0, -9.8])
+    assert Load(force=[0.0, -5.0]) != Load(push=-5.0)
+    assert one != "a push"
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
 from numbers import Real
 from typing import Final, Literal, cast, get_args
@@ -22,7 +22,7 @@ class LoadError(ValueError):
     """A load that cannot be meant."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Load:
     """The forces about whose balance, the haptic equilibrium, a device is linearised (thesis eq. 2.4).
 
@@ -95,6 +95,19 @@ class Load:
                 f"surface_radius of {self.surface_radius:g} m is given beside settle, which slides the handle along "
                 "a plane; leave one of the two out"
             )
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all numbers and words are the same."""
+        return self._values == other._values if isinstance(other, Load) else NotImplemented
+
+    def __hash__(self) -> int:
+        """Of the values, so that equal loads are one key."""
+        return hash(self._values)
+
+    @property
+    def _values(self) -> tuple[object, ...]:
+        values = (getattr(self, each.name) for each in fields(self))
+        return tuple(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in values)
 
     @property
     def weight(self) -> Floats:
