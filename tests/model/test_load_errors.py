@@ -31,6 +31,8 @@ from zwidth.model.reduction import ModelError
         ({"moment": [0.0, np.inf]}, r"moment must be two or three finite numbers \[N m\]"),
         ({"gravity": 9.81}, r"gravity must be two or three finite numbers \[m/s\^2\], got 9.81"),
         ({"push": np.inf}, r"push must be a finite number \[N\], got inf"),
+        ({"push": True}, r"push must be a finite number \[N\], got True"),
+        ({"surface_radius": True}, "surface_radius must be a number but 0.*got True"),
         ({"push": "5"}, r"push must be a finite number \[N\], got '5'"),
         ({"force": [1.0, 0.0], "push": 1.0}, "push is given beside force; give one of them"),
         ({"force": [1.0, 0.0], "moment": [0.0, 1.0]}, "moment is given beside force"),
@@ -73,8 +75,8 @@ def test_loads_of_the_same_numbers_are_equal():
             DeviceError,
             "five-bar: load: gravity must be two or three finite numbers .* got 'down'",
         ),
-        ({"load": (5.0, 0.0)}, LoadError, r"the load \(5, 0, 0\) does not push along the rendered direction"),
-        ({"load": (1.0, -5.0)}, LoadError, r"has a part \(1, 0, 0\) across .* needs \(-0.00291587, 0, 0\); give"),
+        ({"load": (5.0, 0.0)}, LoadError, r"the load \(5, 0, 0\) N does not push along the rendered direction"),
+        ({"load": (1.0, -5.0)}, LoadError, r"part \(1, 0, 0\) N across .* needs \(-0.00291587, 0, 0\) N; give"),
         (
             {"load": Load(moment=[0.0, 0.0, 1.0])},
             LoadError,
@@ -118,6 +120,14 @@ def test_limits_of_motors_and_computer_bound_the_load():
     assert limited.at(load=(0.0, -3.9)).plant.size == 3
     with pytest.raises(EquilibriumError, match=r"takes 5\.00512 N of the wall, more than the force limit of 4 N"):
         limited.at(load=(0.0, -5.0)).plant  # noqa: B018
+
+
+def test_about_an_axis_a_push_is_a_moment():
+    wrist = load_device("openwrist").with_({"loop.saturation.force_N": 0.01})
+    with pytest.raises(
+        EquilibriumError, match=r"takes 0\.05 N m of the wall, more than the force limit of 0\.01 N m"
+    ):
+        wrist.at(axis=(0.0, 0.0, 1.0), load=Load(push=0.05)).plant  # noqa: B018
 
 
 def test_a_moment_that_is_none_is_named_as_one():

@@ -21,7 +21,7 @@ from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError, solve_equilibrium
-from zwidth.model.load import Load
+from zwidth.model.load import Load, unit_of_push
 from zwidth.model.loaded_posture import loaded_postures
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
@@ -322,11 +322,13 @@ class PosedDevice:
             raise OperatingPointError(
                 "the posture is out of reach, singular or without equilibrium; ask for another"
             )
-        found = solve_equilibrium(mechanism, posture, screw(self.direction), self.load, self.encoders == "motor")
+        axis = screw(self.direction)
+        found = solve_equilibrium(mechanism, posture, axis, self.load, self.encoders == "motor")
         if abs(found.wall_force) > self.controller.force_limit:
+            unit = unit_of_push(axis)
             raise EquilibriumError(
-                f"the load takes {abs(found.wall_force):.6g} N of the wall, more than the force limit of "
-                f"{self.controller.force_limit:.6g} N; choose a smaller load"
+                f"the load takes {abs(found.wall_force):.6g} {unit} of the wall, more than the force limit of "
+                f"{self.controller.force_limit:.6g} {unit}; choose a smaller load"
             )
         return found
 

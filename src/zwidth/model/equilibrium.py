@@ -23,7 +23,7 @@ import numpy as np
 
 from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_posture
 from zwidth.model.drive_springs import DriveSprings
-from zwidth.model.load import ALONG, Load, LoadError, vector_text
+from zwidth.model.load import ALONG, Load, LoadError, unit_of_push, vector_text
 from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
@@ -420,13 +420,15 @@ class Balance:
         force = self.load.force if np.any(self.screw[:3]) else self.load.moment
         if force is None or self.load.settle:
             return
+        unit = unit_of_push(self.screw)
         across = force - (force @ self.along) / float(self.along @ self.along) * self.along
         off, needed = np.linalg.norm(across - found.sideways_force), found.sideways_force
         if np.any(np.abs(across) > ALONG * np.linalg.norm(force)) and off > UNBALANCED * np.linalg.norm(force):
             raise LoadError(
-                f"the load {vector_text(force)} has a part {vector_text(across)} across the rendered direction, "
-                f"where the wall does not hold it, and this posture needs {vector_text(needed)}; give the part "
-                "along the direction alone, or ask with settle for the posture in which this load is in balance"
+                f"the load {vector_text(force)} {unit} has a part {vector_text(across)} {unit} across the "
+                f"rendered direction, where the wall does not hold it, and this posture needs "
+                f"{vector_text(needed)} {unit}; give the part along the direction alone, or ask with settle for "
+                "the posture in which this load is in balance"
             )
 
 

@@ -92,8 +92,8 @@ class Load:
             raise LoadError("settle needs a force, under which the device slides to where it is in balance")
         if self.settle and self.surface_radius != inf:
             raise LoadError(
-                f"surface_radius of {self.surface_radius:g} m is given beside settle, which slides the handle along "
-                "a plane; leave one of the two out"
+                f"surface_radius of {self.surface_radius:g} m is given beside settle, which slides the handle "
+                "along a plane; leave one of the two out"
             )
 
     def __eq__(self, other: object) -> bool:
@@ -141,11 +141,11 @@ class Load:
         """
         if self.push is not None:
             return float(self.push)
-        linear = bool(np.any(screw[:3]))
+        linear, unit = bool(np.any(screw[:3])), unit_of_push(screw)
         given, way = (self.force, screw[:3]) if linear else (self.moment, screw[3:])
         other = self.moment if linear else self.force
         if other is not None:
-            wanted, unit = ("force", "N") if linear else ("moment", "N m")
+            wanted = "force" if linear else "moment"
             raise LoadError(
                 f"the wall is rendered along {_way(linear)}; give the load as a {wanted} [{unit}], or push"
             )
@@ -154,8 +154,8 @@ class Load:
         along = float(given @ way) / float(way @ way)
         if not abs(along) * float(np.linalg.norm(way)) > ALONG * float(np.linalg.norm(given)):
             raise LoadError(
-                f"the load {vector_text(given)} does not push along the rendered direction {vector_text(way)}, "
-                "where the wall would hold it; choose one with a part along the direction"
+                f"the load {vector_text(given)} {unit} does not push along the rendered direction "
+                f"{vector_text(way)}, where the wall would hold it; choose one with a part along the direction"
             )
         return along
 
@@ -169,6 +169,11 @@ class Load:
     def with_gravity(self, gravity: ArrayLike) -> Load:
         """The same load under another gravity, (2,) or (3,) [m/s^2]. Raises LoadError for another one."""
         return replace(self, gravity=cast(Floats, gravity))
+
+
+def unit_of_push(screw: Floats) -> str:
+    """Of what a wall along a rendered direction (6,) pushes with: N, or about an axis N m."""
+    return "N" if np.any(screw[:3]) else "N m"
 
 
 def along_text(push: float) -> str:
@@ -186,4 +191,4 @@ def _way(linear: bool) -> str:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, Real) and isfinite(value)
+    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
