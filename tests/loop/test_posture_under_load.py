@@ -12,7 +12,8 @@ from zwidth.device.load import from_document
 from zwidth.device.load import load as load_device
 from zwidth.model import loaded_posture
 from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load
+from zwidth.model.load import Load, LoadError
+from zwidth.model.posture import NO_EQUILIBRIUM, OK
 from zwidth.study.what_if import find_variant, what_if
 
 MOTORS = Load(push=-3.0, posture_of="motors")
@@ -100,3 +101,30 @@ def test_a_search_that_does_not_end_is_an_error(monkeypatch):
     monkeypatch.setattr(loaded_posture, "ROUNDS", 1)
     with pytest.raises(EquilibriumError, match="under a push of -3 N along the direction: after 1 rounds"):
         load_device("five-bar").at(load=MOTORS)
+
+
+# --- batches ----------------------------------------------------------------------------------------
+
+
+def test_in_a_batch_a_load_across_the_direction_is_a_status():
+    loaded = load_device("five-bar").under(Load(force=[3.0, 0.0]))
+    mixed = loaded.at([[0.0, 0.25], [0.02, 0.24]], direction=[[0.0, 1.0], [1.0, 0.0]])
+    assert mixed.status.tolist() == [NO_EQUILIBRIUM, OK]
+    for name in ("closure_residual", "projected", "angles", "jacobian"):
+        assert np.isnan(getattr(mixed.posture, name)[0]).all()
+        assert np.isfinite(getattr(mixed.posture, name)[1]).all()
+    assert mixed.posture.position[0] == pytest.approx([0.0, 0.25, 0.0])
+    with pytest.raises(LoadError, match=r"the load \(3, 0, 0\) N does not push along the rendered direction"):
+        loaded.at([[0.0, 0.25], [0.02, 0.24]])
+
+
+def test_a_part_of_the_load_that_only_one_posture_needs_is_a_status_in_the_others():
+    five_bar = load_device("five-bar")
+    force = five_bar.at(load=Load(push=-5.0)).equilibrium.hand_force
+    many = five_bar.at([[0.0, 0.25], [0.02, 0.24]], load=Load(force=force))
+    assert many.status.tolist() == [OK, NO_EQUILIBRIUM]
+    values = many.measure("sideways_force")
+    assert values.status.tolist() == [OK, NO_EQUILIBRIUM]
+    assert np.isnan(values.values[1])
+    none = five_bar.at([[0.02, 0.24], [0.03, 0.24]], load=Load(force=force))
+    assert none.status.tolist() == [NO_EQUILIBRIUM] * 2

@@ -282,6 +282,12 @@ class Device:
         """
         return _verbs.device_under(self, load, gravity, moment)
 
+    @property
+    def pushed_along_every_direction(self) -> Device:
+        """The device under a push as strong as its load, along whatever direction is rendered; itself without a
+        load."""
+        return self if self.load is None else self.under(self.load.along_every_direction)
+
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
         """The stable walls at the device's reference; `device.at(...).chart()` elsewhere. See `chart_at`."""
         return self.at().chart(radius, decay=decay)

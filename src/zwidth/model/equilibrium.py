@@ -41,6 +41,10 @@ class EquilibriumError(LoadError):
     """There is no equilibrium under a load, or none that the device holds."""
 
 
+class SidewaysForceError(EquilibriumError):
+    """The load has another part across the rendered direction than the posture needs, which no wall holds."""
+
+
 @dataclass(frozen=True)
 class Equilibrium:
     """A device of one design at rest in one posture under load; d drives, c independent coordinates.
@@ -136,7 +140,7 @@ def solve_equilibrium(
     screw      (6,)  the rendered direction (`effective_parameters.screw`)
     counts_motors  whether the encoders are on the motors, or on the links behind the drives
     Raises     EquilibriumError  where nothing balances a joint, or drives and their springs cannot hold the load
-               LoadError         for a load across the direction that nothing holds
+               LoadError         for a load that does not push along the direction
     """
     balance = Balance(mechanism, posture, screw, load, counts_motors)
     found = balance.solve()
@@ -375,7 +379,7 @@ class Balance:
         )
 
     def check(self, found: Equilibrium) -> None:
-        """Raise EquilibriumError or LoadError where drives, hand or wall do not hold what they would have to."""
+        """Raise EquilibriumError where drives, hand or wall do not hold what they would have to."""
         self._check_balance(found)
         self._check_torques(found.torques)
         self._check_across(found)
@@ -416,7 +420,7 @@ class Balance:
             )
 
     def _check_across(self, found: Equilibrium) -> None:
-        """Raise LoadError where the load asks for another force across the direction than the posture needs."""
+        """Raise SidewaysForceError where the load has another part across the direction than the posture needs."""
         force = self.load.force if np.any(self.screw[:3]) else self.load.moment
         if force is None or self.load.settle:
             return
@@ -424,7 +428,7 @@ class Balance:
         across = force - (force @ self.along) / float(self.along @ self.along) * self.along
         off, needed = np.linalg.norm(across - found.sideways_force), found.sideways_force
         if np.any(np.abs(across) > ALONG * np.linalg.norm(force)) and off > UNBALANCED * np.linalg.norm(force):
-            raise LoadError(
+            raise SidewaysForceError(
                 f"the load {vector_text(force)} {unit} has a part {vector_text(across)} {unit} across the "
                 f"rendered direction, where the wall does not hold it, and this posture needs "
                 f"{vector_text(needed)} {unit}; give the part along the direction alone, or ask with settle for "

@@ -44,11 +44,15 @@ def loaded_postures(
     screws   (..., 6)  rendered directions
     Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM
     Raises   EquilibriumError, LoadError  for a single posture without one
+             LoadError  for a load that can be meant in no posture of a batch
     """
     posture = posture.asked or posture
     if not posture.status.shape:
         return replace(_loaded(mechanism, posture, screws, load, counts_motors), asked=posture)
     changed, shape = replace(posture.with_axes(np.array), asked=posture), posture.status.shape
+    refused: LoadError | None = None
+    numbers = [changed.angles, changed.mass_matrix, changed.jacobian, changed.angular_jacobian]
+    numbers += [changed.closure_residual, changed.projected]
     for index in np.ndindex(shape):
         if posture.status[index] != OK:
             continue
@@ -59,15 +63,18 @@ def loaded_postures(
         try:
             own = change_designs(mechanism, single, shape)
             one = _loaded(own, posture.with_axes(single), screws[index], load, counts_motors)
-        except EquilibriumError:
+        except LoadError as error:
+            refused = refused if isinstance(error, EquilibriumError) else error
             changed.status[index] = NO_EQUILIBRIUM
-            for array in (changed.angles, changed.mass_matrix, changed.jacobian, changed.angular_jacobian):
+            for array in numbers:
                 array[index] = np.nan
             continue
         for name in ("position", "angles", "mass_matrix", "jacobian", "angular_jacobian"):
             getattr(changed, name)[index] = getattr(one, name)
         if changed.rotation is not None and one.rotation is not None:
             changed.rotation[index] = one.rotation
+    if refused is not None and not np.any(changed.status == OK):
+        raise refused
     return changed
 
 
