@@ -122,6 +122,14 @@ def test_limits_of_motors_and_computer_bound_the_load():
         limited.at(load=(0.0, -5.0)).plant  # noqa: B018
 
 
+def test_along_every_direction_the_computer_s_limit_bounds_the_load():
+    limited = load_device("five-bar").with_({"loop.saturation.force_N": 5.004})
+    along = limited.at(load=Load(force=[4.0, 0.0]), direction=(1.0, 0.0)).by_direction(count=3)
+    assert along.status == ("ok",) * 3
+    along = limited.at(direction=(1.0, 0.0), load=Load(push=-5.0)).by_direction(count=4)
+    assert [status[:24] for status in along.status] == ["ok", "the load takes 5.00512 N", "ok", "ok"]
+
+
 def test_about_an_axis_a_push_is_a_moment():
     wrist = load_device("openwrist").with_({"loop.saturation.force_N": 0.01})
     with pytest.raises(
