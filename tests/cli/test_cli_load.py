@@ -101,6 +101,25 @@ def test_a_file_whose_own_push_nothing_holds_is_answered():
     assert "under" not in ran.out.splitlines()[0]
 
 
+def test_a_load_across_the_file_s_direction_pushes_along_each_of_several():
+    across = ("--load", "3,-4")
+    mapped = ("map", MECHANISM, "--measure", "rigid_mass", "--direction", "highest", "--cells", "3,3")
+    status = document_of(*mapped, *across)["status"]
+    assert "ok" in [word for row in status for word in row]
+    around = document_of("polar", MECHANISM, "--count", "3", *across)
+    assert around["status"] == ["ok"] * 3
+
+
+def test_a_map_s_load_is_judged_by_the_map_s_direction():
+    mapped = ("map", MECHANISM, "--measure", "rigid_mass", "--cells", "3,3", "--load", "3,0")
+    status = document_of(*mapped, "--direction", "1,0")["status"]
+    assert "ok" in [word for row in status for word in row]
+    (line,) = refusal_lines(*mapped)
+    assert "the load (3, 0, 0) N does not push along the rendered direction (0, 1, 0)" in line
+    (line,) = refusal_lines("map", MECHANISM, "--measure", "rigid_mass", "--cells", "3,3", "--load", "3,-4")
+    assert "has a part (3, 0, 0) N across the rendered direction" in line
+
+
 def test_moments_have_their_units(tmp_path):
     file = tmp_path / "wrist.toml"
     assert run_command("new", "wrist", "--kind", "wrist", "--output", file).code == 0

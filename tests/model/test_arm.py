@@ -9,6 +9,7 @@ import zwidth
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document
 from zwidth.model.arm import ArmError, attach_arm
+from zwidth.model.load import Load
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.motions import Motions
@@ -102,6 +103,13 @@ def test_a_rigid_grasp_is_a_loop_of_the_mechanism():
     np.testing.assert_allclose(natural_frequencies(held), natural_frequencies(together), rtol=1e-8, atol=1e-4)
     for name in ("mass", "damping", "stiffness"):
         np.testing.assert_allclose(getattr(held, name), getattr(together, name), rtol=1e-8, atol=1e-9)
+
+
+def test_without_load_an_arm_has_no_weight_either():
+    point = device(arm=arm()).at(load=Load(push=4.0, gravity=[0.0, -9.81], count_sideways=True))
+    bare = natural_frequencies(point.plant.without_load)
+    assert bare == pytest.approx(natural_frequencies(replace(point, load=None).plant), rel=1e-9)
+    assert natural_frequencies(point.plant)[0] != pytest.approx(bare[0], rel=1e-3)
 
 
 def test_what_a_load_adds_is_the_second_derivative_of_the_muscles_potential():

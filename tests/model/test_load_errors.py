@@ -31,6 +31,8 @@ from zwidth.model.reduction import ModelError
         ({"moment": [0.0, np.inf]}, r"moment must be two or three finite numbers \[N m\]"),
         ({"gravity": 9.81}, r"gravity must be two or three finite numbers \[m/s\^2\], got 9.81"),
         ({"push": np.inf}, r"push must be a finite number \[N\], got inf"),
+        ({"push": True}, r"push must be a finite number \[N\], got True"),
+        ({"surface_radius": True}, "surface_radius must be a number but 0.*got True"),
         ({"push": "5"}, r"push must be a finite number \[N\], got '5'"),
         ({"force": [1.0, 0.0], "push": 1.0}, "push is given beside force; give one of them"),
         ({"force": [1.0, 0.0], "moment": [0.0, 1.0]}, "moment is given beside force"),
@@ -39,6 +41,10 @@ from zwidth.model.reduction import ModelError
         ({"surface_radius": "flat"}, "surface_radius must be a number but 0.*got 'flat'"),
         ({"settle": True}, "settle needs a force"),
         ({"settle": True, "push": 1.0}, "settle needs a force"),
+        (
+            {"force": [0.0, -5.0], "settle": True, "surface_radius": 0.05},
+            "surface_radius of 0.05 m is given beside settle, which slides the handle along a plane; leave one",
+        ),
         ({"hand": "soft"}, "hand must be 'dead' or 'follower' or 'neglected', got the text 'soft'"),
         ({"posture_of": "links"}, "posture_of must be 'handle' or 'motors'"),
         ({"branch": "up"}, "branch must be 'forward' or 'backward'"),
@@ -47,6 +53,15 @@ from zwidth.model.reduction import ModelError
 def test_a_load_that_cannot_be_meant_is_one_clear_error(arguments, words):
     with pytest.raises(ValueError, match=words):
         Load(**arguments)
+
+
+def test_loads_of_the_same_numbers_are_equal():
+    one, other = (Load(force=[0.0, -5.0], gravity=[0.0, 0.0, -9.81]) for _ in range(2))
+    assert one == other
+    assert len({one, other, Load(push=1), Load(push=1.0)}) == 2
+    assert one != Load(force=[0.0, -5.0], gravity=[0.0, 0.0, -9.8])
+    assert Load(force=[0.0, -5.0]) != Load(push=-5.0)
+    assert one != "a push"
 
 
 @pytest.mark.parametrize(
@@ -60,8 +75,8 @@ def test_a_load_that_cannot_be_meant_is_one_clear_error(arguments, words):
             DeviceError,
             "five-bar: load: gravity must be two or three finite numbers .* got 'down'",
         ),
-        ({"load": (5.0, 0.0)}, LoadError, r"the load \(5, 0, 0\) does not push along the rendered direction"),
-        ({"load": (1.0, -5.0)}, LoadError, r"has a part \(1, 0, 0\) across .* needs \(-0.00291587, 0, 0\); give"),
+        ({"load": (5.0, 0.0)}, LoadError, r"the load \(5, 0, 0\) N does not push along the rendered direction"),
+        ({"load": (1.0, -5.0)}, LoadError, r"part \(1, 0, 0\) N across .* needs \(-0.00291587, 0, 0\) N; give"),
         (
             {"load": Load(moment=[0.0, 0.0, 1.0])},
             LoadError,
@@ -107,6 +122,22 @@ def test_limits_of_motors_and_computer_bound_the_load():
         limited.at(load=(0.0, -5.0)).plant  # noqa: B018
 
 
+def test_along_every_direction_the_computer_s_limit_bounds_the_load():
+    limited = load_device("five-bar").with_({"loop.saturation.force_N": 5.004})
+    along = limited.at(load=Load(force=[4.0, 0.0]), direction=(1.0, 0.0)).by_direction(count=3)
+    assert along.status == ("ok",) * 3
+    along = limited.at(direction=(1.0, 0.0), load=Load(push=-5.0)).by_direction(count=4)
+    assert [status[:24] for status in along.status] == ["ok", "the load takes 5.00512 N", "ok", "ok"]
+
+
+def test_about_an_axis_a_push_is_a_moment():
+    wrist = load_device("openwrist").with_({"loop.saturation.force_N": 0.01})
+    with pytest.raises(
+        EquilibriumError, match=r"takes 0\.05 N m of the wall, more than the force limit of 0\.01 N m"
+    ):
+        wrist.at(axis=(0.0, 0.0, 1.0), load=Load(push=0.05)).plant  # noqa: B018
+
+
 def test_a_moment_that_is_none_is_named_as_one():
     with pytest.raises(DeviceError, match=r"five-bar: load: moment must be two or three finite numbers \[N m\]"):
         load_device("five-bar").under((1.0, 2.0, 3.0, 4.0), moment=True)
@@ -141,6 +172,10 @@ def test_a_device_without_a_mechanism_bears_no_load(name, arguments):
         ({"settle": True, "push_N": 1.0}, "load.settle: needs force_N"),
         ({"surface_radius_m": 0.0}, "load.surface_radius_m: must not be 0; remove it for a plane"),
         ({"surface_radius_m": -float("inf")}, "load.surface_radius_m: must not be -inf; remove it for a plane"),
+        (
+            {"force_N": [0.0, -5.0], "settle": True, "surface_radius_m": 0.05},
+            "load.surface_radius_m: stands beside settle, which slides the handle along a plane; remove one",
+        ),
         ({"hand": "soft"}, "load.hand: must be 'dead', 'follower' or 'neglected'"),
         ({"force": [0.0, 5.0]}, "load.force: is not a key of a device file; did you mean 'force_N'"),
         ({"gravity_m_per_s2": -9.81}, "load.gravity_m_per_s2: must be a list"),

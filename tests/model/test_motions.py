@@ -305,6 +305,28 @@ def test_the_counted_posture_is_the_nearest_to_the_counts(seed):
             assert close(found.seen[:, i], to_drive @ sum(w * at[mechanism.driven] for w, at in there))
 
 
+def test_a_count_outside_of_a_ratio_s_table_has_no_posture():
+    mechanism = KINDS["five-bar"](np.random.default_rng(0))
+    q = solve_posture(mechanism, mechanism.reference_position).angles
+    drives = mechanism.drives
+    turned = q[drives.joint]
+    near, values = np.array([-0.01, 0.0, 0.01]), np.array([9.0, 10.0, 11.0])
+    tables = tuple(RatioTable(angle + near, values, turns=False) for angle in turned)
+    mechanism = replace(mechanism, drives=replace(drives, ratio_tables=tables))
+    ratio = ratios_at(mechanism, q)
+    assert counted(mechanism, q, np.full(2, 0.005), ratio) is not None
+    assert counted(mechanism, q, np.full(2, 0.02), ratio) is None
+
+
+def test_drives_that_do_not_turn_with_their_joints_have_no_counted_posture():
+    mechanism = KINDS["five-bar"](np.random.default_rng(0))
+    q = solve_posture(mechanism, mechanism.reference_position).angles
+    coupling = np.zeros((2, len(q)))
+    coupling[[0, 1], mechanism.drives.joint] = -1.0
+    still = replace(mechanism, drives=replace(mechanism.drives, coupling=coupling))
+    assert counted_posture(still, motions_at(mechanism, q), q, np.full(2, 0.005), np.ones(2)) is None
+
+
 def test_a_posture_that_cannot_be_counted_is_none():
     mechanism = KINDS["five-bar"](np.random.default_rng(0))
     q = solve_posture(mechanism, mechanism.reference_position).angles

@@ -15,7 +15,6 @@ from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import FOUND
 from zwidth.chart.edge_memory import NO_WALL as NONE_FOUND
 from zwidth.chart.point_numbers import numbers_of_points
-from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import check_several_directions
@@ -167,6 +166,8 @@ def largest_stiffness_by_direction(
         wrong = given[np.flatnonzero(~(length > 0.0))[0]].tolist()
         raise ValueError(f"directions must have a length above 0, got {wrong}; leave this one out")
     units = given / length
+    if point.load is not None:
+        point = replace(point, load=point.load.along_every_direction)
     plant = _plants(point)
     motions = _motions(point.jacobian)
     keys = [_direction_key(unit, point.load is not None) for unit in units]
@@ -181,9 +182,7 @@ def largest_stiffness_by_direction(
         rows[key] = none, none, none, OUT_OF_MOTION
         if not off[n]:
             known = together[wanted.index(n)]
-            rows[key] = (
-                known if known is not None else _stiffest(plant, units[n], point.towards(units[n]).computer)
-            )
+            rows[key] = known if known is not None else _stiffest(plant, point.towards(units[n]))
         if progress is not None:
             done += keys.count(key)
             progress("directions", done, len(units))
@@ -231,8 +230,7 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
     Directions share the full model's matrices and differ in their actuator.
     """
     if point.load is not None:
-        pushed = replace(point, load=point.load.along_every_direction)
-        return lambda unit: pushed.towards(unit).plant
+        return lambda unit: point.towards(unit).plant
     check_several_directions(point.mechanism, point.operator, point.encoders, None)
     axes = _motions(point.jacobian)
     if point.model != "full" or not len(axes):
@@ -241,13 +239,11 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
     return lambda unit: everywhere.along(axes @ unit)
 
 
-def _stiffest(
-    plant: Callable[[Floats], Plant], unit: Floats, controller: Controller
-) -> tuple[float, float, float, str]:
-    """Stiffness, damping, frequency and status along one direction."""
+def _stiffest(plant: Callable[[Floats], Plant], along: OperatingPoint) -> tuple[float, float, float, str]:
+    """Stiffness, damping, frequency and status along the direction of a point, whose plant `_plants` gives."""
     none = float("nan")
     try:
-        loop = Loop(plant(unit), controller)
+        loop = Loop(plant(along.direction), along.computer)
         peak = largest_stiffness(loop)
     except (DirectionError, UnmovedError):
         return none, none, none, OUT_OF_MOTION

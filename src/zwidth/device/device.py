@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -142,7 +142,8 @@ class Device:
 
         position    (..., 2) or (..., 3) [m]; x, y lies at the height of the file's reference, whose plane a planar
                     device does not leave. Or the angle of every driven joint by the name of its link [rad], or a
-                    posture solved before. Left out: the file's reference
+                    posture solved before: as it is, or under load as it was asked for. Left out: the file's
+                    reference
         direction   (..., 2) or (..., 3) of any length but zero; its leading axes broadcast with those of the
                     position. Left out: the file's
         axis        (..., 3) of any length instead: the axis about which moments are rendered; walls then are in
@@ -210,7 +211,7 @@ class Device:
             shape = np.broadcast_shapes(posture.status.shape, rendered.shape[:-2])
             posture = posture.broadcast_to(shape)
             rendered = np.broadcast_to(rendered, (*shape, *rendered.shape[-2:]))
-            posture = self._posture_under_load(posture, rendered)
+            posture = self._posture_under_load(posture, rendered, model)
             requested_position = self._requested_position(position)
         return OperatingPoint(
             controller=self.controller,
@@ -247,12 +248,13 @@ class Device:
         joint angles), directions, assembly and model. Raises what `at` raises."""
         if point.posture is None:
             return self.at(model=point.model)
+        asked = point.posture.asked or point.posture
         return self.at(
             point.requested_position,
             directions=point.directions,
             relative_stiffness=None if point.wall_matrices is None else point.wall_matrices.stiffness,
             relative_damping=None if point.wall_matrices is None else point.wall_matrices.damping,
-            orientation=None if isinstance(point.requested_position, Mapping) else point.posture.rotation,
+            orientation=None if isinstance(point.requested_position, Mapping) else asked.rotation,
             assembly=point.posture.assembly,
             model=point.model,
         )
@@ -279,6 +281,12 @@ class Device:
         Raises   DeviceError  for what is no load, and for a device without a mechanism
         """
         return _verbs.device_under(self, load, gravity, moment)
+
+    @property
+    def pushed_along_every_direction(self) -> Device:
+        """The device under a push as strong as its load, along whatever direction is rendered; itself without a
+        load."""
+        return self if self.load is None else self.under(self.load.along_every_direction)
 
     def chart(self, radius: float = 1.0, *, decay: bool = True) -> Chart:
         """The stable walls at the device's reference; `device.at(...).chart()` elsewhere. See `chart_at`."""
@@ -406,7 +414,7 @@ class Device:
         rendered = self.direction(direction, axis, characteristic_length)
         return rendered.shape[-1] == 6 and not rendered[..., :3].any()
 
-    def _posture_under_load(self, posture: Posture, directions: Floats) -> Posture:
+    def _posture_under_load(self, posture: Posture, directions: Floats, model: str | None) -> Posture:
         """The postures (...) that the device has under its load, rendering directions (..., 1, 3 or 6)."""
         if self.load is None or directions.shape[-2] != 1:
             return posture
@@ -414,8 +422,9 @@ class Device:
         from zwidth.model.loaded_posture import loaded_postures
 
         assert self.mechanism is not None
+        mechanism = self.mechanism.made_rigid if model == "rigid" else self.mechanism
         counts_motors = self.encoders == "motor"
-        return loaded_postures(self.mechanism, posture, screw(directions[..., 0, :]), self.load, counts_motors)
+        return loaded_postures(mechanism, posture, screw(directions[..., 0, :]), self.load, counts_motors)
 
     def _requested_position(self, position: Position | ArrayLike | Posture | None) -> Position | Floats | None:
         """The requested position that a point keeps, so that another device can be put there."""
@@ -423,7 +432,9 @@ class Device:
 
         if position is None or isinstance(position, Mapping):
             return position
-        return position.position if isinstance(position, Posture) else self.position(position)
+        if not isinstance(position, Posture):
+            return self.position(position)
+        return position.position if self.load is None else (position.asked or position).position
 
     def _wall_matrices(
         self,
@@ -470,7 +481,8 @@ class Device:
         from zwidth.model.posture import Posture, place_of_joints, solve_posture
 
         if isinstance(position, Posture):
-            return position
+            # a device without load takes it as it is
+            return replace(position, asked=None) if self.load is None and position.asked else position
         mechanism = self._mechanism()
         if orientation is not None and mechanism.controls == POSITION:
             message = (

@@ -37,6 +37,11 @@ def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
     radius = load.get("surface_radius_m")
     if is_number(radius) and radius in (0, -inf):
         yield ("load", "surface_radius_m"), f"must not be {radius:g}; remove it for a plane"
+    elif load.get("settle") is True and is_number(radius) and radius != inf:
+        yield (
+            ("load", "surface_radius_m"),
+            "stands beside settle, which slides the handle along a plane; remove one of the two",
+        )
 
 
 def _is_zero(force: Any) -> bool:

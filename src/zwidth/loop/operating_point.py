@@ -97,9 +97,10 @@ class OperatingPoint(PosedDevice):
         assert self.load is not None
         plants = self.loaded_plants
         if held and self.arm is not None:
-            force = self.equilibrium.hand_force
+            force, none = self.equilibrium.hand_force, np.zeros(3)
             plants = LoadedPlants(
-                self._attach_arm(plants.loaded, force), self._attach_arm(plants.unloaded, np.zeros(3))
+                self._attach_arm(plants.loaded, force, self.load.weight),
+                self._attach_arm(plants.unloaded, none, none),
             )
         elif held:
             plants = LoadedPlants(self.attach_operator(plants.loaded), self.attach_operator(plants.unloaded))
@@ -127,14 +128,14 @@ class OperatingPoint(PosedDevice):
                  holds the operator, too
         """
         if self.arm is not None:
-            return self._attach_arm(plant, np.zeros(3))
+            return self._attach_arm(plant, np.zeros(3), np.zeros(3) if self.load is None else self.load.weight)
         if self.operator is None or plant.handle is None:
             return plant
         return attach(plant, self.operator, self._motions_across(plant))
 
-    def _attach_arm(self, plant: Plant, force: Floats) -> Plant:
-        """A full plant with the arm at its handle, which pushes with a force (3,). Raises ModelError for a reduced
-        model, ArmError where the arm cannot hold the handle."""
+    def _attach_arm(self, plant: Plant, force: Floats, gravity: Floats) -> Plant:
+        """A full plant with the arm at its handle, which pushes with a force (3,) under gravity (3,). Raises
+        ModelError for a reduced model, ArmError where the arm cannot hold the handle."""
         if self.model not in ("full", None):
             raise ModelError(
                 f"an arm that is a chain of bodies holds the full model alone, not {self.model!r}; leave the "
@@ -144,7 +145,6 @@ class OperatingPoint(PosedDevice):
         rows = np.zeros((3, plant.size))
         handle = self.handle_rows
         rows[:, : handle.shape[1]] = handle
-        gravity = np.zeros(3) if self.load is None else self.load.weight
         return attach_arm(plant, self.arm, rows, self._posture.position, force, gravity)
 
     def _motions_across(self, plant: Plant) -> Floats:

@@ -21,7 +21,8 @@ from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError, solve_equilibrium
-from zwidth.model.load import Load
+from zwidth.model.load import Load, unit_of_push
+from zwidth.model.loaded_posture import loaded_postures
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
@@ -187,8 +188,23 @@ class PosedDevice:
         return replace(self, directions=directions[..., None, :], wall_matrices=None)
 
     def in_model(self, model: Model | None) -> Self:
-        """The same device, reduced to another model."""
-        return self if model == self.model else replace(self, model=model)
+        """The same device, reduced to another model. Under load the posture is the one that the model has there,
+        whose drives and links bend, or do not.
+
+        Raises  EquilibriumError, LoadError  where a single posture has no equilibrium in that model
+        """
+        if model == self.model:
+            return self
+        other = replace(self, model=model)
+        stays = (model == "rigid") == (self.model == "rigid")
+        if stays or self.load is None or self._posture.asked is None:
+            return other
+        assert self.mechanism is not None
+        mechanism = self.mechanism.made_rigid if model == "rigid" else self.mechanism
+        found = loaded_postures(
+            mechanism, self._posture, screw(self.direction), self.load, self.encoders == "motor"
+        )
+        return replace(other, posture=found)
 
     @cached_property
     def without_operator(self) -> Self:
@@ -289,10 +305,8 @@ class PosedDevice:
         drives = replace(
             drives_at(self.mechanism.drives, posture), ratio_tables=self.mechanism.drives.ratio_tables
         )
-        if self.model == "rigid":
-            drives = replace(drives, stiffness=np.full(len(drives.names), np.inf))
-            return replace(self.mechanism, drives=drives, flexible=())
-        return replace(self.mechanism, drives=drives)
+        mechanism = replace(self.mechanism, drives=drives)
+        return mechanism.made_rigid if self.model == "rigid" else mechanism
 
     @cached_property
     def equilibrium(self) -> Equilibrium:
@@ -308,11 +322,13 @@ class PosedDevice:
             raise OperatingPointError(
                 "the posture is out of reach, singular or without equilibrium; ask for another"
             )
-        found = solve_equilibrium(mechanism, posture, screw(self.direction), self.load, self.encoders == "motor")
+        axis = screw(self.direction)
+        found = solve_equilibrium(mechanism, posture, axis, self.load, self.encoders == "motor")
         if abs(found.wall_force) > self.controller.force_limit:
+            unit = unit_of_push(axis)
             raise EquilibriumError(
-                f"the load takes {abs(found.wall_force):.6g} N of the wall, more than the force limit of "
-                f"{self.controller.force_limit:.6g} N; choose a smaller load"
+                f"the load takes {abs(found.wall_force):.6g} {unit} of the wall, more than the force limit of "
+                f"{self.controller.force_limit:.6g} {unit}; choose a smaller load"
             )
         return found
 

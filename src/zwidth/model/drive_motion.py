@@ -88,16 +88,21 @@ def counted_posture(
 
     start    motions of the device;   angles (n,)  its joint coordinates
     ahead    (d,)  by what the counted coordinates are ahead of those of its joints
-    Returns  None where the joints cannot be there
+    Returns  None where the joints cannot be there, or the drives do not determine where they are
     """
     mech, at, motions, k = start.mech, angles, start, len(mechanism.driven)
     for _ in range(STEPS):
         drives = DriveMotion.of(mechanism, motions, at, ratio)
         T, Z = drives.T[:, :k], drives.Z[:, :k, :k]
         away = drive_travel(mechanism, angles, at, ratio) - ahead
-        seen = np.linalg.solve(T.T @ T + np.tensordot(away, Z, 1), T.T)
+        try:
+            seen = np.linalg.solve(T.T @ T + np.tensordot(away, Z, 1), T.T)
+        except np.linalg.LinAlgError:
+            return None
         step = -(seen @ away)
-        if not np.max(np.abs(step), initial=0.0) > SETTLED:
+        if not np.isfinite(step).all():  # outside the table of a ratio
+            return None
+        if np.max(np.abs(step), initial=0.0) <= SETTLED:
             return CountedPosture(at, motions, drives, np.asarray(seen, dtype=np.float64))
         moved = moved_posture(mech, at, np.append(step, np.zeros(motions.count - k)))
         if moved is None or not np.isfinite(moved).all():

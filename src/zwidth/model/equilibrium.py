@@ -23,7 +23,7 @@ import numpy as np
 
 from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_posture
 from zwidth.model.drive_springs import DriveSprings
-from zwidth.model.load import ALONG, Load, LoadError, vector_text
+from zwidth.model.load import ALONG, Load, LoadError, unit_of_push, vector_text
 from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
@@ -39,6 +39,10 @@ UNBALANCED: Final = 1e-7  # share of the torques that counts as a joint that not
 
 class EquilibriumError(LoadError):
     """There is no equilibrium under a load, or none that the device holds."""
+
+
+class SidewaysForceError(EquilibriumError):
+    """The load has another part across the rendered direction than the posture needs, which no wall holds."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,7 @@ def solve_equilibrium(
     screw      (6,)  the rendered direction (`effective_parameters.screw`)
     counts_motors  whether the encoders are on the motors, or on the links behind the drives
     Raises     EquilibriumError  where nothing balances a joint, or drives and their springs cannot hold the load
-               LoadError         for a load across the direction that nothing holds
+               LoadError         for a load that does not push along the direction
     """
     balance = Balance(mechanism, posture, screw, load, counts_motors)
     found = balance.solve()
@@ -375,7 +379,7 @@ class Balance:
         )
 
     def check(self, found: Equilibrium) -> None:
-        """Raise EquilibriumError or LoadError where drives, hand or wall do not hold what they would have to."""
+        """Raise EquilibriumError where drives, hand or wall do not hold what they would have to."""
         self._check_balance(found)
         self._check_torques(found.torques)
         self._check_across(found)
@@ -416,17 +420,19 @@ class Balance:
             )
 
     def _check_across(self, found: Equilibrium) -> None:
-        """Raise LoadError where the load asks for another force across the direction than the posture needs."""
+        """Raise SidewaysForceError where the load has another part across the direction than the posture needs."""
         force = self.load.force if np.any(self.screw[:3]) else self.load.moment
         if force is None or self.load.settle:
             return
+        unit = unit_of_push(self.screw)
         across = force - (force @ self.along) / float(self.along @ self.along) * self.along
         off, needed = np.linalg.norm(across - found.sideways_force), found.sideways_force
         if np.any(np.abs(across) > ALONG * np.linalg.norm(force)) and off > UNBALANCED * np.linalg.norm(force):
-            raise LoadError(
-                f"the load {vector_text(force)} has a part {vector_text(across)} across the rendered direction, "
-                f"where the wall does not hold it, and this posture needs {vector_text(needed)}; give the part "
-                "along the direction alone, or ask with settle for the posture in which this load is in balance"
+            raise SidewaysForceError(
+                f"the load {vector_text(force)} {unit} has a part {vector_text(across)} {unit} across the "
+                f"rendered direction, where the wall does not hold it, and this posture needs "
+                f"{vector_text(needed)} {unit}; give the part along the direction alone, or ask with settle for "
+                "the posture in which this load is in balance"
             )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
 from numbers import Real
 from typing import Final, Literal, cast, get_args
@@ -22,7 +22,7 @@ class LoadError(ValueError):
     """A load that cannot be meant."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Load:
     """The forces about whose balance, the haptic equilibrium, a device is linearised (thesis eq. 2.4).
 
@@ -39,12 +39,13 @@ class Load:
                   is in balance; False: the posture is kept, and the hand supplies what it needs across the
                   rendered direction
     surface_radius  of the surface about the handle [m]: positive for one that is convex towards the hand, negative
-                  for a hollow one, inf for a plane
+                  for a hollow one, inf for a plane, the only one with settle
     count_sideways  whether the motions that no wall moves without load count for stability, too
     branch        of springs whose torque is 0 where their stiffness changes: "forward", the motor ahead, or
                   "backward"
 
-    Raises  LoadError  for a force of 0, numbers that are not finite, a radius of 0, several forces
+    Raises  LoadError  for a force of 0, numbers that are not finite, a radius of 0, several forces, and a radius
+                       beside settle
             ValueError for an unknown word
     """
 
@@ -89,6 +90,24 @@ class Load:
             raise LoadError(f"surface_radius must be a number but 0, or inf [m], got {self.surface_radius!r}")
         if self.settle and self.force is None:
             raise LoadError("settle needs a force, under which the device slides to where it is in balance")
+        if self.settle and self.surface_radius != inf:
+            raise LoadError(
+                f"surface_radius of {self.surface_radius:g} m is given beside settle, which slides the handle "
+                "along a plane; leave one of the two out"
+            )
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all numbers and words are the same."""
+        return self._values == other._values if isinstance(other, Load) else NotImplemented
+
+    def __hash__(self) -> int:
+        """Of the values, so that equal loads are one key."""
+        return hash(self._values)
+
+    @property
+    def _values(self) -> tuple[object, ...]:
+        values = (getattr(self, each.name) for each in fields(self))
+        return tuple(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in values)
 
     @property
     def weight(self) -> Floats:
@@ -122,11 +141,11 @@ class Load:
         """
         if self.push is not None:
             return float(self.push)
-        linear = bool(np.any(screw[:3]))
+        linear, unit = bool(np.any(screw[:3])), unit_of_push(screw)
         given, way = (self.force, screw[:3]) if linear else (self.moment, screw[3:])
         other = self.moment if linear else self.force
         if other is not None:
-            wanted, unit = ("force", "N") if linear else ("moment", "N m")
+            wanted = "force" if linear else "moment"
             raise LoadError(
                 f"the wall is rendered along {_way(linear)}; give the load as a {wanted} [{unit}], or push"
             )
@@ -135,8 +154,8 @@ class Load:
         along = float(given @ way) / float(way @ way)
         if not abs(along) * float(np.linalg.norm(way)) > ALONG * float(np.linalg.norm(given)):
             raise LoadError(
-                f"the load {vector_text(given)} does not push along the rendered direction {vector_text(way)}, "
-                "where the wall would hold it; choose one with a part along the direction"
+                f"the load {vector_text(given)} {unit} does not push along the rendered direction "
+                f"{vector_text(way)}, where the wall would hold it; choose one with a part along the direction"
             )
         return along
 
@@ -150,6 +169,11 @@ class Load:
     def with_gravity(self, gravity: ArrayLike) -> Load:
         """The same load under another gravity, (2,) or (3,) [m/s^2]. Raises LoadError for another one."""
         return replace(self, gravity=cast(Floats, gravity))
+
+
+def unit_of_push(screw: Floats) -> str:
+    """Of what a wall along a rendered direction (6,) pushes with: N, or about an axis N m."""
+    return "N" if np.any(screw[:3]) else "N m"
 
 
 def along_text(push: float) -> str:
@@ -167,4 +191,4 @@ def _way(linear: bool) -> str:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, Real) and isfinite(value)
+    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)

@@ -29,6 +29,7 @@ from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
 from zwidth.model.ratio_table import drives_at
 
 STEPS: Final = 40  # of Newton's method
+ROUNDS: Final = 40  # in which free joints, bending and sliding follow one another
 SETTLED: Final = 1e-11  # share of the largest force, or of the mechanism's size, that counts as balance
 PROBE: Final = 1e-6  # by which joints are moved for a derivative [rad], [m]
 LARGEST_STEP: Final = 0.5  # of Newton's method [rad], [m]
@@ -39,13 +40,19 @@ def loaded_postures(
 ) -> Posture:
     """The postures under load of postures (...) without it, one by one; designs broadcast with them.
 
+    posture  as it is asked for; one that was found under load stands for the one that it was found from
     screws   (..., 6)  rendered directions
     Returns  the postures; in a batch one without equilibrium is marked NO_EQUILIBRIUM
     Raises   EquilibriumError, LoadError  for a single posture without one
+             LoadError  for a load that can be meant in no posture of a batch
     """
+    posture = posture.asked or posture
     if not posture.status.shape:
-        return _loaded(mechanism, posture, screws, load, counts_motors)
-    changed, shape = posture.with_axes(np.array), posture.status.shape
+        return replace(_loaded(mechanism, posture, screws, load, counts_motors), asked=posture)
+    changed, shape = replace(posture.with_axes(np.array), asked=posture), posture.status.shape
+    refused: LoadError | None = None
+    numbers = [changed.angles, changed.mass_matrix, changed.jacobian, changed.angular_jacobian]
+    numbers += [changed.closure_residual, changed.projected]
     for index in np.ndindex(shape):
         if posture.status[index] != OK:
             continue
@@ -56,15 +63,18 @@ def loaded_postures(
         try:
             own = change_designs(mechanism, single, shape)
             one = _loaded(own, posture.with_axes(single), screws[index], load, counts_motors)
-        except EquilibriumError:
+        except LoadError as error:
+            refused = refused if isinstance(error, EquilibriumError) else error
             changed.status[index] = NO_EQUILIBRIUM
-            for array in (changed.angles, changed.mass_matrix, changed.jacobian, changed.angular_jacobian):
+            for array in numbers:
                 array[index] = np.nan
             continue
         for name in ("position", "angles", "mass_matrix", "jacobian", "angular_jacobian"):
             getattr(changed, name)[index] = getattr(one, name)
         if changed.rotation is not None and one.rotation is not None:
             changed.rotation[index] = one.rotation
+    if refused is not None and not np.any(changed.status == OK):
+        raise refused
     return changed
 
 
@@ -77,7 +87,7 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
         return Balance(posed, at, screw, load, counts_motors)
 
     at = posture
-    for _ in range(STEPS):  # each of the three hangs on the others by the load's own small changes
+    for _ in range(ROUNDS):  # each of the three hangs on the others by the load's own small changes
         before = at.angles
         if mechanism.free:
             at = _hung(mechanism, at, balance)
@@ -89,6 +99,11 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
             at = _settled(mechanism, at, screw, load, balance)
         if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
             break
+    else:
+        raise EquilibriumError(
+            f"no posture was found under {load.text}: after {ROUNDS} rounds of bending and hanging it still "
+            "changes; choose a smaller load, or stiffer drives and links"
+        )
     final = balance(at)
     found = final.solve()
     final.check(found)

@@ -12,7 +12,7 @@ three successive angles do when two of their axes meet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, Literal
 
@@ -234,3 +234,9 @@ class Mechanism:
     def design_shape(self) -> tuple[int, ...]:
         """Leading axes of all numbers: () for one design."""
         return design_shape(self)
+
+    @property
+    def made_rigid(self) -> Mechanism:
+        """The same mechanism with drives and links that do not bend."""
+        drives = replace(self.drives, stiffness=np.full_like(self.drives.stiffness, np.inf))
+        return replace(self, drives=drives, flexible=())

@@ -92,6 +92,7 @@ class Posture:
     angular_jacobian  (..., 3, c)  the same of the handle's angular velocity [1]
     closure_residual  (...)        largest gap left in any loop [m]; of angles, times the mechanism's size
     rotation          (..., 3, 3)  axes of the handle in the base frame, as `position`; None: not controlled
+    asked             the postures that were asked for, of which these are those under load; None: the same
     """
 
     assembly: str
@@ -104,11 +105,13 @@ class Posture:
     closure_residual: Floats
     projected: Floats
     rotation: Floats | None = None
+    asked: Posture | None = None
 
     def with_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Posture:
         """The postures with a change of the leading axes made to each of their arrays, such as an index."""
-        arrays = _arrays(self)
-        return Posture(self.assembly, **{name: np.asarray(change(array)) for name, array in arrays.items()})
+        arrays: dict[str, Any] = {name: np.asarray(change(array)) for name, array in _arrays(self).items()}
+        asked = None if self.asked is None else self.asked.with_axes(change)
+        return Posture(self.assembly, **arrays, asked=asked)
 
     def broadcast_to(self, shape: tuple[int, ...]) -> Posture:
         """The same postures with these leading axes; itself where it has them. Raises ValueError as numpy does."""
@@ -121,7 +124,8 @@ class Posture:
 
 def _arrays(posture: Posture) -> dict[str, NDArray[Any]]:
     """The arrays of a posture by their names."""
-    values = {one.name: getattr(posture, one.name) for one in fields(posture) if one.name != "assembly"}
+    names = [one.name for one in fields(posture) if one.name not in ("assembly", "asked")]
+    values = {name: getattr(posture, name) for name in names}
     return {name: np.asarray(value) for name, value in values.items() if value is not None}
 
 
@@ -253,7 +257,8 @@ def _posture(
 def join_postures(postures: Sequence[Posture]) -> Posture:
     """Postures of several designs, all of one shape (...), as one of shape (P, ...)."""
     each = [_arrays(posture) for posture in postures]
-    return Posture(postures[0].assembly, **{name: np.stack([one[name] for one in each]) for name in each[0]})
+    arrays: dict[str, Any] = {name: np.stack([one[name] for one in each]) for name in each[0]}
+    return Posture(postures[0].assembly, **arrays)
 
 
 def reachable_positions(mechanism: Mechanism, assembly: str | None = None) -> Floats:

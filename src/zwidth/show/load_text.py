@@ -47,7 +47,9 @@ def balance_text(found: Equilibrium) -> str:
 
 def has_sideways_force(found: Equilibrium) -> bool:
     """Whether the hand pushes across the direction by more than rounding."""
-    whole = max(float(np.linalg.norm(found.hand_force)), float(np.linalg.norm(found.hand_moment)))
+    size, linear = float(found.motions.mech.size[0]), np.any(found.screw[:3])
+    force, moment = (float(np.linalg.norm(part)) for part in (found.hand_force, found.hand_moment))
+    whole = max(force, moment / size) if linear else max(moment, force * size)
     return bool(np.linalg.norm(found.sideways_force) > ROUNDING * whole)
 
 

@@ -47,7 +47,7 @@ STEP: Final = 0.4  # between two logarithms that are tried
 STEPS: Final = 60  # of these, at most, up or down
 SETTLED: Final = 1e-10  # share of a stiffness to which it is solved for
 TOO_SOFT: Final = "a wall could always be stiffer"
-NOT_LINEAR: Final = "a fixed surface is looked for along a direction, not about an axis"
+NOT_ALONG_A_DIRECTION: Final = "a fixed surface is looked for along a direction, not about an axis"
 
 
 @dataclass(frozen=True)
@@ -310,7 +310,7 @@ class _Pushes:
         """
         axis = screw(self.here.direction)
         if np.any(axis[3:]):
-            return nan, NOT_LINEAR
+            return nan, NOT_ALONG_A_DIRECTION
         posture, why = self.here.posture, ""
         assert posture is not None
 

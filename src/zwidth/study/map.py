@@ -211,8 +211,8 @@ def map_job(
                     raise error.with_name(one.name) from None
     else:
         device.direction(direction)  # raises what is wrong with it
-    if isinstance(direction, str) and device.load is not None:
-        device = device.under(device.load.along_every_direction)
+    if isinstance(direction, str):
+        device = device.pushed_along_every_direction
     if not isinstance(direction, str) and device.renders_moments(direction):
         requested_measures = tuple(one.about_moments() for one in requested_measures)
     plane = plane or plane_of(device, assembly=assembly)

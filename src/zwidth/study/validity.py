@@ -28,6 +28,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
+from zwidth.model.load import LoadError
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
@@ -301,10 +302,10 @@ def _runs(good: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 def _models(full: OperatingPoint) -> Iterator[tuple[str, str, Plant | None, str]]:
     """Key, label, plant and reason of each model; without damping only where it has some."""
     for key, label in SIMPLER:
-        reduced = full.in_model(key)
         try:
+            reduced = full.in_model(key)
             itself, plant = reduced.ungripped_plant is full.ungripped_plant, reduced.plant
-        except ModelError as error:
+        except (ModelError, LoadError) as error:
             yield key, label, None, str(error)
             continue
         if itself:

@@ -19,6 +19,7 @@ from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
+from zwidth.model.load import LoadError
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
 
@@ -116,7 +117,7 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
     try:
         loop = make()
         return Variant(key, label, loop, stability_chart(loop, decay=False))
-    except (ModelError, ChartError) as error:
+    except (ModelError, LoadError, ChartError) as error:
         return Variant(key, label, None, None, str(error))
 
 
@@ -181,7 +182,7 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
     def reduces_to_itself(name: Model) -> bool:
         try:
             return point.in_model(name).ungripped_plant is full
-        except ModelError:
+        except (ModelError, LoadError):
             return False
 
     def of(name: Model, *, lossless: bool = False) -> Callable[[], Loop]:

@@ -45,7 +45,7 @@ class LoadSection(Section):
     )
     surface_radius_m: NumberOrInfinity | None = documented_key(
         "radius of the surface at the handle, positive if it is convex towards the hand, negative if it is "
-        "hollow; omitted: a plane",
+        "hollow; omitted: a plane, the only surface that a handle that settles slides along",
         "m",
         default=None,
     )

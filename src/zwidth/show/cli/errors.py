@@ -57,7 +57,7 @@ def translate_errors(question: Question) -> Iterator[None]:
     from zwidth.loop.estimator import NonlinearError
     from zwidth.loop.point_errors import MissingNumbersError
     from zwidth.loop.sections import HysteresisError, UnmovedError
-    from zwidth.model.equilibrium import EquilibriumError
+    from zwidth.model.equilibrium import EquilibriumError, SidewaysForceError
     from zwidth.model.load import LoadError
     from zwidth.model.operator import OperatorError
     from zwidth.model.posture import PostureError
@@ -66,6 +66,8 @@ def translate_errors(question: Question) -> Iterator[None]:
 
     try:
         yield
+    except SidewaysForceError as error:
+        raise BadInput(f"{question.name}: load: {error}") from None
     except (PostureError, EquilibriumError) as error:
         raise NoAnswer(str(error)) from None
     except LoadError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -296,13 +295,19 @@ def _plane_option(name: str, value: str | None) -> str:
 
 
 def _plane(case: CommandLine) -> PlaneGrid:
-    from zwidth.model.equilibrium import EquilibriumError
+    from zwidth.model.equilibrium import EquilibriumError, SidewaysForceError
     from zwidth.model.posture import PostureError
     from zwidth.study.plane_grid import plane_of
 
-    device, assembly = case.device, case.question.assembly
+    device, assembly, direction = case.device, case.question.assembly, case.question.direction
+    if case["extreme"] is not None:
+        device, direction = device.pushed_along_every_direction, None
     # an assembly that does not reach the reference position, or holds nothing there, may reach and hold others
-    with suppress(PostureError, EquilibriumError):
-        device.at(assembly=assembly)  # raises what is wrong with its name
+    try:
+        device.at(direction=direction, assembly=assembly)  # raises what is wrong with its name
+    except SidewaysForceError:
+        raise
+    except (PostureError, EquilibriumError):
+        pass
     ranges = case["x_range"], case["y_range"]
     return plane_of(device, case["plane"], case["through"], *ranges, case["cells"], assembly)

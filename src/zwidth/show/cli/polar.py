@@ -75,7 +75,8 @@ class PolarCommand(Command):
             raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; use zwidth chart")
         if case.device.load is None:  # under load each direction is computed by itself
             question.refuse_unsupported(case.device)
-        return case.point.by_direction(case["plane"], case["count"], progress=case.progress)
+        point = question.point(case.device.pushed_along_every_direction)
+        return point.by_direction(case["plane"], case["count"], progress=case.progress)
 
     def reason(self, case: CommandLine, result: ByDirection) -> str | None:
         return result.reason
