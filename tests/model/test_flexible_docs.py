@@ -38,7 +38,7 @@ def names() -> dict[str, Any]:
                 compared += 1
             else:
                 exec(compile(ast.Module([node], []), "flexible-links.md", "exec"), found)
-    assert compared == 12
+    assert compared == 15
     return found
 
 
