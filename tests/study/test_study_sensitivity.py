@@ -15,7 +15,7 @@ from zwidth.chart.edge_by_eigenvalues import ChartError, closed_rings
 from zwidth.chart.peak import Peak
 from zwidth.chart.tracer import Tracer
 from zwidth.device import address
-from zwidth.device.load import from_document, load
+from zwidth.device.load import device_of_point, from_document, load
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
 from zwidth.study.derivative import central_derivative, one_sided_derivative
@@ -315,3 +315,15 @@ def test_slopes_know_what_they_are_worth():
     estimates = np.array([slope.error for slope in slopes])
     assert np.median(errors) < 1e-7
     assert np.mean(errors > 10.0 * estimates) < 0.1
+
+
+def test_the_operator_and_the_load_of_the_point_are_those_of_the_answer():
+    held, free = load("published-two-mass").held_by("thesis-arm"), load("published-two-mass")
+    of_file, of_point = held.sensitivities(), free.sensitivities(free.at(operator="thesis-arm"))
+    assert of_point.numbers == of_file.numbers
+    assert of_point.numbers != free.sensitivities().numbers
+    device = load("five-bar")
+    of_file, of_point = device.under((0.0, -5.0)), device.at(load=(0.0, -5.0))
+    assert device_of_point(device, of_point).document == of_file.document
+    assert device_of_point(of_file, device.at()).document == device.document
+    assert device_of_point(of_file, of_file.at()) is of_file

@@ -17,7 +17,7 @@ from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
 from zwidth.device.format_version import refuse_newer, without_version
 from zwidth.device.legs import members
 from zwidth.device.load_choice import document_under, load_of_table
-from zwidth.device.operator_choice import document_held_by
+from zwidth.device.operator_choice import NOBODY, document_held_by
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.posture_arguments import screws
 from zwidth.device.read import bundled, read
@@ -32,6 +32,7 @@ from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
 
 if TYPE_CHECKING:
+    from zwidth.loop.operating_point import OperatingPoint
     from zwidth.model.arm import Arm
 
 UNNAMED_OPERATOR: Final = "as given"  # an operator without a name
@@ -90,6 +91,24 @@ def device_under(device: Device, load: Load | ArrayLike | None, gravity: ArrayLi
     return (
         device if document is device.document else from_document(document, device.label, skip_assembly_check=True)
     )
+
+
+def device_without_load(device: Device) -> Device:
+    """The device with nothing that pushes."""
+    if device.load is None:
+        return device
+    document = {key: value for key, value in device.document.items() if key != "load"}
+    return from_document(document, device.label, skip_assembly_check=True)
+
+
+def device_of_point(device: Device, point: OperatingPoint) -> Device:
+    """The device in the hands and under the load of one of its operating points, which may be others than its
+    file's. Raises what `Device.held_by` and `Device.under` raise."""
+    if point.operator is not device.operator and point.arm is device.arm:
+        device = device_held_by(device, point.operator or NOBODY)
+    if point.load == device.load:
+        return device
+    return device_without_load(device) if point.load is None else device_under(device, point.load, None, False)
 
 
 def _listed(settings: Settings) -> Sequence[str | tuple[str, Any]]:

@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from zwidth.chart.chart import StabilityChart, largest_stiffness, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
-from zwidth.device.load import from_document
+from zwidth.device.load import device_of_point, device_without_load
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError
 from zwidth.loop.sections import UnresolvedError
@@ -248,14 +248,6 @@ def without_push(load: Load | None) -> Load | None:
     return replace(load, force=None, moment=None, push=None, settle=False)
 
 
-def device_without_load(device: Device) -> Device:
-    """The device with nothing that pushes."""
-    if device.load is None:
-        return device
-    document = {key: value for key, value in device.document.items() if key != "load"}
-    return from_document(document, device.label, skip_assembly_check=True)
-
-
 @dataclass(frozen=True)
 class _Pushes:
     """The charts of one posture.
@@ -272,7 +264,7 @@ class _Pushes:
     @classmethod
     def of(cls, device: Device, point: OperatingPoint | None) -> _Pushes:
         load = device.load if point is None or point.load is None else point.load
-        bare = device_without_load(device)
+        bare = device_without_load(device if point is None else device_of_point(device, point))
         here = bare.at() if point is None else bare.at_point(point)
         return cls(bare, here, load or Load(), without_push(load))
 

@@ -16,7 +16,7 @@ from zwidth.device import address, build
 from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted, one_line, quote
-from zwidth.device.load import from_document
+from zwidth.device.load import device_of_point, from_document
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.schema import device_file as schema
 from zwidth.device.schema.operator import OperatorSection
@@ -120,7 +120,8 @@ class Family:
     device           the device whose numbers are varied
     ranges           the numbers that differ from member to member
     operators        names or files of those who may hold it, "none" for no operator; (): as the device file says
-    operating_point  posture, direction and model, the same for all members
+    operating_point  posture, direction and model, the same for all members, and load and operator where these are
+                     not varied
     """
 
     device: Device
@@ -130,6 +131,9 @@ class Family:
     _built: dict[FamilyMember, tuple[OperatingPoint, int]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "device", device_of_point(self.device, self.operating_point))
 
     @property
     def free(self) -> tuple[int, ...]:

@@ -23,6 +23,7 @@ from zwidth.device import address
 from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
+from zwidth.device.load import device_of_point
 from zwidth.device.schema import device_file as schema
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
@@ -65,7 +66,7 @@ def sensitivities(
     """
     require("device", device, Device)
     operating_point = point or device.at()
-
+    device = device_of_point(device, operating_point)
     loop = operating_point.loop
     peak = largest_stiffness(loop)
     left_out = dict(_left_out(device.document))

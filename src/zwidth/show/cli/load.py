@@ -137,7 +137,7 @@ class LoadCommand(Command):
 
 
 def _bare(case: CommandLine) -> Device:
-    from zwidth.study.load_path import device_without_load
+    from zwidth.device.load import device_without_load
 
     return device_without_load(case.device)
 
