@@ -59,6 +59,7 @@ def values_of(rng, name, K, B):
     given = {
         "wall": {"stiffness": K, "damping": B},
         "one_sided_wall": {"stiffness": K, "damping": B, "no_pull": rng.integers(2)},
+        "pressed_wall": {"stiffness": K, "damping": B, "load": 1e-4 * K},
         "slot": {"width": 2e-4, "stiffness": K, "damping": B, "no_pull": rng.integers(2)},
         "nonlinear_wall": {"stiffness": K, "cubic": K * 1e6, "damping": B, "two_sided": rng.integers(2)},
         "hunt_crossley": {"stiffness": 50.0 * K, "exponent": 1.5, "dissipation": B / K},

@@ -44,7 +44,7 @@ def implausible_beams(device: Device) -> KeyMessages:
     mechanism = table(device.document, "mechanism")
     own = [member for member in members(mechanism, "links") if isinstance(member.entry.get("beam"), dict)]
     seen = set[KeyPath]()
-    modes = _mode_messages(device)
+    modes = _mode_messages(device) if own else {}
     for member in own:
         path = ("mechanism", *member.path, "beam")
         if path not in seen:
