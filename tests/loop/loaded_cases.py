@@ -113,9 +113,12 @@ MADE = {
 
 
 def random_posture(mechanism, rng):
-    """A posture near the reference, or there."""
+    """A posture near the reference, or there; None of a mechanism whose drives leave the handle free."""
     if "as built" in mechanism.assemblies:
-        return solve_posture(mechanism)
+        try:
+            return solve_posture(mechanism)
+        except ValueError:
+            return None
     found = some_postures(mechanism, rng, count=1, spread=rng.uniform(0.0, 0.04))
     return found.with_axes(lambda array: array[0]) if found.status[0] == OK else None
 
