@@ -316,3 +316,12 @@ BEAM = BeamProperties(L, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 def test_what_no_body_can_be_made_of_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("softer", [1.0 - 3e-16, 1.0, 1.0 + 3e-16])
+def test_where_the_modes_end_between_two_planes_rounding_does_not_choose(softer):
+    """Of the same modes of a round section in both planes the one in the x-y plane is kept."""
+    beam = BeamProperties(L, 1.0, softer, 0.3, 1e5, 0.1, 1e-6)
+    body = finite_elements(beam, [L], 8, 1)
+    moved = np.max(np.abs(body.mass[:6, 6 + 6 :]), axis=1)
+    assert moved[1] > 1e-3 > 1e-9 > moved[2]

@@ -58,7 +58,7 @@ def test_natural_frequencies(name, method):
     assert np.all(found[:free] == 0.0)
     assert found[free : free + 3] == pytest.approx(expected[free : free + 3], rel=1e-6)
     assert found[free : free + 5] == pytest.approx(expected[free : free + 5], rel=1e-5)
-    assert found[free:12] == pytest.approx(expected[free:12], rel=1e-4)
+    assert found[free:12] == pytest.approx(expected[free:12], rel=2e-4)
 
 
 @pytest.mark.parametrize("name", ["planar arm", "spatial arm", "five-bar, hinge", "five-bar, point", "slides"])

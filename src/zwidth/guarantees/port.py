@@ -239,10 +239,13 @@ def without_idle_motions(plant: Plant) -> Plant:
         _, sizes, turns = np.linalg.svd(np.array(rows))
         level = IDLE * np.max(np.abs(rows))
         free = free @ turns[: np.count_nonzero(sizes > level)].T
-    V = np.hstack([free, shapes[:, (squared != 0.0) & _moved(plant, shapes, np.array(ends))]])
+    moved = (squared != 0.0) & _moved(plant, shapes, np.array(ends))
+    V = np.hstack([free, shapes[:, moved]])
     if V.shape[1] == plant.size:
         return plant
-    return _within(plant, V, plant.handle)
+    # what free motions are left has no stiffness, not even the rounding of what is left out
+    stiffness = np.diag(np.append(np.zeros(free.shape[1]), squared[moved]))
+    return replace(_within(plant, V, plant.handle), mass=np.eye(len(stiffness)), stiffness=stiffness)
 
 
 def _moved(plant: Plant, shapes: Floats, ends: Floats) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from math import ceil
 from numbers import Integral
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from zwidth.model.argument_checks import check_choice, describe_value
 from zwidth.model.beam_integrals import (
@@ -42,6 +42,8 @@ from zwidth.model.flexible_body import FlexibleBody, Floats
 SAME_PLACE = 1e-9
 # A static deflection of which modes and other deflections leave less than this share says nothing new
 DEPENDENT = 1e-7
+# Modes whose squared frequencies are closer are one but for rounding: those of a round section in its two planes
+REPEATED = 1e-8
 # Finite elements: the mass of cubics has degree 6 and their second-order terms 5; 4 points are exact up to 7
 ELEMENT_ORDER = 4
 # Assumed modes: two panels to each half wave of the highest mode, exact to rounding with 8 points
@@ -87,7 +89,8 @@ def finite_elements(
         return body_of_shapes(beam, all_shapes, panels, at)
     _check_count("modes", modes, 0)
     M, K = elastic_matrices(beam, all_shapes(panels.places), panels.weights)
-    T = _craig_bampton(M, K, 6 * len(held), modes)
+    family = np.repeat([0, 1, 2, 3], 2 * n)[order]  # bending in both planes, stretch, twist
+    T = _craig_bampton(M, K, family, 6 * len(held), modes)
     return body_of_shapes(beam, lambda places: all_shapes(places).reduced(T), panels, at)
 
 
@@ -175,8 +178,12 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
     )
 
 
-def _craig_bampton(M: Floats, K: Floats, interface: int, modes: int) -> Floats:
-    """T (e, interface + modes): the first coordinates held one after the other, then the modes with all held."""
+def _craig_bampton(M: Floats, K: Floats, family: NDArray[np.int64], interface: int, modes: int) -> Floats:
+    """T (e, interface + modes): the first coordinates held one after the other, then the modes with all held.
+
+    family  (e,) of each coordinate: coordinates of different families are not coupled. Of equal frequencies, as of
+            a round section in both planes, the one of the first family comes first on every processor
+    """
     from scipy.linalg import eigh, solve
 
     e, inner = len(K), slice(interface, None)
@@ -189,8 +196,18 @@ def _craig_bampton(M: Floats, K: Floats, interface: int, modes: int) -> Floats:
     T[:interface, :interface] = np.eye(interface)
     if e > interface:
         T[inner, :interface] = -solve(K[inner, inner], K[inner, :interface], assume_a="pos")
-    if modes:
-        _, T[inner, interface:] = eigh(K[inner, inner], M[inner, inner], subset_by_index=(0, modes - 1))
+    found: list[tuple[float, int, NDArray[np.int64], Floats]] = []
+    for one in range(int(np.max(family, initial=-1)) + 1 if modes else 0):
+        own = interface + np.flatnonzero(family[inner] == one)
+        if len(own):
+            squared, shapes = eigh(K[np.ix_(own, own)], M[np.ix_(own, own)])
+            found += [(w, one, own, shape) for w, shape in zip(squared.tolist(), shapes.T, strict=True)]
+    found.sort(key=lambda mode: mode[0])
+    for i in range(1, len(found)):
+        if found[i][1] < found[i - 1][1] and found[i][0] - found[i - 1][0] <= REPEATED * found[i][0]:
+            found[i - 1], found[i] = found[i], found[i - 1]
+    for k, (_, _, own, shape) in enumerate(found[:modes]):
+        T[own, interface + k] = shape
     return T
 
 
