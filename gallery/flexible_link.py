@@ -22,7 +22,6 @@ from scipy.optimize import brentq
 
 from gallery.brute_force import BruteForceLoop
 from zwidth.device.load import from_document
-from zwidth.model.modes import real_modes
 
 LENGTH, OUTER, WALL = 0.2, 8e-3, 0.5e-3  # of an aluminium tube [m]
 YOUNGS_MODULUS, DENSITY = 68.9e9, 2700.0
@@ -52,20 +51,10 @@ def device(method):
     )
 
 
-points = {method: device(method).at() for method in METHODS}
-largest = {method: point.chart(decay=False).stiffness_max for method, point in points.items()}
-
-
-def first_mode(plant):
-    """The lowest natural frequency of a vibration that the wall moves [Hz]: in its plane."""
-    modes = real_modes(plant)
-    moved = np.abs(modes.input) > 1e-3 * np.abs(modes.input).max()
-    vibrations = modes.frequency_squared[(modes.frequency_squared > 0.0) & moved]
-    return float(np.sqrt(vibrations.min()) / (2.0 * pi))
-
-
-first = {method: first_mode(point.plant) for method, point in points.items()}
-felt = float(points["lumped"].effective.stiffness)  # at the tip, the motor held
+found = {method: device(method).bending().bent for method in METHODS}
+largest = {method: numbers.stiffness_max for method, numbers in found.items()}
+first = {method: numbers.first_mode for method, numbers in found.items()}  # of those that the wall moves
+felt = found["lumped"].static_stiffness  # at the tip, the motor held
 
 
 # --- the second route -------------------------------------------------------------------------------
