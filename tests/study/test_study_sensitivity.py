@@ -320,8 +320,9 @@ def test_slopes_know_what_they_are_worth():
 def test_the_operator_and_the_load_of_the_point_are_those_of_the_answer():
     held, free = load("published-two-mass").held_by("thesis-arm"), load("published-two-mass")
     of_file, of_point = held.sensitivities(), free.sensitivities(free.at(operator="thesis-arm"))
-    assert of_point.numbers == of_file.numbers
-    assert of_point.numbers != free.sensitivities().numbers
+    # By their text: a NaN, of what has no logarithm, equals no other from Python 3.13 on, even where it is the same one.
+    assert repr(of_point.numbers) == repr(of_file.numbers)
+    assert repr(of_point.numbers) != repr(free.sensitivities().numbers)
     device = load("five-bar")
     of_file, of_point = device.under((0.0, -5.0)), device.at(load=(0.0, -5.0))
     assert device_of_point(device, of_point).document == of_file.document
