@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from matplotlib.figure import Figure
 
 import zwidth
 from tests.cli.command_runner import document_of, run_command
 from zwidth.measures.catalogue import MEASURES
+from zwidth.model.load import Load
 from zwidth.study.sweep import sweep
 
 WRIST, PADDLE = "openwrist", "five-bar"
@@ -55,3 +57,29 @@ def test_show_has_the_rates_of_the_orientation_and_units_of_a_wrist():
     assert [len(row) for row in shown["angular_jacobian"]] == [3, 3, 3]
     assert "1/(kg m²)³" in told
     assert "angle [rad]" in told
+
+
+def test_python_writes_the_report_that_the_command_writes(tmp_path):
+    here, there = tmp_path / "here.html", tmp_path / "there.html"
+    device = zwidth.load(WRIST)
+    numbers = device.report(here, device.at(axis=(0.0, 0.0, 1.0)))
+    told = document_of("report", WRIST, "--axis", "0,0,1", "--output", there)
+    assert here.read_bytes() == there.read_bytes()
+    assert set(numbers) <= set(told)
+    assert numbers["stiffness_max_Nm_per_rad"] == told["stiffness_max_Nm_per_rad"] > 0.0
+    assert numbers["position_m"] == told["position_m"]
+
+
+def test_a_figure_drawn_from_python_has_the_units_of_moments():
+    chart = zwidth.load(WRIST).at().chart()
+    axes = chart.plot(Figure().add_subplot())
+    assert "Nm/rad]" in axes.get_xlabel()
+    assert "Nms/rad]" in axes.get_ylabel()
+
+
+def test_a_push_about_an_axis_is_a_moment_in_what_a_study_says_of_itself():
+    turned = zwidth.load(WRIST).under(Load(push=0.05))
+    pushed = zwidth.load(PADDLE).under(Load(push=1.0))
+    periods = {"loop.sampling_period_s": [1e-3]}
+    assert sweep(turned, periods, ["stiffness_max"]).attrs["load"] == "a moment of 0.05 N m about the axis"
+    assert sweep(pushed, periods, ["stiffness_max"]).attrs["load"] == "a push of 1 N along the direction"

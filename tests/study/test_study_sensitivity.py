@@ -320,7 +320,7 @@ def test_slopes_know_what_they_are_worth():
 def test_the_operator_and_the_load_of_the_point_are_those_of_the_answer():
     held, free = load("published-two-mass").held_by("thesis-arm"), load("published-two-mass")
     of_file, of_point = held.sensitivities(), free.sensitivities(free.at(operator="thesis-arm"))
-    # By their text: a NaN, of what has no logarithm, equals no other from Python 3.13 on, even where it is the same one.
+    # By their text: from Python 3.13 on a NaN, of what has no logarithm, does not even equal itself within them.
     assert repr(of_point.numbers) == repr(of_file.numbers)
     assert repr(of_point.numbers) != repr(free.sensitivities().numbers)
     device = load("five-bar")

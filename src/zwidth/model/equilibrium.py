@@ -288,9 +288,13 @@ class Balance:
         """A torque [N m] by which others are judged as rounding: that of the drives, or of the whole weight."""
         return float(max(np.max(np.abs(s), initial=0.0), np.max(self.heaviest, initial=0.0)))
 
+    @property
+    def _load_text(self) -> str:
+        return self.load.text(unit_of_push(self.screw))
+
     def _not_held(self) -> str:
         return (
-            f"no equilibrium was found under {self.load.text}: the springs of the drives bend further than the "
+            f"no equilibrium was found under {self._load_text}: the springs of the drives bend further than the "
             "device can move; is the load too large, or a stiffness too small?"
         )
 
@@ -351,7 +355,7 @@ class Balance:
         most = float(np.max(np.linalg.eigvalsh(np.linalg.solve(root, half.T))))
         if not most < 1.0:
             raise EquilibriumError(
-                f"the links buckle under {self.load.text}: they bear {share / most:.4g} of it; choose a smaller "
+                f"the links buckle under {self._load_text}: they bear {share / most:.4g} of it; choose a smaller "
                 "load, or stiffer links"
             )
         return np.asarray(np.linalg.solve(self.elastic - own, pushed[n:]))

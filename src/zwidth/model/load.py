@@ -119,19 +119,22 @@ class Load:
         """Whether the hand leans on the wall."""
         return self.force is not None or self.moment is not None or self.push is not None
 
-    @property
-    def text(self) -> str:
-        """The load in words: "a push of (0, -5, 0) N, gravity (0, 0, -9.81) m/s²"."""
+    def text(self, unit: str = "N") -> str:
+        """The load in words: "a push of (0, -5, 0) N, gravity (0, 0, -9.81) m/s²".
+
+        unit  of what the rendered direction pushes with: N, or about an axis that of a moment
+        """
         parts = []
-        for what, vector, unit in (
+        for what, vector, its_unit in (
             ("a push of", self.force, "N"),
             ("a moment of", self.moment, "N m"),
             ("gravity", self.gravity, "m/s²"),
         ):
             if vector is not None:
-                parts.append(f"{what} {vector_text(vector)} {unit}")
+                parts.append(f"{what} {vector_text(vector)} {its_unit}")
         if self.push is not None:
-            parts.insert(0, along_text(self.push))
+            way = "a push of {} along the direction" if unit == "N" else "a moment of {} about the axis"
+            parts.insert(0, way.format(f"{self.push:g} {unit}"))
         return ", ".join(parts) or "no force"
 
     def along(self, screw: Floats) -> float | None:
@@ -174,11 +177,6 @@ class Load:
 def unit_of_push(screw: Floats) -> str:
     """Of what a wall along a rendered direction (6,) pushes with: N, or about an axis N m."""
     return "N" if np.any(screw[:3]) else "N m"
-
-
-def along_text(push: float) -> str:
-    """A push along whatever direction is rendered, in words."""
-    return f"a push of {push:g} N along the direction"
 
 
 def vector_text(values: Floats) -> str:

@@ -22,7 +22,7 @@ from zwidth.model.design_axes import change_designs
 from zwidth.model.equilibrium import Balance, EquilibriumError
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
-from zwidth.model.load import Load, LoadError
+from zwidth.model.load import Load, LoadError, unit_of_push
 from zwidth.model.mechanism import BALL_X, POSITION, Floats, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
@@ -101,8 +101,8 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
             break
     else:
         raise EquilibriumError(
-            f"no posture was found under {load.text}: after {ROUNDS} rounds of bending and hanging it still "
-            "changes; choose a smaller load, or stiffer drives and links"
+            f"no posture was found under {load.text(unit_of_push(screw))}: after {ROUNDS} rounds of bending and "
+            "hanging it still changes; choose a smaller load, or stiffer drives and links"
         )
     final = balance(at)
     found = final.solve()

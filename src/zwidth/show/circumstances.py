@@ -24,12 +24,7 @@ def operator_text(name: str) -> str:
 
 def load_text(load: Load) -> str:
     """A load in words, in the units of what is rendered."""
-    from zwidth.model.load import along_text
-
-    text = load.text
-    if load.push is None or spoken_unit("N") == "N":
-        return text
-    return text.replace(along_text(load.push), f"a moment of {load.push:g} {spoken_unit('N')} about the axis")
+    return load.text(spoken_unit("N"))
 
 
 def omission_text(left_out: Sequence[str]) -> str:

@@ -316,7 +316,7 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "assembly": job.assembly or device.reference_assembly or "",
         "model": job.model or "full",
         "operator": device.operator_name or "none",
-        **({} if device.load is None else {"load": device.load.text}),
+        **({} if device.load is None else {"load": device.load.text()}),
         "direction": rendered,
         "plane": "".join(plane.names),
         "plane_axes": [*plane.first.tolist(), *plane.second.tolist()],

@@ -80,6 +80,12 @@ class Study:
         designs = plural(self.sampling.count, "design")
         return f"Study: {designs} of {self.device.label!r} over {axes}\n  of each {names}"
 
+    @property
+    def turns(self) -> bool:
+        """Whether every design renders moments about an axis, so that stiffness is in N m/rad."""
+        varied = "direction" in [axis.key for axis in self.sampling.axes]
+        return not varied and self.device.renders_moments(self.direction)
+
 
 def check_study(
     document: dict[str, Any],
@@ -122,9 +128,7 @@ def check_study(
         return None
     hypercube = checked.sampling == "latin-hypercube"
     _check_size(checked, hypercube)
-    if "direction" not in [axis.key for axis in axes] and device.renders_moments(checked.direction):
-        columns = tuple(replace(one, measure=one.measure.about_moments()) for one in columns)
-    return Study(
+    study = Study(
         label=label,
         document=document,
         device=device,
@@ -143,6 +147,11 @@ def check_study(
         wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
         plane=plane,
         spelling=spelling,
+    )
+    if not study.turns:
+        return study
+    return replace(
+        study, columns=tuple(replace(one, measure=one.measure.about_moments()) for one in study.columns)
     )
 
 

@@ -159,6 +159,6 @@ def _attributes(sweep: Sweep) -> dict[str, Any]:
         "study": json.dumps(sweep.study.document),
         "device_file": json.dumps(device.document),
         "operator": device.operator_name or "none",
-        **({} if device.load is None else {"load": device.load.text}),
+        **({} if device.load is None else {"load": device.load.text("N m" if sweep.study.turns else "N")}),
         "zwidth": __version__,
     }

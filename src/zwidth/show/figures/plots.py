@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 
 from zwidth.show.figures.caption import caption_of_result, write_caption
 from zwidth.show.figures.style import BLACK, GREY, VERMILION, context, figure, inline_svg, label
+from zwidth.show.moment_units import speaking_of_moments
 
 Window = tuple[float, float, float, float]
 Draw = Callable[[Axes, Any], None]
@@ -26,26 +27,32 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
     Raises  TypeError  for what has no drawing
     """
     draw = drawing_of(result)
-    if ax is not None:
-        draw(ax, result)
-        return ax
-    from matplotlib import pyplot
+    with speaking_of_moments(_turns(result)):
+        if ax is not None:
+            draw(ax, result)
+            return ax
+        from matplotlib import pyplot
 
-    with context():
-        made, ax = pyplot.subplots(figsize=(5.6, 3.9), layout="constrained")
-        draw(ax, result)
-        write_caption(made, caption_of_result(result))
-    return ax
+        with context():
+            made, ax = pyplot.subplots(figsize=(5.6, 3.9), layout="constrained")
+            draw(ax, result)
+            write_caption(made, caption_of_result(result))
+        return ax
 
 
 def notebook(result: Any) -> str:
     """A result as HTML: its few lines, and its figure beneath."""
     made, ax = figure()
-    with context():
+    with context(), speaking_of_moments(_turns(result)):
         drawing_of(result)(ax, result)
         write_caption(made, caption_of_result(result))
     picture = inline_svg(made, f"zwidth-{next(FIGURE_NUMBERS)}", repr(result).splitlines()[0])
     return f"<pre>{escape(repr(result))}</pre>\n<div style='max-width: 40em'>{picture}</div>"
+
+
+def _turns(result: Any) -> bool:
+    """Whether a result is about moments about an axis."""
+    return result.operating_point is not None and result.operating_point.turns
 
 
 def drawing_of(result: Any) -> Draw:

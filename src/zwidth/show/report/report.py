@@ -14,6 +14,7 @@ from zwidth._version import __version__
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.progress import Progress
+from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import write_text
 from zwidth.show.report import bending, load, sentences, tables
 from zwidth.show.report.facts import Facts, gather
@@ -49,12 +50,13 @@ def write_report(
     _ = facts.bending
     say("report", 4, PARTS)
     target = Path(path)
-    write_text(target, page(facts))
-    return {"file": str(target), **tables.document(facts)}
+    with speaking_of_moments(facts.point.turns):
+        write_text(target, page(facts))
+        return {"file": str(target), **tables.document(facts)}
 
 
 def page(facts: Facts) -> str:
-    """The page as HTML; the same text for the same device."""
+    """The page as HTML, in the units spoken now; the same text for the same device."""
     environment = Environment(
         loader=PackageLoader("zwidth.show.report", "."),
         autoescape=True,

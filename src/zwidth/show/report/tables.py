@@ -7,6 +7,7 @@ from math import isnan
 from typing import Any
 
 from zwidth.conditions import Bound
+from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.output import json_value
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
@@ -116,16 +117,19 @@ def _wall_text(stiffness: float, damping: float) -> str:
 
 
 def document(facts: Facts) -> dict[str, Any]:
-    """All numbers of the report by the keys of the command line's --json; None for what is not known."""
+    """All numbers of the report by the keys of the command line's --json; None for what is not known. Call it
+    while the units of what is rendered are spoken."""
     chart, e = facts.chart, facts.effective
     fastest, buildable = chart.fastest_decay, chart.fastest_decay_in_first_quadrant
-    values = {
+    about = {
         "device": facts.device.name,
         "summary": sentences.summary(facts),
         "position_m": None if facts.posture is None else facts.posture.position.tolist(),
         "direction": None if facts.direction is None else facts.direction.tolist(),
         "assembly": None if facts.posture is None else facts.posture.assembly,
         "model": facts.model,
+    }
+    values = {
         "link_side_mass_kg": float(e.link_side_mass),
         "motor_side_mass_kg": float(e.motor_side_mass),
         "rigid_mass_kg": float(e.rigid_mass),
@@ -165,7 +169,8 @@ def document(facts: Facts) -> dict[str, Any]:
         ],
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
-    return {key: _known(value) for key, value in {**values, **reason}.items()}
+    numbers = keys_of_moments(values) if facts.point.turns else values
+    return {key: _known(value) for key, value in {**about, **numbers, **reason}.items()}
 
 
 def _load(facts: Facts) -> dict[str, Any]:
