@@ -49,7 +49,7 @@ def environment(without: str) -> dict[str, str]:
 def main() -> int:
     without, *arguments = sys.argv[1:] or [""]
     env = environment(without)
-    subprocess.run([sys.executable, "-m", "zwidth.show.cli.main", "compile"], env=env, check=True)
+    subprocess.run([sys.executable, "-m", "zwidth", "compile"], env=env, check=True)
     root = Path(__file__).parent.parent
     return subprocess.run([sys.executable, "-m", "pytest", *arguments], env=env, cwd=root).returncode
 

@@ -43,6 +43,7 @@ MAY_IMPORT["cuda_kernels"] = {"tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")
+MAY_IMPORT["__main__"] = {"show"}
 MAY_IMPORT["_old_names"] = {*FLOW, "device"}  # above all, and imported by nothing but the package itself
 
 VERBS = "_verbs"

@@ -62,7 +62,7 @@ def compile_into(kernels: Path, content: Path, work: Path) -> None:
         "PYTHONPATH": str(content),
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    run(sys.executable, "-m", "zwidth.show.cli.main", "compile", **settings)
+    run(sys.executable, "-m", "zwidth", "compile", **settings)
     (work / "cache" / "zwidth" / "kernels").rename(kernels)
 
 

@@ -35,6 +35,15 @@ def test_nothing_heavy_is_imported_before_it_is_needed(words):
     assert not HEAVY & set(done.stderr.split())
 
 
+def test_the_command_is_a_module_of_python_as_well():
+    as_module = subprocess.run(
+        [sys.executable, "-m", "zwidth", "chart"], capture_output=True, text=True, check=False
+    )
+    as_command = run_process("chart")
+    assert as_command.returncode == 2
+    assert (as_module.returncode, as_module.stdout, as_module.stderr) == (2, as_command.stdout, as_command.stderr)
+
+
 @pytest.mark.parametrize(("given", "used"), [(None, "1"), ("3", "3")])
 def test_linear_algebra_has_one_thread_before_numpy_is_loaded(given, used):
     """The variable counts only if it is set when numpy comes; what the user has set stays."""
