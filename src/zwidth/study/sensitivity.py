@@ -272,9 +272,9 @@ def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
         whole = steps
         while whole and isinstance(whole[-1], int):
             whole = whole[:-1]
-        names = {dotted(whole, document)} if whole != steps else set()
+        names = [dotted(whole, document)] if whole != steps else []
         if any(isinstance(step, int) for step in whole):
-            names.add(".".join("*" if isinstance(step, int) else step for step in whole))
+            names.append(".".join("*" if isinstance(step, int) else step for step in whole))
         for name in names:
             members.setdefault(name, []).append(path)
     return members

@@ -369,7 +369,7 @@ def _controls(
     """What of the handle the drives control, and their motions of it (6, d) at the reference posture."""
     if not kept:
         raise fail(robot.label, "", _nothing_moves(robot, motions))
-    free = [row for name in shape.free for row in _free_rows(robot, tree, motions, name)]
+    free = [row for name in sorted(shape.free) for row in _free_rows(robot, tree, motions, name)]
     each = [freedom.handle_motions(place, kept, free) for place in motions.places]
     found = [controls for H in each if (controls := freedom.controls_of(H))]
     if not found:
