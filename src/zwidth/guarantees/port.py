@@ -8,18 +8,13 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from zwidth.model.idle_motions import IDLE, modal_damping, separated_modes
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import LaggedDamper, Plant
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# Modal damping below this share of the largest is rounding of 0.
-UNDAMPED = 1e-13
-# A motion with less than this share in a force, a reading or the damping counts as uncoupled.
-IDLE = 1e-11
-# The same of a damped vibration, for the rounding of its shape beside fast ones: its share in a response is 1e-14.
-IDLE_DAMPED = 1e-7
 # Matrix entries that a response holds at once: 64 MB of complex numbers.
 AT_ONCE = 2**22
 
@@ -87,27 +82,9 @@ class Port:
 def port(plant: Plant, held: Floats) -> Port:
     """The plant held along `held` (n,)."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    damping = _modal_damping(plant, shapes)
+    damping = modal_damping(plant, shapes)
     lagged = tuple(replace(damper, along=shapes.T @ damper.along) for damper in plant.lagged_dampers)
     return Port(squared, damping, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes.T @ held, lagged)
-
-
-def _modal_damping(plant: Plant, shapes: Floats) -> Floats:
-    """The damping (n, n) in coordinates of modes, symmetric and without rounding of 0."""
-    damping = shapes.T @ plant.damping @ shapes
-    damping = (damping + damping.T) / 2.0
-    own = np.abs(np.diag(damping))
-    # B is positive semidefinite: a mode that dissipates nothing by itself is not damped through others either
-    still = own <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
-    damping[still, :] = damping[:, still] = 0.0
-    return np.where(_coupling(damping), damping, np.diag(np.diag(damping)))
-
-
-def _coupling(matrix: Floats) -> NDArray[np.bool_]:
-    """Which two modes a symmetric matrix (n, n) in modal coordinates couples by more than a share of what it does
-    to both of them."""
-    own = np.sqrt(np.abs(np.diag(matrix)))
-    return np.asarray((np.abs(matrix) > IDLE * np.outer(own, own)) & ~np.eye(len(own), dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -239,26 +216,14 @@ def without_idle_motions(plant: Plant) -> Plant:
         _, sizes, turns = np.linalg.svd(np.array(rows))
         level = IDLE * np.max(np.abs(rows))
         free = free @ turns[: np.count_nonzero(sizes > level)].T
-    moved = (squared != 0.0) & _moved(plant, shapes, np.array(ends))
+    shapes, moved = separated_modes(plant, squared, shapes, np.array(ends))
+    moved &= squared != 0.0
     V = np.hstack([free, shapes[:, moved]])
     if V.shape[1] == plant.size:
         return plant
     # what free motions are left has no stiffness, not even the rounding of what is left out
     stiffness = np.diag(np.append(np.zeros(free.shape[1]), squared[moved]))
     return replace(_within(plant, V, plant.handle), mass=np.eye(len(stiffness)), stiffness=stiffness)
-
-
-def _moved(plant: Plant, shapes: Floats, ends: Floats) -> NDArray[np.bool_]:
-    """Which modes (n,), the columns of `shapes`, forces along the ends (k, n) move, by dampers of others too."""
-    part = np.abs(ends @ shapes)
-    part /= np.maximum(np.linalg.norm(part, axis=1, keepdims=True), 1e-300)
-    damping = _modal_damping(plant, shapes)
-    moved = np.any(part > np.where(np.diag(damping) > 0.0, IDLE_DAMPED, IDLE), axis=0)
-    others = [shapes.T @ M @ shapes for M in (plant.hysteresis, plant.circulatory) if M is not None]
-    coupled = np.any([_coupling(M) for M in (damping, *others)], axis=0)
-    while np.any(more := ~moved & np.any(coupled & moved[:, None], axis=0)):
-        moved |= more
-    return np.asarray(moved)
 
 
 def _within(plant: Plant, V: Floats, handle: Floats | None) -> Plant:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.idle_motions import separated_modes
 from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, undamped_modes
 from zwidth.model.plant import Plant
 
@@ -55,13 +56,13 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
 
     Motions with neither stiffness nor damping are split off: they are M-orthogonal to the rest, and their double
     pole at 0 is known exactly. Where motions that are braked only have come to is told by what of it the sensor
-    reads, one state for all of them. Hidden is a pole that moves the reading within a period T [s] by no more than
-    rounding.
+    reads, one state for all of them. Idle vibrations are left out, too, and their poles are hidden ones. Hidden is
+    also a pole that moves the reading within a period T [s] by no more than rounding.
 
     second_reading  (3, n)  weights of x'', x' and x in a force; a pole is hidden only if it moves this neither. Of
                             motions without springs it must read no place, of those without dampers no velocity
     """
-    free, braked, elastic = _motions(plant)
+    free, braked, elastic, idle = _motions(plant, second_reading)
     damped_or_elastic = np.hstack([braked, elastic])
     A, source, reading = _state_matrices(plant, braked, damped_or_elastic, period)
     ends = np.abs(np.hstack([free, damped_or_elastic]).T @ np.stack([plant.actuator, plant.sensor], axis=1))
@@ -78,7 +79,7 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
             # a feedback of it moves poles by what it reads of them: here that counts itself, not a share of all
             hidden &= _poles(A, source, second, period, SECOND_UNREAD / UNOBSERVED_UNDAMPED)[1]
     unread = np.zeros(2 * damped_or_elastic.shape[1] + len(plant.lagged_dampers) - len(A), dtype=complex)
-    hidden_poles = np.concatenate([poles[hidden], unread])
+    hidden_poles = np.concatenate([poles[hidden], unread, _own_poles(plant, idle)])
     free_count = int(free.shape[1])
     return FirstOrderForm(A, source, reading, poles[~hidden], hidden_poles, inertia, free_count, second, direct)
 
@@ -105,16 +106,31 @@ def _drag(plant: Plant) -> Floats:
     return np.asarray(plant.damping + sum(lagged, np.zeros_like(plant.damping)))
 
 
-def _motions(plant: Plant) -> tuple[Floats, Floats, Floats]:
+def _motions(plant: Plant, second_reading: Floats | None) -> tuple[Floats, Floats, Floats, Floats]:
     """Mass-normalised motions: free of stiffness and damping (n, f), braked but free of stiffness (n, b), and
-    elastic (n, e)."""
+    elastic ones that are moved or read (n, e), and idle (n, i)."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    ends = [plant.actuator, plant.sensor, *(damper.along for damper in plant.lagged_dampers)]
+    ends += [] if second_reading is None else list(second_reading)
+    separated, moved = separated_modes(plant, squared, shapes, np.array(ends))
+    idle = ~moved & (squared != 0.0)
+    shapes = np.where(squared == 0.0, shapes, separated)
     drag = _drag(plant)
-    rigid, elastic = shapes[:, squared == 0.0], shapes[:, squared != 0.0]
+    rigid, elastic = shapes[:, squared == 0.0], shapes[:, (squared != 0.0) & ~idle]
     brakes, axes = np.linalg.eigh(rigid.T @ drag @ rigid)
     level = 1e-13 * max(float(np.max(np.abs(shapes.T @ drag @ shapes))), np.finfo(float).tiny)
     slides = np.abs(brakes) <= level
-    return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic
+    return rigid @ axes[:, slides], rigid @ axes[:, ~slides], elastic, shapes[:, idle]
+
+
+def _own_poles(plant: Plant, motions: Floats) -> Complexes:
+    """Poles (2 i,) [1/s] of mass-normalised motions (n, i) that nothing else couples to."""
+    count = motions.shape[1]
+    A = np.zeros((2 * count, 2 * count))
+    A[:count, count:] = np.eye(count)
+    A[count:, :count] = -(motions.T @ plant.stiffness @ motions)
+    A[count:, count:] = -(motions.T @ plant.damping @ motions)
+    return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
 
 
 def _state_matrices(plant: Plant, braked: Floats, basis: Floats, period: float) -> tuple[Floats, Floats, Floats]:
