@@ -170,7 +170,10 @@ def _run(tracer: Tracer, memory: EdgeMemory, stage: int, value: float = 0.0) -> 
     """`_stage`. Raises ChartError where memory does not hold what the stage finds."""
     result = _stage(tracer.table, memory, stage, value, LONGEST, NEAR_END)
     if stage != JOIN and (result == 0.0 if stage != LINE_PIECES else result < 0.0):
-        raise ChartError("the edge of the stable set has too many pieces to be charted; is the delay realistic?")
+        raise ChartError(
+            "the edge of the stable set has too many pieces to be charted, as of a long delay or of many undamped "
+            "modes; check the delay, or give the modes some damping"
+        )
     return result
 
 

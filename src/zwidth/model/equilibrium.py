@@ -223,9 +223,13 @@ class Balance:
         wrench = self.to_wrench[:3] if np.any(self.screw[:3]) else self.to_wrench[3:]
         return np.asarray(-(self.along @ wrench) / float(self.along @ self.along))
 
-    def solve(self) -> Equilibrium:
-        """The deflections of the flexible drives and the wall's force; where the whole load at once leads
-        nowhere, it is brought on in steps. Raises LoadError, too, for a push that the hand cannot give."""
+    def solve(self, near: Equilibrium | None = None) -> Equilibrium:
+        """The deflections of the flexible drives, the bending of the links and the wall's force; where the whole
+        load at once leads nowhere, it is brought on in steps.
+
+        near    the equilibrium of a neighbouring posture, from which this one is looked for first; None: from none
+        Raises  LoadError, too, for a push that the hand cannot give
+        """
         if self.normal is not None and not np.any(self._push_of_torques()):
             linear = bool(np.any(self.screw[:3]))
             raise LoadError(
@@ -233,6 +237,12 @@ class Balance:
                 f"control, and cannot push {'along a direction' if linear else 'about an axis'}; leave the load "
                 f"out, or render {'an axis' if linear else 'a direction'}"
             )
+        if near is not None:
+            self._bend(near.bending, 1.0)
+            found = self._newton(1.0, near.deflections, near.wall_force)
+            if found is not None:
+                return found
+            self._bend(np.zeros(len(self.elastic)), 1.0)
         start = np.zeros(len(self.ratio)), 0.0
         found = self._newton(1.0, *start)
         for step in range(1, RAMP + 1) if found is None else ():

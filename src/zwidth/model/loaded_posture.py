@@ -19,7 +19,7 @@ from zwidth.compiled import compiled
 from zwidth.model.closed_posture import moved_posture
 from zwidth.model.closure import equations, passive_rates
 from zwidth.model.design_axes import change_designs
-from zwidth.model.equilibrium import Balance, EquilibriumError
+from zwidth.model.equilibrium import Balance, Equilibrium, EquilibriumError
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.load import Load, LoadError, unit_of_push
@@ -80,23 +80,17 @@ def loaded_postures(
 
 def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool) -> Posture:
     """The posture of one design under load."""
-    tables = mechanism.drives.ratio_tables
-
-    def balance(at: Posture) -> Balance:
-        posed = replace(mechanism, drives=replace(drives_at(mechanism.drives, at), ratio_tables=tables))
-        return Balance(posed, at, screw, load, counts_motors)
-
-    at = posture
+    balances, at = _Balances(mechanism, screw, load, counts_motors), posture
     for _ in range(ROUNDS):  # each of the three hangs on the others by the load's own small changes
         before = at.angles
         if mechanism.free:
-            at = _hung(mechanism, at, balance)
+            at = _hung(mechanism, at, balances)
         if load.posture_of == "motors":
-            at = _behind_motors(mechanism, posture, at, balance)
+            at = _behind_motors(mechanism, posture, at, balances)
         elif mechanism.flexible:
-            at = _ahead_of_bending(mechanism, posture, at, balance)
+            at = _ahead_of_bending(mechanism, posture, at, balances)
         if load.settle:
-            at = _settled(mechanism, at, screw, load, balance)
+            at = _settled(mechanism, at, screw, load, balances)
         if np.max(np.abs(at.angles - before), initial=0.0) <= SETTLED:
             break
     else:
@@ -104,21 +98,51 @@ def _loaded(mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, c
             f"no posture was found under {load.text(unit_of_push(screw))}: after {ROUNDS} rounds of bending and "
             "hanging it still changes; choose a smaller load, or stiffer drives and links"
         )
-    final = balance(at)
-    found = final.solve()
-    final.check(found)
+    found = balances.check(at)
     # `_moved` places the handle as if the links did not bend
     return replace(at, position=found.handle_place) if mechanism.flexible else at
 
 
-def _behind_motors(
-    mechanism: Mechanism, asked: Posture, at: Posture, balance: Callable[[Posture], Balance]
-) -> Posture:
+class _Balances:
+    """The equilibria of the postures that a search passes through, each looked for from the one before."""
+
+    def __init__(self, mechanism: Mechanism, screw: Floats, load: Load, counts_motors: bool) -> None:
+        self.mechanism, self.screw, self.load, self.counts_motors = mechanism, screw, load, counts_motors
+        self.last: tuple[Posture, Balance, Equilibrium] | None = None
+
+    def solve(self, posture: Posture) -> Equilibrium:
+        """The equilibrium of a posture of the links. Raises what `Balance.solve` raises."""
+        return self._of(posture)[1]
+
+    def check(self, posture: Posture) -> Equilibrium:
+        """The same, if drives, hand and wall hold what they have to. Raises what `Balance.check` raises."""
+        balance, found = self._of(posture)
+        balance.check(found)
+        return found
+
+    def scale(self, posture: Posture) -> float:
+        """The largest generalised force of a posture, see `Balance.largest_part`."""
+        balance, found = self._of(posture)
+        return balance.largest_part(found)
+
+    def _of(self, posture: Posture) -> tuple[Balance, Equilibrium]:
+        if self.last is not None and self.last[0] is posture:
+            return self.last[1:]
+        mechanism = self.mechanism
+        ratios = replace(drives_at(mechanism.drives, posture), ratio_tables=mechanism.drives.ratio_tables)
+        posed = replace(mechanism, drives=ratios)
+        balance = Balance(posed, posture, self.screw, self.load, self.counts_motors)
+        found = balance.solve(None if self.last is None else self.last[2])
+        self.last = posture, balance, found
+        return balance, found
+
+
+def _behind_motors(mechanism: Mechanism, asked: Posture, at: Posture, balances: _Balances) -> Posture:
     """The links' posture where the motors count the one that is asked for: behind it by the bending of the
     drives."""
     k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
-        found = balance(at).solve()
+        found = balances.solve(at)
         away = asked.angles[mechanism.driven] - found.counted.angles[mechanism.driven]
         if np.max(np.abs(away), initial=0.0) <= SETTLED:
             return at
@@ -130,13 +154,11 @@ def _behind_motors(
     )
 
 
-def _ahead_of_bending(
-    mechanism: Mechanism, asked: Posture, at: Posture, balance: Callable[[Posture], Balance]
-) -> Posture:
+def _ahead_of_bending(mechanism: Mechanism, asked: Posture, at: Posture, balances: _Balances) -> Posture:
     """The links' posture, as if they were rigid, in which their bending has the handle where it is asked for."""
     k, c = len(mechanism.driven), asked.jacobian.shape[-1]
     for _ in range(STEPS):
-        found = balance(at).solve()
+        found = balances.solve(at)
         away = asked.position - found.handle_place
         step = np.zeros(c)
         # what the drives cannot make up for, as bending out of a plane, stays
@@ -147,9 +169,7 @@ def _ahead_of_bending(
     raise EquilibriumError("no posture was found in which the bent links have the handle where it is asked for")
 
 
-def _settled(
-    mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balance: Callable[[Posture], Balance]
-) -> Posture:
+def _settled(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balances: _Balances) -> Posture:
     """The posture, with its handle on the same surface, in which the load as it is given is in balance."""
     assert load.force is not None
     if mechanism.controls != POSITION or not np.any(screw[:3]) or np.any(screw[3:]):
@@ -159,15 +179,15 @@ def _settled(
     reached = motions[0][:, motions[1] > 1e-9 * motions[1][0]]
     across = reached @ np.linalg.svd((u @ reached)[None])[2][1:].T  # the ways along the surface
     size, strength = float(pack(mechanism).size[0]), float(np.linalg.norm(force))
-    start = balance(at).solve().handle_place
+    start = balances.solve(at).handle_place
 
     def off(there: Posture) -> Floats:
-        found = balance(there).solve()
+        found = balances.solve(there)
         return np.append(across.T @ (found.hand_force - force) / strength, u @ (found.handle_place - start) / size)
 
     found = _newton(mechanism, at, off, np.arange(k), SETTLED)
     if found is None:
-        left = balance(at).solve().hand_force - force
+        left = balances.solve(at).hand_force - force
         raise EquilibriumError(
             f"no posture was found near this one in which the load alone is in balance: here the hand has to "
             f"supply {float(np.linalg.norm(across.T @ left)):.4g} N more across the direction; leave settle out, "
@@ -176,14 +196,14 @@ def _settled(
     return found
 
 
-def _hung(mechanism: Mechanism, at: Posture, balance: Callable[[Posture], Balance]) -> Posture:
+def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
     """The posture with free joints where gravity, their springs and the load leave them."""
-    k, count, here = len(mechanism.driven), len(mechanism.free), balance(at)
+    k, count = len(mechanism.driven), len(mechanism.free)
     # the same in every posture, so that what is searched for are forces
-    scale = here.largest_part(here.solve()) or 1.0
+    scale = balances.scale(at) or 1.0
 
     def off(there: Posture) -> Floats:
-        return np.asarray(balance(there).solve().unbalanced[k:] / scale)
+        return np.asarray(balances.solve(there).unbalanced[k:] / scale)
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
         return at
