@@ -62,9 +62,9 @@ def separated_modes(
     waiting = list(range(len(runs)))
     while waiting:
         source = waiting.pop(0)
+        pushed = np.hstack([M[:, runs[source]] @ moved[source] for M in couplings])
         for target, run in enumerate(runs):
-            pushed = np.hstack([M[run, runs[source]] @ moved[source] for M in couplings])
-            wider = _widened(moved[target], pushed, COUPLED)
+            wider = _widened(moved[target], pushed[run], COUPLED)
             if wider.shape[1] > moved[target].shape[1]:
                 moved[target] = wider
                 waiting.append(target)
@@ -94,7 +94,12 @@ def _scaled(matrix: Floats, runs: list[slice]) -> Floats:
 
 def _widened(basis: Floats, columns: Floats, level: float) -> Floats:
     """An orthonormal basis (k, b), widened by what of columns (k, c) lies outside it, by more than a level."""
+    if basis.shape[0] == basis.shape[1] or np.linalg.norm(columns) <= level:
+        return basis
     outside = columns - basis @ (basis.T @ columns)
+    outside -= basis @ (
+        basis.T @ outside
+    )  # what rounding has left, which would grow as a small rest gets length 1
     ways, sizes, _ = np.linalg.svd(outside, full_matrices=False)
     return np.hstack([basis, ways[:, sizes > level]])
 
