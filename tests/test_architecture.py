@@ -21,7 +21,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml"))
 
 # Numbers flow from left to right: a package imports itself and what stands before it.
-FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "study", "show")
+FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "identify", "study", "show")
 # Device files become models and loops; what computes knows nothing of files.
 EVERYWHERE = {
     "compiled",
@@ -41,6 +41,7 @@ MAY_IMPORT |= {module: set() for module in EVERYWHERE}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
 MAY_IMPORT["cuda_kernels"] = {"tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
+MAY_IMPORT["identify"].add("device")
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")
 MAY_IMPORT["__main__"] = {"show"}

@@ -30,11 +30,19 @@ def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = Fals
     Raises  UnreadableFileError  where there is none, for anything else than a plain file, for one that is larger,
                                  and where the system refuses to read it
     """
+    data = read_head(path, largest + 1, pipes=pipes)
+    if len(data) > largest:
+        raise UnreadableFileError(f"is larger than {largest // 1_000_000} MB")
+    return data
+
+
+def read_head(path: str | os.PathLike[str], most: int, *, pipes: bool = False) -> bytes:
+    """The first bytes of a plain file, at most so many; as `read_plain`, but for its size."""
     try:
         if wrong := _no_plain_file(os.stat(path).st_mode, pipes):
             raise UnreadableFileError(wrong)
         with open(path, "rb") as stream:
-            data = stream.read(largest + 1)
+            return stream.read(most)
     except FileNotFoundError:
         raise UnreadableFileError("no such file", missing=True) from None
     except OSError as error:
@@ -44,9 +52,6 @@ def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = Fals
         if isinstance(error, UnreadableFileError):
             raise
         raise UnreadableFileError("cannot be read: its name holds a zero byte") from None
-    if len(data) > largest:
-        raise UnreadableFileError(f"is larger than {largest // 1_000_000} MB")
-    return data
 
 
 def _no_plain_file(mode: int, pipes: bool) -> str:

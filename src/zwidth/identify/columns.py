@@ -1,0 +1,78 @@
+"""Which columns a kind of measurement has, and what is wrong with those of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from zwidth.device.text_file import header_fault
+
+# Unit that a column is named by -> units that people record it in, and by what they are multiplied.
+OTHER_UNITS: Final = {
+    "rad": {
+        "deg": "pi/180",
+        "degree": "pi/180",
+        "degrees": "pi/180",
+        "mrad": "0.001",
+        "rev": "2 pi",
+        "counts": "",
+    },
+    "m": {"mm": "0.001", "um": "1e-6", "cm": "0.01", "counts": ""},
+    "N": {"mN": "0.001", "kN": "1000", "V": ""},
+    "Nm": {"mNm": "0.001", "Nmm": "0.001", "mN_m": "0.001", "V": ""},
+    "s": {"ms": "0.001", "us": "1e-6", "min": "60"},
+    "A": {"mA": "0.001"},
+    "Hz": {"kHz": "1000", "rad_per_s": "1/(2 pi)"},
+    "N_per_m": {"N_per_mm": "1000"},
+    "Ns_per_m": {"Ns_per_mm": "1000"},
+}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns that a kind of measurement has.
+
+    needed    each of them, or one of several where they are alternatives: ("time_s", ("force_N", "torque_Nm"))
+    optional  numbers that are read where they are there
+    text      the same, words or numbers: names of joints, of those who held the device
+    """
+
+    needed: tuple[str | tuple[str, ...], ...]
+    optional: tuple[str, ...] = ()
+    text: tuple[str, ...] = ()
+
+    @property
+    def listed(self) -> str:
+        """The needed columns as messages name them."""
+        return ", ".join(one if isinstance(one, str) else " or ".join(one) for one in self.needed)
+
+    def choose(self, names: Sequence[str]) -> tuple[list[str], str]:
+        """The columns to read of those that a table has, and what is wrong with them; "" if nothing."""
+        chosen, faults = list[str](), list[str]()
+        for one in self.needed:
+            choices = (one,) if isinstance(one, str) else one
+            present = [name for name in choices if name in names]
+            if len(present) > 1:
+                faults.append(f"columns {' and '.join(present)} are alternatives; keep one of them")
+            elif not present:
+                faults.append(f"column {' or '.join(choices)} is missing{self._other_unit(choices, names)}")
+            chosen += present[:1]
+        chosen += [name for name in (*self.optional, *self.text) if name in names]
+        if twice := header_fault(names, [], chosen).partition(";")[0]:
+            faults.append(twice)
+        if faults and not any("multiply" in fault for fault in faults):
+            separated = header_fault(names, chosen or ["?"]).partition(": ")[2] if len(names) == 1 else ""
+            faults.append(separated or f"needed are {self.listed}")
+        return chosen, "; ".join(faults)
+
+    @staticmethod
+    def _other_unit(choices: Sequence[str], names: Sequence[str]) -> str:
+        """A hint where a column of the same quantity in another unit is there."""
+        for choice in choices:
+            quantity, _, unit = choice.partition("_")
+            for other, factor in OTHER_UNITS.get(unit, {}).items():
+                if f"{quantity}_{other}" in names:
+                    by = f"multiply by {factor}" if factor else "multiply by the value of one"
+                    return f"; {quantity}_{other} is there: {by} and name it {choice}"
+        return ""

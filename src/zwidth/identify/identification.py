@@ -1,0 +1,158 @@
+"""What was identified: the checks that the data passed, the numbers with their intervals, and the validation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite, nan
+from typing import Any
+
+from zwidth.result import Result
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that the data must be, before anything is fitted.
+
+    what     is checked, a noun: "motion"
+    passed   whether the data are so
+    reason   what was seen of it, and where it failed what to record instead
+    warning  it failed, and the fit is made all the same: a remark that a reader must see
+    """
+
+    what: str
+    passed: bool
+    reason: str
+    warning: bool = False
+
+    def document(self) -> dict[str, Any]:
+        """The check as --json has it."""
+        return {"what": self.what, "passed": self.passed, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with the interval that holds it with 95 %.
+
+    name   what it is, a noun: "backlash"
+    value  best estimate
+    low, high  ends of the interval; -inf or inf where the data set no bound
+    unit   in words as users read it; "" for a share
+    path   of the number in the device file, as `--set` takes it; "" where the file has no such key
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    path: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """The number as --json has it; an end without bound is null."""
+        return {
+            "name": self.name,
+            "path": self.path or None,
+            "value": self.value,
+            "low": self.low if isfinite(self.low) else None,
+            "high": self.high if isfinite(self.high) else None,
+            "unit": self.unit,
+        }
+
+
+class IdentificationError(ValueError):
+    """A number was asked for that the data do not give; the text says why."""
+
+
+@dataclass(frozen=True, repr=False)
+class Identification(Result):
+    """Numbers of a device from measurements of it.
+
+    kind         of measurement: "stiffness", "modes", ...
+    label        the device, for people
+    checks       in the order in which they were made
+    estimates    the numbers; () where a check refuses the data
+    validation   share of the unseen part's motion (or torque) that is explained: 1 minus the residual's variance
+                 over the signal's; nan where nothing was fitted
+    validated_on what the unseen part was, and how it was predicted, a sentence
+    remarks      sentences about what was seen beside the numbers
+    curves       columns of what was measured and fitted, for figures and .csv, by kind
+    details      further numbers of the kind, keys and values of --json
+    """
+
+    kind: str
+    label: str
+    checks: tuple[Check, ...]
+    estimates: tuple[Estimate, ...] = ()
+    validation: float = nan
+    validated_on: str = ""
+    remarks: tuple[str, ...] = ()
+    curves: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def reason(self) -> str | None:
+        """Why nothing was fitted; None where something was."""
+        if self.estimates:
+            return None
+        failed = [f"{check.what}: {check.reason}" for check in self.checks if not (check.passed or check.warning)]
+        return "; ".join(failed) or "the data tell no number"
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of this name or path. Raises IdentificationError."""
+        for estimate in self.estimates:
+            if name in (estimate.name, estimate.path):
+                return estimate
+        names = ", ".join(estimate.path or estimate.name for estimate in self.estimates)
+        raise IdentificationError(f"{name!r} was not identified: {self.reason or f'identified are {names}'}")
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Path -> value of all numbers that a device file holds, as `Device.with_` takes them."""
+        return {one.path: one.value for one in self.estimates if one.path}
+
+    def document(self) -> dict[str, Any]:
+        """Keys and values of --json."""
+        return {
+            "kind": self.kind,
+            "check": [check.document() for check in self.checks],
+            "parameters": [estimate.document() for estimate in self.estimates],
+            "validation": self.validation,
+            "validated_on": self.validated_on,
+            "remarks": list(self.remarks),
+            **self.details,
+        }
+
+    def table(self) -> Mapping[str, Any]:
+        """Columns of what was measured and fitted."""
+        return self.curves
+
+    def __repr__(self) -> str:
+        lines = [f"Identification of {self.kind}, {self.label}"]
+        if self.reason:
+            return "\n".join([*lines, f"  nothing fitted: {self.reason}"])
+        for one in self.estimates:
+            lines.append(f"  {one.path or one.name} = {one.value:.5g}, {interval(one)} {one.unit}".rstrip())
+        return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
+
+
+def interval(estimate: Estimate) -> str:
+    """The interval in words.
+
+    >>> interval(Estimate("mass", 0.1, 0.05, inf, "kg"))
+    'above 0.05'
+    """
+    if estimate.low == -inf and estimate.high == inf:
+        return "without bound"
+    if estimate.low == -inf:
+        return f"below {estimate.high:.4g}"
+    if estimate.high == inf:
+        return f"above {estimate.low:.4g}"
+    return f"{estimate.low:.4g} to {estimate.high:.4g}"
+
+
+def refused(kind: str, label: str, checks: Sequence[Check]) -> Identification | None:
+    """The identification that a failed check leaves, without numbers; None where the data may be fitted."""
+    if all(check.passed or check.warning for check in checks):
+        return None
+    return Identification(kind, label, tuple(checks))

@@ -1,0 +1,176 @@
+"""Nonlinear least squares whose intervals follow the shape of the likelihood, not only its curvature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Residuals = Callable[[Floats], Floats]
+
+LEVEL: Final = 0.95
+MOST_STEPS: Final = 40  # towards one end of an interval
+CLOSE: Final = 1e-3  # share of the half width to which an end is found
+FARTHEST: Final = 1e3  # half widths by curvature, beyond which the data set no bound
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters that make a sum of squares least.
+
+    values       (p,) of the parameters
+    low, high    (p,) ends of their intervals; -inf, inf where the data set no bound
+    covariance   (p, p) of their errors by the curvature; inf where a parameter changes nothing
+    residuals    (n,) that remain
+    scale        standard deviation of the residuals, 1 where it was known beforehand
+    freedom      residuals less parameters
+    converged    whether the optimiser says that it has arrived
+    """
+
+    values: Floats
+    low: Floats
+    high: Floats
+    covariance: Floats
+    residuals: Floats
+    scale: float
+    freedom: float
+    converged: bool
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of the residuals."""
+        return float(np.sum(self.residuals**2))
+
+
+def fit_least_squares(
+    residuals: Residuals,
+    start: ArrayLike,
+    *,
+    lower: ArrayLike = -np.inf,
+    upper: ArrayLike = np.inf,
+    known_scale: bool = False,
+    effective_count: float | None = None,
+    level: float = LEVEL,
+    profiled: bool = True,
+) -> Fit:
+    """Parameters x that make |r(x)|^2 least, each with its interval by the profile likelihood.
+
+    An end of the interval of x_i is where the least sum of squares over the other parameters has risen by q^2 s^2
+    (Venzon and Moolgavkar 1988, known at second hand), q the two-sided quantile of Student's distribution, and of
+    the normal one where the deviation of the residuals is known beforehand. To first order it is x_i +- q sigma_i.
+
+    residuals        r (n,) of parameters (p,), each divided by its standard deviation or by what is proportional
+                     to it; independent of each other
+    start            (p,) where the search begins
+    lower, upper     (p,) bounds of the parameters
+    known_scale      the residuals have the standard deviation 1
+    effective_count  number of independent residuals where they are fewer than n, as of overlapping segments
+    profiled         False: intervals by the curvature alone, q sigma_i
+    Raises           ValueError  for fewer residuals than parameters, or some that are no numbers at the start
+    """
+    from scipy.optimize import least_squares
+    from scipy.stats import norm, t
+
+    x0 = np.atleast_1d(np.asarray(start, dtype=float))
+    low, high = np.broadcast_to(lower, x0.shape), np.broadcast_to(upper, x0.shape)
+    first = residuals(x0)
+    if len(first) < len(x0) or not np.all(np.isfinite(first)):
+        raise ValueError(f"{len(first)} residuals for {len(x0)} parameters, or some are no finite numbers")
+    solved = least_squares(residuals, x0, bounds=(low, high), x_scale="jac", xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    x, r = np.asarray(solved.x), np.asarray(solved.fun)
+    count = len(r) if effective_count is None else effective_count
+    thinned = count / len(r)  # each residual counts for so much of an independent one
+    freedom = max(count - len(x), 1.0)
+    scale = 1.0 if known_scale else float(np.sqrt(np.sum(r**2) * thinned / freedom))
+    covariance = _covariance(np.asarray(solved.jac)) * scale**2 / thinned
+    tail = 0.5 + 0.5 * level
+    quantile = float(norm.ppf(tail) if known_scale else t.ppf(tail, freedom))
+    sigma = np.sqrt(np.diag(covariance))
+    ends = np.stack([x - quantile * sigma, x + quantile * sigma])
+    if profiled and scale > 0.0:
+        rise = (quantile * scale) ** 2 / thinned
+        search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high)
+        for i in range(len(x)):
+            for side in (0, 1):
+                ends[side, i] = search.end(i, ends[side, i])
+    ends = np.where(np.isfinite(ends), ends, np.array([[-np.inf], [np.inf]]))
+    return Fit(x, ends[0], ends[1], covariance, r, scale, freedom, bool(solved.status > 0))
+
+
+def _covariance(jacobian: Floats) -> Floats:
+    """(J^T J)^-1; infinite variance of parameters that the residuals do not feel."""
+    _, size, rows = np.linalg.svd(jacobian, full_matrices=False)
+    felt = size > 1e-12 * np.max(size, initial=1e-300)
+    inverse = rows[felt].T / size[felt]
+    covariance = np.asarray(inverse @ inverse.T)
+    lost = np.any(np.abs(rows[~felt]) > 1e-6, axis=0)
+    covariance[lost, lost] = np.inf
+    return covariance
+
+
+@dataclass(frozen=True)
+class _EndSearch:
+    """Where the least sum of squares has risen by `rise` above `least`, along one parameter."""
+
+    residuals: Residuals
+    best: Floats
+    least: float
+    rise: float
+    lower: Floats
+    upper: Floats
+
+    def end(self, i: int, guess: float) -> float:
+        """The end of parameter i's interval on the side of a guess; -inf, inf where there is none within its
+        bounds or FARTHEST widths."""
+        towards = np.sign(guess - self.best[i]) or 1.0
+        if not np.isfinite(guess):
+            return float(towards * np.inf)
+        bound = self.upper[i] if towards > 0 else self.lower[i]
+        width = abs(guess - self.best[i])
+        inner, outer = 0.0, np.nan  # steps with a rise below and above the wanted one
+        step, rest = width, self.best.copy()
+        rises = {0.0: 0.0}
+        for _ in range(MOST_STEPS):
+            step = min(step, abs(bound - self.best[i]))
+            risen, rest = self._risen(i, self.best[i] + towards * step, rest)
+            rises[step] = root = float(np.sqrt(max(risen, 0.0) / self.rise))
+            if root < 1.0:
+                inner = step
+                if step >= abs(bound - self.best[i]) or step > FARTHEST * width:
+                    return float(towards * np.inf)
+            else:
+                outer = step
+            if abs(root - 1.0) < CLOSE or (outer - inner) < CLOSE * width:
+                break
+            step = self._next(inner, outer, rises)
+        return float(self.best[i] + towards * step)
+
+    def _next(self, inner: float, outer: float, rises: dict[float, float]) -> float:
+        """The next step: the root of the rise is nearly a straight line over it."""
+        if np.isnan(outer):
+            return inner * float(np.clip(1.0 / max(rises[inner], 0.1), 1.2, 4.0))
+        share = (1.0 - rises[inner]) / (rises[outer] - rises[inner])
+        return inner + float(np.clip(share, 0.1, 0.9)) * (outer - inner)
+
+    def _risen(self, i: int, fixed: float, start: Floats) -> tuple[float, Floats]:
+        """By how much the least sum of squares with parameter i held exceeds the least of all, and its place."""
+        from scipy.optimize import least_squares
+
+        others = np.arange(len(self.best)) != i
+
+        def held(some: Floats) -> Floats:
+            x = np.empty(len(self.best))
+            x[others], x[i] = some, fixed
+            return self.residuals(x)
+
+        if not others.any():
+            return float(np.sum(held(np.zeros(0)) ** 2)) - self.least, self.best.copy()
+        bounds = (self.lower[others], self.upper[others])
+        solved = least_squares(held, start[others], bounds=bounds, x_scale="jac", xtol=1e-8, ftol=1e-10)
+        place = np.empty(len(self.best))
+        place[others], place[i] = solved.x, fixed
+        return 2.0 * float(solved.cost) - self.least, place
