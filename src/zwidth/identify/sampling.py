@@ -106,8 +106,8 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[Samplin
     if uneven > MOST_UNEVEN * row:
         return failed(
             f"{uneven} of {row} rows of {record.label} do not follow the one before by {usual:.6g} s or a "
-            f"multiple of it, first at {record.place(first_uneven)}; record every sample of the loop, with its own "
-            "time"
+            f"multiple of it, first at {record.place(first_uneven)}; record every sample of the loop, with "
+            "its own time"
         )
     count, mean = max(sums[0], 1.0), sums[1] / max(sums[0], 1.0)
     jitter = usual * float(np.sqrt(max(sums[2] / count - mean**2, 0.0)))
