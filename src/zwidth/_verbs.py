@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
     from zwidth.guarantees.loop_guarantees import Guarantees
+    from zwidth.identify.identification import Identification
     from zwidth.loop.loop import Loop
     from zwidth.loop.multi_loop import MultiLoop
     from zwidth.loop.operating_point import OperatingPoint
@@ -82,6 +83,19 @@ def device_bending(device: Device, point: OperatingPoint | None) -> Bending | No
     from zwidth.study.bending import bending
 
     return bending(device, point)
+
+
+def device_identify(
+    device: Device,
+    kind: str,
+    records: Any,
+    point: OperatingPoint | None,
+    progress: Progress | None,
+    options: dict[str, Any],
+) -> Identification:
+    from zwidth.identify.kinds import identify
+
+    return identify(device, kind, records, point=point, progress=progress, **options)
 
 
 def device_report(device: Device, path: Any, point: OperatingPoint) -> dict[str, Any]:

@@ -24,6 +24,7 @@ def test_the_commands_are_those_promised():
         "compile",
         "new",
         "import",
+        "identify",
         "show",
         "chart",
         "check",

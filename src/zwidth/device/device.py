@@ -25,6 +25,7 @@ from zwidth.model.response import Response
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
     from zwidth.chart.verdict import WallVerdicts
+    from zwidth.identify.identification import Identification
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.loop.posed_device import Position
     from zwidth.loop.wall_matrices import WallMatrices
@@ -346,6 +347,27 @@ class Device:
         point  where: `device.at(...)`; left out: the reference
         """
         return _verbs.device_bending(self, point)
+
+    def identify(
+        self,
+        kind: str,
+        records: Any,
+        *,
+        point: OperatingPoint | None = None,
+        progress: Progress | None = None,
+        **options: Any,
+    ) -> Identification:
+        """Numbers of this device from measurements of it, each with its 95 % interval; see `identify.kinds`.
+
+            found = device.identify("stiffness", "strokes.csv", joint="upper-right")
+            measured = device.with_(found.settings)
+
+        kind     "stiffness" and others, see `identify.kinds.KINDS`
+        records  a file (.csv, .mat), columns as a mapping or an xarray dataset; or a list of such, each a run
+        point    where it was measured, for kinds that hang on it; left out: the reference
+        options  of the kind
+        """
+        return _verbs.device_identify(self, kind, records, point, progress, options)
 
     def report(self, path: str | os.PathLike[str], point: OperatingPoint | None = None) -> dict[str, Any]:
         """Write everything about the device into one HTML file; returns the numbers in it. See `write_report`.

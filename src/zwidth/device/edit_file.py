@@ -13,12 +13,14 @@ from zwidth.device.read import LARGEST_FILE
 from zwidth.device.text_file import UnreadableFileError, read_text
 
 
-def edited_text(path: str | os.PathLike[str], settings: Mapping[str, Any], source: str = "") -> str:
+def edited_text(
+    path: str | os.PathLike[str], settings: Mapping[str, Any], sources: Mapping[str, str] | None = None
+) -> str:
     """The text of a device file with numbers set as `Device.with_` sets them; what it does not change stands as it
     is written.
 
     settings  path -> value; `address.UNSET` removes a key
-    source    where the numbers come from, noted under [sources] for each of them; "": nothing is noted
+    sources   path -> where its number comes from, which is noted under [sources]
     Raises    DeviceError  for a file that cannot be read, or paths that lead nowhere
     """
     import tomlkit
@@ -34,10 +36,10 @@ def edited_text(path: str | os.PathLike[str], settings: Mapping[str, Any], sourc
     before = document.unwrap()
     after = address.apply(before, list(settings.items()))
     _carry_over(document, before, after)
-    if source:
+    if sources:
         noted = document.setdefault("sources", tomlkit.table())
-        for steps in settings:
-            noted[dotted(address.resolve(after, steps), after)] = source
+        for path_of_number, source in sources.items():
+            noted[dotted(address.resolve(after, path_of_number), after)] = source
     return tomlkit.dumps(document)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf, isfinite, nan
+from math import ceil, inf, isfinite, log10, nan
 from typing import Any
 
 from zwidth.result import Result
@@ -132,23 +132,42 @@ class Identification(Result):
         if self.reason:
             return "\n".join([*lines, f"  nothing fitted: {self.reason}"])
         for one in self.estimates:
-            lines.append(f"  {one.path or one.name} = {one.value:.5g}, {interval(one)} {one.unit}".rstrip())
+            lines.append(f"  {one.path or one.name} = {value_text(one)}, {interval(one)} {one.unit}".rstrip())
         return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
 
 
 def interval(estimate: Estimate) -> str:
-    """The interval in words.
+    """The interval in words, its ends with as many digits as tell them apart.
 
-    >>> interval(Estimate("mass", 0.1, 0.05, inf, "kg"))
-    'above 0.05'
+    >>> interval(Estimate("mass", 0.1, 0.05, inf, "kg")), interval(Estimate("mass", 0.1, 0.09996, 0.10004, "kg"))
+    ('above 0.05', '0.09996 to 0.10004')
     """
+    digits = _digits(estimate)
+    low, high = f"{estimate.low:.{digits}g}", f"{estimate.high:.{digits}g}"
     if estimate.low == -inf and estimate.high == inf:
         return "without bound"
     if estimate.low == -inf:
-        return f"below {estimate.high:.4g}"
-    if estimate.high == inf:
-        return f"above {estimate.low:.4g}"
-    return f"{estimate.low:.4g} to {estimate.high:.4g}"
+        return f"below {high}"
+    return f"above {low}" if estimate.high == inf else f"{low} to {high}"
+
+
+def value_text(estimate: Estimate) -> str:
+    """The value with the digits of its interval."""
+    return f"{estimate.value:.{_digits(estimate)}g}"
+
+
+def written_value(estimate: Estimate) -> float:
+    """The value as a device file gets it: two digits more than its interval tells."""
+    return float(f"{estimate.value:.{_digits(estimate) + 2}g}")
+
+
+def _digits(estimate: Estimate) -> int:
+    """Significant digits of which the last two differ between the ends of the interval."""
+    width = estimate.high - estimate.low
+    largest = max((abs(one) for one in (estimate.low, estimate.high) if isfinite(one)), default=0.0)
+    if not isfinite(width) or width <= 0.0 or largest == 0.0:
+        return 4
+    return min(max(2 + ceil(log10(largest / width)), 2), 12)
 
 
 def refused(kind: str, label: str, checks: Sequence[Check]) -> Identification | None:

@@ -18,6 +18,7 @@ COMMANDS: Final = {
     "compile": ("compile", "compile_command"),
     "new": ("new", "NewCommand"),
     "import": ("import_", "ImportCommand"),
+    "identify": ("identify", "identify"),
     "show": ("show", "ShowCommand"),
     "chart": ("chart", "ChartCommand"),
     "check": ("check", "CheckCommand"),

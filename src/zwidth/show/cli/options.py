@@ -230,6 +230,14 @@ class DirectionType(Numbers):
         return value if value in EXTREMES else super().convert(value, param, ctx)
 
 
+with_settings_option: Final = click.option(
+    "--set",
+    "settings",
+    metavar="PATH=VALUE",
+    multiple=True,
+    help="Change a number of the device file; repeatable. PATH=unset removes it.",
+)
+
 LOAD_OPTIONS: Final = (
     click.option(
         "--load",
@@ -332,13 +340,7 @@ def _with_device_options(command: Callback, *where: Any) -> Callback:
             help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
             "[operator] of DEVICE.",
         ),
-        click.option(
-            "--set",
-            "settings",
-            metavar="PATH=VALUE",
-            multiple=True,
-            help="Change a number of the device file; repeatable. PATH=unset removes it.",
-        ),
+        with_settings_option,
     ]
 
     takes_loads = LOAD_OPTIONS[0] in where

@@ -263,6 +263,12 @@ def _mechanism_motion(ax: Axes, motion: Any) -> None:
     draw_close_up(ax, motion)
 
 
+def _identification(ax: Axes, result: Any) -> None:
+    from zwidth.show.figures.identify import draw_identification
+
+    draw_identification(ax, result)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "RobustChart": _robust,
@@ -289,4 +295,5 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Validity": _validity,
     "Sweep": _sweep,
     "CommonArea": _common_area,
+    "Identification": _identification,
 }
