@@ -1,6 +1,7 @@
 """A bench on which a motor pulls at its blocked transmission: torque over angle, made by the play operator.
 
-Dry friction lets the elastic torque g(angle) lag within +-T_c of the motor's: the exact motion of a massless shaft.
+Dry friction lets the elastic torque g(angle) lag within +-T_c of the motor's: the exact motion of a massless
+shaft.
 Nothing here is taken from the package.
 """
 
@@ -22,6 +23,8 @@ def bent_angles(torque, friction, *, span=None, **spring):
     """Angles (n,) of the shaft under torques (n,), at first at rest."""
     reach = 3.0 * np.max(np.abs(torque)) / min(spring["forward"], spring.get("backward") or spring["forward"])
     grid = np.linspace(-reach - spring.get("play", 0.0), reach + spring.get("play", 0.0), 400_001)
+    if spring.get("hardening", 0.0) < 0.0:  # up to where it has softened to nothing
+        grid = grid[np.abs(grid) < np.sqrt(spring["forward"] / 3.0 / -spring["hardening"])]
     table = elastic_torque(grid, **spring) + 1e-9 * grid
     elastic, held = np.empty_like(torque), 0.0
     for row, now in enumerate(torque):

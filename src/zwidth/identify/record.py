@@ -84,8 +84,10 @@ class ArrayRecord(Record):
 class CsvRecord(Record):
     """A record in a CSV file, which is read again each time that its pieces are asked for."""
 
-    def __init__(self, path: Path, names: Sequence[str], text: Sequence[str]) -> None:
+    def __init__(self, path: Path, header: Sequence[str], names: Sequence[str], text: Sequence[str]) -> None:
         self.label, self.names, self._path = str(path), tuple(names), path
+        # columns that are not read may have no name, or one that is there twice
+        self._header = [name if name in names else f"column {number}" for number, name in enumerate(header)]
         self.text = tuple(name for name in names if name in text)
 
     def pieces(self, rows: int = ROWS) -> Iterator[Piece]:
@@ -96,6 +98,8 @@ class CsvRecord(Record):
         try:
             with pandas.read_csv(
                 self._path,
+                names=self._header,
+                header=0,
                 usecols=list(self.names),
                 dtype=kinds,
                 chunksize=rows,
@@ -137,9 +141,6 @@ class CsvRecord(Record):
         rows = self._rows()
         _, header = next(rows)
         for line, cells in rows:
-            if len(cells) > len(header):
-                text = f"has {len(cells)} cells, but the header names {plural(len(header), 'column')}"
-                faults.append(Fault(self.label, f"line {line}", f"{text}; write a decimal point, not a comma"))
             for name in self.names:
                 at = header.index(name)
                 cell = cells[at] if at < len(cells) else ""
@@ -166,14 +167,25 @@ def read_record(path: str | os.PathLike[str], wanted: Columns) -> Record:
         text = decode(head[: head.rfind(b"\n") + 1] or head)
     except UnreadableFileError as error:
         raise fail(str(file), "", f"{error}; give a CSV or .mat file with columns {wanted.listed}") from None
-    for number, line in enumerate(text.splitlines()):
-        if not line.strip(", \t"):
+    lines = csv.reader(text.splitlines())
+    for header in lines:
+        if not any(cell.strip() for cell in header):
             continue
-        names, wrong = wanted.choose([name.strip() for name in next(csv.reader([line]))])
+        names, wrong = wanted.choose([name.strip() for name in header])
         if wrong:
-            raise fail(str(file), f"line {number + 1}", wrong)
-        return CsvRecord(file, names, wanted.text)
+            raise fail(str(file), f"line {lines.line_num}", wrong)
+        _refuse_longer_rows(str(file), len(header), lines)
+        return CsvRecord(file, [name.strip() for name in header], names, wanted.text)
     raise fail(str(file), "", f"is empty; its first line must name columns: {wanted.listed}")
+
+
+def _refuse_longer_rows(label: str, width: int, lines: Any) -> None:
+    """Raise DeviceError for the first row of a csv.reader with more cells than the header names, as decimal commas
+    make them."""
+    for row in lines:
+        if any(cell.strip() for cell in row[width:]):
+            wrong = f"has {len(row)} cells, but the header names {plural(width, 'column')}"
+            raise fail(label, f"line {lines.line_num}", f"{wrong}; write decimal points, no commas")
 
 
 def record_of(columns: Mapping[str, ArrayLike] | Any, wanted: Columns, label: str = "record") -> Record:

@@ -32,7 +32,7 @@ def draw_stiffness(ax: Axes, result: Identification) -> None:
                 linewidths=0.6,
                 label=f"{name}measured, {word}",
             )
-        _draw_spring(ax, curves, mine, f"{name}fitted spring and friction" if number == 0 else "")
+        _draw_spring(ax, curves, mine, "fitted spring and friction" if number == 0 else "")
     ax.axhline(0.0, color=GREY, linewidth=0.6)
     ax.axvline(0.0, color=GREY, linewidth=0.6)
     label(ax.xaxis, "Angle at the motor's shaft", "rad")
