@@ -31,6 +31,7 @@ EXCLUSIVE: Final = ({"play", "preload"}, {"angle drift", "torque drift"})
 SEEN: Final = 4.0  # standard errors from zero, from which an extension counts
 WORTH: Final = 0.9  # of the sum of squares, that an extension must at least bring it down to
 CLUSTERS: Final = 24  # that are wanted for the intervals
+MOST_CLUSTERS: Final = 120  # of several strokes each where there are many
 FEWEST_STROKES: Final = 10  # from which each is a cluster of its own
 OUTLIER: Final = 6.0  # robust standard deviations
 MOST_OUTLIERS: Final = 0.05  # share of the bins
@@ -237,12 +238,11 @@ def _covariance(
     """
     cluster = _clusters(strokes)
     pseudo = np.linalg.pinv(jacobian)  # (p, n)
-    hat = jacobian @ pseudo
     number = int(cluster.max()) + 1
     changes = np.empty((number, jacobian.shape[1]))
     for which in range(number):
         rows = np.flatnonzero(cluster == which)
-        left = np.eye(len(rows)) - hat[np.ix_(rows, rows)]
+        left = np.eye(len(rows)) - jacobian[rows] @ pseudo[:, rows]
         changes[which] = pseudo[:, rows] @ np.linalg.lstsq(left, residuals[rows], rcond=None)[0]
     scatter = (number - 1.0) / number * changes.T @ changes
     freedom = max(number - jacobian.shape[1], 1)
@@ -273,7 +273,9 @@ def _clusters(strokes: Strokes) -> NDArray[np.int64]:
     """A number (n,) for each bin: bins of one cluster are not independent. Strokes, cut where they are few."""
     _, stroke = np.unique(strokes.stroke, return_inverse=True)
     count = int(stroke.max()) + 1
-    pieces = 1 if count >= FEWEST_STROKES else int(np.ceil(CLUSTERS / count))
+    if count >= FEWEST_STROKES:
+        return np.asarray(stroke * min(MOST_CLUSTERS, count) // count)
+    pieces = int(np.ceil(CLUSTERS / count))
     label = np.empty(len(stroke), dtype=np.int64)
     for number in range(count):
         rows = np.flatnonzero(stroke == number)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BINS: Final = 24  # of a stroke
+MOST_BINS: Final = 6000  # of a record
 LEAST_TURN: Final = 0.05  # share of the range by which the angle comes back where it turns
 TURN_COUNTS, TURN_NOISE = 3.0, 8.0  # or so many counts, or standard deviations of the noise
 SMOOTHED: Final = 40  # of a stroke, over which the torque is smoothed to find its largest value
@@ -103,14 +104,16 @@ def turning_points(angle: Floats, threshold: float) -> list[int]:
     [0, 2, 5, 6]
     """
     turns, extreme, rising = [0], 0, 0
-    for row in range(1, len(angle)):
+    readings = angle.tolist()  # Python's own numbers are compared faster, one by one
+    first = readings[0]
+    for row, reading in enumerate(readings):
         if rising == 0:
-            if abs(angle[row] - angle[0]) > threshold:
-                rising = 1 if angle[row] > angle[0] else -1
+            if abs(reading - first) > threshold:
+                rising = 1 if reading > first else -1
                 extreme = row
-        elif rising * (angle[row] - angle[extreme]) >= 0.0:
+        elif rising * (reading - readings[extreme]) >= 0.0:
             extreme = row
-        elif rising * (angle[extreme] - angle[row]) > threshold:
+        elif rising * (readings[extreme] - reading) > threshold:
             turns.append(extreme)
             extreme, rising = row, -rising
     if rising and extreme > turns[-1]:
@@ -136,7 +139,7 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
         rows = start + _moving(sign * torque[start : end + 1], sign * angle[start : end + 1], stuck)
         if len(rows) < 2:
             continue
-        for part in np.array_split(rows, min(BINS, len(rows))):
+        for part in np.array_split(rows, min(max(MOST_BINS // (len(turns) - 1), 2), BINS, len(rows))):
             place = float(np.mean(part)) / max(len(angle) - 1, 1)
             reach = 0.5 * abs(float(angle[part[-1]] - angle[part[0]])) if len(part) > 1 else 0.0
             mean = float(np.mean(torque[part])), float(np.mean(angle[part]))
