@@ -9,7 +9,7 @@ import pytest
 
 from tests.systems import published
 from zwidth.chart.chart import stability_chart
-from zwidth.study.exact_edge import exact_edge
+from zwidth.chart.edge_crossings import exact_edge
 from zwidth.study.user_points import UserPoint, compare_points
 
 POINTS = (

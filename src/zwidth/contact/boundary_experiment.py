@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.chart.edge_crossings import EdgeKind
 from zwidth.contact.line_search import (
     Brackets,
     Lines,
@@ -35,7 +36,6 @@ from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
-EdgeKind = Literal["lower", "upper", "tip"]
 Progress = Callable[[int, int], None]  # done, of how many
 
 PER_DECADE: Final = 3  # of the raster

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_crossings import EdgeKind, exact_edge
 from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
 from zwidth.contact.boundary_experiment import (
     TIP_SHARE,
-    EdgeKind,
     EdgePoint,
     StableExtent,
     find_stable_walls,
@@ -41,7 +41,6 @@ from zwidth.loop.unsupported_feedback import refuse_load
 from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator, attach
 from zwidth.progress import Progress
-from zwidth.study.exact_edge import exact_edge
 from zwidth.study.experiment_plan import Plan
 from zwidth.study.journal import Journal, fingerprint
 from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint

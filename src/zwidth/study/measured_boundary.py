@@ -9,7 +9,8 @@ from math import isnan, nan
 from typing import Any, NamedTuple
 
 from zwidth.chart.chart import StabilityChart
-from zwidth.contact.boundary_experiment import EdgeKind, EdgePoint, StableExtent
+from zwidth.chart.edge_crossings import EdgeKind
+from zwidth.contact.boundary_experiment import EdgePoint, StableExtent
 from zwidth.model.operator import Operator
 from zwidth.result import Result
 from zwidth.study.experiment_plan import Plan

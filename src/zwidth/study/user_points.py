@@ -149,7 +149,7 @@ def compare_points(chart: StabilityChart | None, points: Sequence[UserPoint]) ->
     """Compare measured points with an exact chart; None: no point has an exact value."""
     if chart is None:
         return PointsComparison(tuple(ComparedPoint(point, nan, None) for point in points))
-    from zwidth.study.exact_edge import exact_edge
+    from zwidth.chart.edge_crossings import exact_edge
 
     verdicts = chart.check([point.stiffness for point in points], [point.damping for point in points]).names
     compared = []
