@@ -51,7 +51,7 @@ def test_walls_inside_the_edge_are_those_that_eigenvalues_call_stable():
         chords = EdgeChords.of(chart)
         K0, K1, B0, B1 = chart.box
         K, B = rng.uniform(K0, K1, 200), rng.uniform(B0, B1, 200)
-        distance, _ = chords.distances(K, B, (K1 - K0, B1 - B0))
+        distance, *_ = chords.nearest(K, B, (K1 - K0, B1 - B0))
         verdict = judge(chart.loop, K, B).verdict
         clear, stable = (np.abs(distance) > 1e-5) & (verdict != 0), verdict > 0
         assert clear.any()
@@ -63,7 +63,7 @@ def test_a_distance_is_the_shortest_way_to_the_edge():
     chart = stability_chart(published(), decay=False)
     chords = EdgeChords.of(chart)
     scales = (2000.0, 5.0)
-    distance, _ = chords.distances(np.array([4000.0]), np.array([10.0]), scales)
+    distance, *_ = chords.nearest(np.array([4000.0]), np.array([10.0]), scales)
     around = np.linspace(0.0, 2.0 * np.pi, 400)
     for radius, inside in ((0.999, True), (1.001, False)):
         reach = radius * distance[0]

@@ -136,25 +136,28 @@ class EdgeChords:
             y = y0 + (at - x0) * (y1 - y0) / (x1 - x0)
         return np.asarray(np.sum(np.where(crossed & (y > above), np.sign(x0 - x1), 0.0), axis=1) > 0.0)
 
-    def distances(self, stiffness: Floats, damping: Floats, scales: tuple[float, float]) -> tuple[Floats, Floats]:
-        """Distances (m,) of walls from the edge, positive where they are stable, and the frequency there [Hz].
+    def nearest(
+        self, stiffness: Floats, damping: Floats, scales: tuple[float, float]
+    ) -> tuple[Floats, Floats, Floats]:
+        """Distances (m,) of walls from the edge, positive where they are stable; the frequency there [Hz] (m,); and
+        the nearest walls on the edge (m, 2).
 
         scales   a stiffness [N/m] and a damping [N s/m] that count as one unit of distance each
-        Returns  -inf and nan where nothing is stable
+        Returns  where nothing is stable: minus the distance from the origin, nan, and the origin
         """
+        unit, walls = np.array(scales), np.column_stack([stiffness, damping])
         if not len(self):
-            return np.full(len(stiffness), -np.inf), np.full(len(stiffness), np.nan)
-        unit = np.array(scales)
+            away = np.linalg.norm(walls / unit, axis=1)
+            return -away, np.full(len(walls), np.nan), np.zeros_like(walls)
         first, along = self.first / unit, (self.last - self.first) / unit
-        walls = np.column_stack([stiffness, damping]) / unit
-        length = np.maximum(np.sum(along**2, axis=1), 1e-300)
-        away = walls[:, None, :] - first
-        share = np.clip(np.sum(away * along, axis=2) / length, 0.0, 1.0)
-        distance = np.linalg.norm(away - share[..., None] * along, axis=2)
+        apart = (walls / unit)[:, None, :] - first
+        share = np.clip(np.sum(apart * along, axis=2) / np.maximum(np.sum(along**2, axis=1), 1e-300), 0.0, 1.0)
+        distance = np.linalg.norm(apart - share[..., None] * along, axis=2)
         chord, row = np.argmin(distance, axis=1), np.arange(len(walls))
         ends, s = self.frequency[chord], share[row, chord]
-        sign = np.where(self.inside(np.asarray(stiffness), np.asarray(damping)), 1.0, -1.0)
-        return sign * distance[row, chord], ends[:, 0] + s * (ends[:, 1] - ends[:, 0])
+        sign = np.where(self.inside(walls[:, 0], walls[:, 1]), 1.0, -1.0)
+        on_edge = self.first[chord] + s[:, None] * (self.last - self.first)[chord]
+        return sign * distance[row, chord], ends[:, 0] + s * (ends[:, 1] - ends[:, 0]), on_edge
 
 
 def exact_edge(chart: Chart, stiffness: float, damping: float, edge: EdgeKind | None = None) -> float:
