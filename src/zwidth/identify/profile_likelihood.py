@@ -53,7 +53,9 @@ def fit_least_squares(
     lower: ArrayLike = -np.inf,
     upper: ArrayLike = np.inf,
     known_scale: bool = False,
+    scale_freedom: float | None = None,
     effective_count: float | None = None,
+    diff_step: float | None = None,
     level: float = LEVEL,
     profiled: bool = True,
 ) -> Fit:
@@ -68,7 +70,9 @@ def fit_least_squares(
     start            (p,) where the search begins
     lower, upper     (p,) bounds of the parameters
     known_scale      the residuals have the standard deviation 1
+    scale_freedom    degrees of freedom by which that deviation was estimated; None: it is known exactly
     effective_count  number of independent residuals where they are fewer than n, as of overlapping segments
+    diff_step        relative step of the derivatives, for residuals that are not computed to rounding; None: 1.5e-8
     profiled         False: intervals by the curvature alone, q sigma_i
     Raises           ValueError  for fewer residuals than parameters, or some that are no numbers at the start
     """
@@ -80,7 +84,16 @@ def fit_least_squares(
     first = residuals(x0)
     if len(first) < len(x0) or not np.all(np.isfinite(first)):
         raise ValueError(f"{len(first)} residuals for {len(x0)} parameters, or some are no finite numbers")
-    solved = least_squares(residuals, x0, bounds=(low, high), x_scale="jac", xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    solved = least_squares(
+        residuals,
+        x0,
+        bounds=(low, high),
+        x_scale="jac",
+        diff_step=diff_step,
+        xtol=1e-10,
+        ftol=1e-12,
+        gtol=1e-12,
+    )
     x, r = np.asarray(solved.x), np.asarray(solved.fun)
     count = len(r) if effective_count is None else effective_count
     thinned = count / len(r)  # each residual counts for so much of an independent one
@@ -88,12 +101,13 @@ def fit_least_squares(
     scale = 1.0 if known_scale else float(np.sqrt(np.sum(r**2) * thinned / freedom))
     covariance = _covariance(np.asarray(solved.jac)) * scale**2 / thinned
     tail = 0.5 + 0.5 * level
-    quantile = float(norm.ppf(tail) if known_scale else t.ppf(tail, freedom))
+    scale_known_by = scale_freedom if known_scale else freedom
+    quantile = float(norm.ppf(tail) if scale_known_by is None else t.ppf(tail, scale_known_by))
     sigma = np.sqrt(np.diag(covariance))
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
     if profiled and scale > 0.0:
         rise = (quantile * scale) ** 2 / thinned
-        search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high)
+        search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high, diff_step)
         for i in range(len(x)):
             for side in (0, 1):
                 ends[side, i] = search.end(i, ends[side, i])
@@ -122,6 +136,7 @@ class _EndSearch:
     rise: float
     lower: Floats
     upper: Floats
+    diff_step: float | None
 
     def end(self, i: int, guess: float) -> float:
         """The end of parameter i's interval on the side of a guess; -inf, inf where there is none within its
@@ -170,7 +185,9 @@ class _EndSearch:
         if not others.any():
             return float(np.sum(held(np.zeros(0)) ** 2)) - self.least, self.best.copy()
         bounds = (self.lower[others], self.upper[others])
-        solved = least_squares(held, start[others], bounds=bounds, x_scale="jac", xtol=1e-8, ftol=1e-10)
+        solved = least_squares(
+            held, start[others], bounds=bounds, x_scale="jac", diff_step=self.diff_step, xtol=1e-8, ftol=1e-10
+        )
         place = np.empty(len(self.best))
         place[others], place[i] = solved.x, fixed
         return 2.0 * float(solved.cost) - self.least, place
