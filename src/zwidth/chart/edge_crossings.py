@@ -8,21 +8,32 @@ that the direction in which a chord crosses a line says on which side the stable
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
-    from zwidth.chart.tracer import Tracer
+    from zwidth.loop.loop import Loop
 
 Floats = NDArray[np.float64]
 EdgeKind = Literal["lower", "upper", "tip"]
 
 MOST_STEPS: Final = 30  # of false position between the ends of a chord
+
+
+class WallCurve(Protocol):
+    """Walls with a pair of roots on the circle, by the angle of the pair."""
+
+    @property
+    def loop(self) -> Loop:
+        """Whose walls they are."""
+
+    def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
+        """K and B (k,) at angles (k,) in (0, pi)."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +42,13 @@ class EdgeChords:
 
     first, last  (n, 2)  walls [N/m, N s/m] in the order of the walk, the stable side on the left
     frequency    (n, 2)  of the vibration at both ends [Hz]
-    tracer       moves a point of a chord onto the edge itself; None: the chords are what is known
+    curve        moves a point of a chord onto the edge itself; None: the chords are what is known
     """
 
     first: Floats
     last: Floats
     frequency: Floats
-    tracer: Tracer | None = None
+    curve: WallCurve | None = None
 
     @classmethod
     def of(cls, chart: Chart) -> EdgeChords:
@@ -50,11 +61,22 @@ class EdgeChords:
         first = np.vstack([np.empty((0, 2)), *(wall[:-1] for wall in walls)])
         last = np.vstack([np.empty((0, 2)), *(wall[1:] for wall in walls)])
         pairs = [np.column_stack([one[:-1], one[1:]]) for one in frequencies]
-        tracer = chart.edge.tracer if isinstance(chart, StabilityChart) else None
-        return cls(first, last, np.vstack([np.empty((0, 2)), *pairs]), tracer)
+        curve = chart.edge.tracer if isinstance(chart, StabilityChart) else None
+        return cls(first, last, np.vstack([np.empty((0, 2)), *pairs]), curve)
 
     def __len__(self) -> int:
         return len(self.first)
+
+    def thinned(self, count: int) -> EdgeChords:
+        """The edge with one chord in place of up to so many that follow each other on one arc."""
+        joined = np.all(self.first[1:] == self.last[:-1], axis=1)
+        straight = self.frequency[:, 0] == self.frequency[:, 1]
+        begins = np.append(True, ~joined | (straight[1:] != straight[:-1]))[: len(self)]
+        along = np.arange(len(self)) - np.maximum.accumulate(np.where(begins, np.arange(len(self)), 0))
+        start = np.flatnonzero(along % count == 0)
+        end = np.append(start[1:], len(self)) - 1
+        frequency = np.column_stack([self.frequency[start, 0], self.frequency[end, 1]])
+        return replace(self, first=self.first[start], last=self.last[end], frequency=frequency)
 
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
@@ -95,15 +117,17 @@ class EdgeChords:
         ends = self.frequency[chord]
         frequency = np.where(known, ends[:, 0] + share * (ends[:, 1] - ends[:, 0]), np.nan)
         curved = known & (ends[:, 0] != ends[:, 1]) & np.isfinite(ends).all(axis=1)
-        if self.tracer is not None and curved.any():
-            on_edge = self._on_edge(self.tracer, chord[curved], at[curved, 0], across)
+        if self.curve is not None and curved.any():
+            on_edge = self._on_edge(self.curve, chord[curved], at[curved, 0], across)
             value[curved], frequency[curved] = on_edge
         return value, frequency
 
-    def _on_edge(self, tracer: Tracer, chord: NDArray[np.intp], at: Floats, across: int) -> tuple[Floats, Floats]:
+    def _on_edge(
+        self, curve: WallCurve, chord: NDArray[np.intp], at: Floats, across: int
+    ) -> tuple[Floats, Floats]:
         """Move crossings from the chords to the curve, by false position in the angle, the retained end's value
         halved (Illinois)."""
-        turn = 2.0 * np.pi * tracer.loop.period
+        turn = 2.0 * np.pi * curve.loop.period
         a, b = self.frequency[chord, 0] * turn, self.frequency[chord, 1] * turn
         at_a, at_b = self.first[chord, across] - at, self.last[chord, across] - at
         other = self.first[chord, 1 - across]
@@ -115,7 +139,7 @@ class EdgeChords:
             with np.errstate(divide="ignore", invalid="ignore"):
                 x = np.where(at_a != at_b, b - at_b * (b - a) / (at_b - at_a), 0.5 * (a + b))
             x = np.where(going, x, angle)
-            walls = tracer.walls(x)
+            walls = curve.walls(x)
             f = np.where(going, walls[across] - at, 0.0)
             angle, other = x, np.where(going, walls[1 - across], other)
             same_as_a = (f > 0.0) == (at_a > 0.0)
@@ -139,8 +163,8 @@ class EdgeChords:
     def nearest(
         self, stiffness: Floats, damping: Floats, scales: tuple[float, float]
     ) -> tuple[Floats, Floats, Floats]:
-        """Distances (m,) of walls from the edge, positive where they are stable; the frequency there [Hz] (m,); and
-        the nearest walls on the edge (m, 2).
+        """Distances (m,) of walls from the edge, positive where they are stable; the frequency there (m,) [Hz];
+        and the nearest walls on the edge (m, 2).
 
         scales   a stiffness [N/m] and a damping [N s/m] that count as one unit of distance each
         Returns  where nothing is stable: minus the distance from the origin, nan, and the origin

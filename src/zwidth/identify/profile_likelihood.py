@@ -72,7 +72,7 @@ def fit_least_squares(
     known_scale      the residuals have the standard deviation 1
     scale_freedom    degrees of freedom by which that deviation was estimated; None: it is known exactly
     effective_count  number of independent residuals where they are fewer than n, as of overlapping segments
-    diff_step        relative step of the derivatives, for residuals that are not computed to rounding; None: 1.5e-8
+    diff_step        relative step of the derivatives, for residuals that are not exact to rounding; None: 1.5e-8
     profiled         False: intervals by the curvature alone, q sigma_i
     Raises           ValueError  for fewer residuals than parameters, or some that are no numbers at the start
     """

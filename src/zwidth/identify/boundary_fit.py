@@ -1,0 +1,255 @@
+"""Numbers of a device that bring its exact chart nearest to a measured boundary, with their intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.boundary_model import BoundaryModel, Deviations, Scatter
+from zwidth.identify.boundary_parameters import BoundaryParameters
+from zwidth.identify.boundary_points import EDGE, LOWER, TIP, UPPER, BoundaryPoints
+from zwidth.identify.profile_likelihood import Fit, fit_least_squares
+
+Floats = NDArray[np.float64]
+
+FIRST_SCATTER: Final = 0.02  # share of the measured range that the scatter is taken for at first
+LEAST_SCATTER: Final = 1e-9  # share of the measured range; less would be the rounding of the chart
+ENOUGH: Final = 6  # points of a kind from which on their scatter is estimated from them alone
+ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
+SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
+COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
+
+
+@dataclass(frozen=True)
+class BoundaryFit:
+    """A fit of a boundary.
+
+    parameters  what was varied
+    fit         vector of the numbers, ends of their intervals, and what remains in units of the scatter
+    scatter     standard deviations that remain
+    deviations  of the points on the boundary
+    freedom     degrees of freedom by which the scatter is known, of the least known number
+    """
+
+    parameters: BoundaryParameters
+    fit: Fit
+    scatter: Scatter
+    deviations: Deviations
+    freedom: float
+
+    @property
+    def vector(self) -> Floats:
+        """The numbers (p,) as they vary."""
+        return self.fit.values
+
+    def ends(self, i: int) -> tuple[float, float, float]:
+        """A number and the ends of its interval; the bound that the file sets where the data set none."""
+        low, high = self.fit.low.copy(), self.fit.high.copy()
+        given = self.parameters
+        limited = ~given.positive & np.isfinite(given.lower) & np.isneginf(low)
+        low = np.where(limited, given.lower, low)
+        columns = (given.values(np.where(np.isnan(x), 0.0, x)) for x in (self.fit.values, low, high))
+        value, least, most = (float(column[i]) for column in columns)
+        return value, least, most
+
+
+def ranges(points: BoundaryPoints) -> Scatter:
+    """How far the measured points reach: in stiffness, in damping, in frequency; each above 0."""
+    edges = points[points.on_edge]
+    frequency = edges.frequency[edges.frequency > 0.0]
+    reach = [
+        float(np.ptp(values)) or float(np.max(np.abs(values), initial=0.0)) or 1.0 if len(values) else 1.0
+        for values in (edges.stiffness, edges.damping, frequency)
+    ]
+    return Scatter(*reach)
+
+
+def first_scatter(points: BoundaryPoints) -> Scatter:
+    """The scatter that a fit begins with."""
+    return Scatter(*(FIRST_SCATTER * one for one in ranges(points)))
+
+
+def fit_boundary(
+    model: BoundaryModel, parameters: BoundaryParameters, *, start: Floats | None = None, profiled: bool = True
+) -> BoundaryFit:
+    """Fit the numbers to the points of a model, and estimate the scatter from what remains.
+
+    The scatter along damping, along stiffness and of the frequency are each estimated from the points that have
+    it, where there are six or more; others are taken to be in the same proportion to the measured range.
+
+    start     vector to begin with; None: the best of several
+    profiled  False: intervals by the curvature alone
+    Raises    ValueError  for fewer points on the boundary than numbers
+    """
+    reach = ranges(model.points)
+    scatter = first_scatter(model.points)
+    x = _coarse_start(model, parameters, scatter) if start is None else start
+    step = COARSE_STEP if model.interpolated(x) else None
+    for _ in range(ROUNDS):
+        fit = _fit(model, parameters, scatter, x, step, profiled=False)
+        x, before = fit.values, scatter
+        scatter = _scatter(model, fit, scatter, reach)
+        if all(abs(a / b - 1.0) < SAME_SCATTER for a, b in zip(scatter, before, strict=True)):
+            break
+    freedom = _freedom(model, fit, scatter)
+    fit = _fit(model, parameters, scatter, x, step, profiled=profiled, freedom=freedom)
+    return BoundaryFit(parameters, fit, scatter, model.deviations(fit.values, scatter), freedom)
+
+
+def _fit(
+    model: BoundaryModel,
+    parameters: BoundaryParameters,
+    scatter: Scatter,
+    start: Floats,
+    step: float | None,
+    *,
+    profiled: bool,
+    freedom: float | None = None,
+) -> Fit:
+    return fit_least_squares(
+        lambda vector: model.residuals(vector, scatter),
+        start,
+        lower=parameters.lower,
+        upper=parameters.upper,
+        known_scale=True,
+        scale_freedom=freedom,
+        diff_step=step,
+        profiled=profiled,
+    )
+
+
+def _coarse_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: Scatter) -> Floats:
+    """The file's numbers, or others in their place where the points then lie nearer to the edge, one by one.
+
+    The sum of the deviations' sizes is compared, not of their squares: far from the truth one point would rule.
+    """
+
+    def size(vector: Floats) -> float:
+        return float(np.sum(np.abs(model.residuals(vector, scatter))))
+
+    best = parameters.start
+    least = size(best)
+    for _ in range(2 if len(best) > 1 else 1):
+        for i in range(len(best)):
+            for value in parameters.other_starts(i):
+                tried = best.copy()
+                tried[i] = value
+                if (its := size(tried)) < least:
+                    best, least = tried, its
+    return best
+
+
+def _parts(model: BoundaryModel) -> dict[str, NDArray[np.bool_]]:
+    """Which residuals (m,) are of points along damping, along stiffness, of unknown edges, of frequencies."""
+    edges = model.points[model.points.on_edge]
+    seen = int(np.sum(edges.frequency > 0.0))
+    total = len(edges) + seen + int(np.sum(~model.points.on_edge))
+    place = np.arange(total)
+
+    def of(*kinds: str) -> NDArray[np.bool_]:
+        return np.append(edges.of(*kinds), np.zeros(total - len(edges), dtype=bool))
+
+    return {
+        "stiffness": of(TIP),
+        "damping": of(LOWER, UPPER),
+        "frequency": (place >= len(edges)) & (place < len(edges) + seen),
+        "distance": of(EDGE),
+    }
+
+
+def _scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) -> Scatter:
+    """Standard deviations of what remains: of each kind of points, and common to the kinds with few."""
+    parts, squares = _parts(model), fit.residuals**2
+    counted = sum(int(np.sum(part)) for part in parts.values())
+    kept = max(
+        1.0 - len(fit.values) / counted, 1.0 / counted
+    )  # share of the points that is not used up by numbers
+    own = {name: float(np.sum(part)) >= ENOUGH and name != "distance" for name, part in parts.items()}
+    few = np.any([part for name, part in parts.items() if not own[name]], axis=0)
+    common = float(np.sqrt(np.mean(squares[few]) / kept)) if few.any() else float("nan")
+    sizes = dict[str, float]()
+    for name, most, now in zip(Scatter._fields, reach, before, strict=True):
+        part = parts[name]
+        size = float(np.sqrt(np.mean(squares[part]) / kept)) if own[name] else common
+        sizes[name] = max(now * size, LEAST_SCATTER * most) if np.isfinite(size) else np.nan
+    known = [sizes[name] / most for name, most in zip(Scatter._fields, reach, strict=True) if sizes[name] > 0.0]
+    share = float(np.median(known))
+    filled = [
+        sizes[name] if np.isfinite(sizes[name]) else share * most
+        for name, most in zip(Scatter._fields, reach, strict=True)
+    ]
+    return Scatter(*filled)
+
+
+def _freedom(model: BoundaryModel, fit: Fit, scatter: Scatter) -> float:
+    """Degrees of freedom by which the scatter is known (Satterthwaite), of the number that knows it least.
+
+    The variance of a number is made of the variances of the kinds of points in the shares of their information.
+    """
+    from scipy.optimize._numdiff import approx_derivative
+
+    jacobian = np.atleast_2d(
+        approx_derivative(lambda x: model.residuals(x, scatter), fit.values, method="2-point")
+    )
+    parts = _parts(model)
+    counted = sum(int(np.sum(part)) for part in parts.values())
+    kept = max(1.0 - len(fit.values) / counted, 1.0 / counted)
+    information = jacobian[np.any(list(parts.values()), axis=0)]
+    total = information.T @ information
+    inverse = np.linalg.pinv(total)
+    least = max(counted - len(fit.values), 1.0)
+    shares = dict[str, Floats]()
+    for name, part in parts.items():
+        J = jacobian[part]
+        shares[name] = np.diag(inverse @ J.T @ J @ inverse) / np.maximum(np.diag(inverse), 1e-300)
+    for i in range(len(fit.values)):
+        spread = sum(
+            float(shares[name][i]) ** 2 / max(float(np.sum(part)) * kept, 1e-9)
+            for name, part in parts.items()
+            if part.any()
+        )
+        least = min(least, 1.0 / spread) if spread > 0.0 else least
+    return max(least, 1.0)
+
+
+def derivatives(model: BoundaryModel, vector: Floats, scatter: Scatter) -> Floats:
+    """Change (m, p) of what remains per change of each number, by central differences."""
+    columns = []
+    for i, value in enumerate(vector.tolist()):
+        ends, step = [], COARSE_STEP * max(abs(value), 1e-3)
+        for side in (-1.0, 1.0):
+            moved = vector.copy()
+            moved[i] += side * step
+            ends.append(model.residuals(moved, scatter))
+        columns.append((ends[1] - ends[0]) / (2.0 * step))
+    return np.column_stack(columns)
+
+
+def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, int]:
+    """Minus twice the logarithm of the largest likelihood, up to what all models of the same points share; the
+    number of points and frequencies; and the number of standard deviations that were estimated.
+
+    Each kind of points has its own standard deviation, of which the likelihood is largest at what remains:
+    sum n ln(SS / n); tried walls add -2 ln Phi(d).
+    """
+    reach, residuals = ranges(model.points), fit.fit.residuals
+    total, count, kinds, used = 0.0, 0, 0, np.zeros(len(residuals), dtype=bool)
+    for name, part in _parts(model).items():
+        if part.any():
+            its = "damping" if name == "distance" else name
+            size = getattr(fit.scatter, its) / getattr(reach, its)
+            mean = float(np.mean(residuals[part] ** 2)) * size**2
+            total += float(np.sum(part)) * float(np.log(max(mean, LEAST_SCATTER**2)))
+            count, kinds, used = count + int(np.sum(part)), kinds + 1, used | part
+    return total + float(np.sum(residuals[~used] ** 2)), count, kinds
+
+
+def without(points: BoundaryPoints, every: int = 3) -> NDArray[np.bool_]:
+    """Which points (n,) are kept where every third on the boundary is left out, along each edge."""
+    order = np.lexsort((points.chosen, points.kind, ~points.on_edge))
+    keep = np.ones(len(points), dtype=bool)
+    keep[order[: int(points.on_edge.sum())][1::every]] = False
+    return keep
