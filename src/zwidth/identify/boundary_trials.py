@@ -36,6 +36,7 @@ TOUCH_SPEED: Final = 0.02  # m/s
 VISIBLE_STEPS: Final = 3.0  # encoder steps
 MOVED: Final = 0.15  # by which a number's logarithm is moved to see how the simulated edge moves
 ROUNDS: Final = 4
+SAME_SLOPES: Final = 0.3  # change of the numbers' logarithms up to which the slopes are kept
 STAYS: Final = 0.02  # change of the numbers' logarithms at which the rounds end
 
 
@@ -166,17 +167,19 @@ def model_by_trials(
     label = parameters.device.label
     x = fit_boundary(model, parameters, profiled=False).vector
     x = np.clip(x, parameters.start - 3.0, parameters.start + 3.0)
+    slopes, sloped_at = np.empty((0, 0)), np.full(len(x), np.inf)
     by_trials: BoundaryModel = model
     for number in range(ROUNDS):
         report("simulating trials", number, ROUNDS)
         try:
-            by_trials = _around(model, parameters, plan, x)
+            if not np.max(np.abs(x - sloped_at)) < SAME_SLOPES:
+                slopes, sloped_at = _slopes(model.points, parameters, plan, x), x
+            by_trials = _around(model, parameters, plan, x, slopes)
         except (TrialError, ValueError) as error:
             raise fail(label, "", f"no trials can be simulated: {error}") from None
         if int(by_trials.points.on_edge.sum()) < len(x) + 1:
-            raise fail(
-                label, "", f"the simulated device has edges at {by_trials.points.on_edge.sum()} of the points only"
-            )
+            edges = int(by_trials.points.on_edge.sum())
+            raise fail(label, "", f"the simulated device has an edge at {edges} of the points only")
         new = fit_boundary(by_trials, parameters, start=x, profiled=False).vector
         new = np.clip(new, x - 1.0, x + 1.0)
         moved, x = float(np.max(np.abs(new - x))), new
@@ -186,10 +189,21 @@ def model_by_trials(
     return by_trials
 
 
-def _around(model: BoundaryModel, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> TrialModel:
-    """Simulated edges at numbers x and how they move with them."""
+def _around(
+    model: BoundaryModel, parameters: BoundaryParameters, plan: TrialPlan, x: Floats, slopes: Floats
+) -> TrialModel:
+    """Simulated edges at numbers x, that move with them by known slopes (n, p)."""
     points = model.points
     at, frequency = _simulated(points, parameters, plan, x)
+    known = np.isfinite(at) & np.isfinite(slopes).all(axis=1)
+    kept = np.ones(len(points), dtype=bool)
+    kept[points.on_edge] = known
+    edges = SimulatedEdges(x, at[known], slopes[known], frequency[known])
+    return TrialModel(points[kept], model.edge_of, simulated=edges)
+
+
+def _slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> Floats:
+    """How the simulated edges (n, p) move with each number, by central differences."""
     slopes = []
     for i in range(len(x)):
         ends, places = [], []
@@ -200,12 +214,7 @@ def _around(model: BoundaryModel, parameters: BoundaryParameters, plan: TrialPla
             ends.append(_simulated(points, parameters, plan, moved)[0])
             places.append(float(moved[i]))
         slopes.append((ends[1] - ends[0]) / (places[1] - places[0]))
-    D = np.column_stack(slopes)
-    known = np.isfinite(at) & np.isfinite(D).all(axis=1)
-    kept = np.ones(len(points), dtype=bool)
-    kept[points.on_edge] = known
-    edges = SimulatedEdges(x, at[known], D[known], frequency[known])
-    return TrialModel(points[kept], model.edge_of, simulated=edges)
+    return np.column_stack(slopes)
 
 
 def _simulated(
