@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 import zwidth
@@ -12,7 +14,7 @@ from zwidth.identify.record import record_of
 
 
 def random_document(rng):
-    """A device of two masses: 0.2-20 kHz sampling, a mode from 1 Hz to 0.4 of the sampling rate, 1-30 % damping."""
+    """Two masses: 0.2-20 kHz sampling, a mode from 1 Hz to 0.4 of the sampling rate, 1-30 % damping."""
     rate = 10.0 ** rng.uniform(np.log10(200.0), np.log10(20000.0))
     m1, m2 = 10.0 ** rng.uniform(-2.0, 0.0, 2)
     f = 10.0 ** rng.uniform(0.0, np.log10(0.4 * rate))
@@ -22,14 +24,14 @@ def random_document(rng):
     return {
         "name": "random",
         "plant": {
-            "mass_kg": [[m1, 0.0], [0.0, m2]],
+            "mass_kg": [[float(m1), 0.0], [0.0, float(m2)]],
             "damping_Ns_per_m": (b * link).tolist(),
             "stiffness_N_per_m": (k * link).tolist(),
             "actuator": [0.0, 1.0],
             "sensor": [0.0, 1.0],
             "handle": [1.0, 0.0],
         },
-        "loop": {"sampling_period_s": 1.0 / rate, "delay_samples": float(rng.uniform(0.1, 2.0))},
+        "loop": {"sampling_period_s": float(1.0 / rate), "delay_samples": float(rng.uniform(0.1, 2.0))},
     }
 
 
@@ -53,7 +55,7 @@ def toml(document):
     lines = [f'name = "{document["name"]}"']
     for name in ("plant", "loop"):
         lines.append(f"[{name}]")
-        lines += [f"{key} = {value!r}" for key, value in document[name].items()]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in document[name].items()]
     return "\n".join(lines) + "\n"
 
 
@@ -74,7 +76,11 @@ def measured(rng, chords, scatter=0.01, count=10, tips=4, frequency=0.0):
         *zip(ends[0] + scatter * K1 * rng.normal(size=tips), B, ends[1], ["tip"] * tips, strict=True),
     ]
     rows = [row for row in rows if np.isfinite(row[:2]).all()]
-    columns = dict(zip(("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz", "edge"), zip(*rows), strict=True))
+    columns = dict(
+        zip(
+            ("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz", "edge"), zip(*rows, strict=True), strict=True
+        )
+    )
     if frequency:
         f = np.array(columns["frequency_Hz"])
         columns["frequency_Hz"] = f + frequency * np.max(f) * rng.normal(size=len(f))

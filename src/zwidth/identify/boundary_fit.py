@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,8 @@ LEAST_SCATTER: Final = 1e-9  # share of the measured range; less would be the ro
 ENOUGH: Final = 6  # points of a kind from which on their scatter is estimated from them alone
 ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
 SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
+STARTS: Final = 3  # fits from different vectors, of which the best is kept
+MOST_CROSSED: Final = 2  # numbers whose starts are all combined
 COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
 
 
@@ -78,15 +81,16 @@ def fit_boundary(
     """Fit the numbers to the points of a model, and estimate the scatter from what remains.
 
     The scatter along damping, along stiffness and of the frequency are each estimated from the points that have
-    it, where there are six or more; others are taken to be in the same proportion to the measured range.
+    it; where there are few, it is taken to be at least in the same proportion to the measured range as the others.
 
     start     vector to begin with; None: the best of several
     profiled  False: intervals by the curvature alone
     Raises    ValueError  for fewer points on the boundary than numbers
     """
-    reach = ranges(model.points)
+    reach, x = ranges(model.points), start
     scatter = first_scatter(model.points)
-    x = _coarse_start(model, parameters, scatter) if start is None else start
+    if x is None:
+        x = _best_start(model, parameters, scatter)
     step = COARSE_STEP if model.interpolated(x) else None
     for _ in range(ROUNDS):
         fit = _fit(model, parameters, scatter, x, step, profiled=False)
@@ -94,7 +98,7 @@ def fit_boundary(
         scatter = _scatter(model, fit, scatter, reach)
         if all(abs(a / b - 1.0) < SAME_SCATTER for a, b in zip(scatter, before, strict=True)):
             break
-    freedom = _freedom(model, fit, scatter)
+    freedom = _freedom(model, x, scatter)
     fit = _fit(model, parameters, scatter, x, step, profiled=profiled, freedom=freedom)
     return BoundaryFit(parameters, fit, scatter, model.deviations(fit.values, scatter), freedom)
 
@@ -121,8 +125,8 @@ def _fit(
     )
 
 
-def _coarse_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: Scatter) -> Floats:
-    """The file's numbers, or others in their place where the points then lie nearer to the edge, one by one.
+def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: Scatter) -> Floats:
+    """The best of the fits that begin at the nearest of several vectors.
 
     The sum of the deviations' sizes is compared, not of their squares: far from the truth one point would rule.
     """
@@ -130,16 +134,18 @@ def _coarse_start(model: BoundaryModel, parameters: BoundaryParameters, scatter:
     def size(vector: Floats) -> float:
         return float(np.sum(np.abs(model.residuals(vector, scatter))))
 
-    best = parameters.start
-    least = size(best)
-    for _ in range(2 if len(best) > 1 else 1):
-        for i in range(len(best)):
-            for value in parameters.other_starts(i):
-                tried = best.copy()
-                tried[i] = value
-                if (its := size(tried)) < least:
-                    best, least = tried, its
-    return best
+    begin = parameters.start
+    values = [np.append(begin[i], parameters.other_starts(i)) for i in range(len(begin))]
+    if len(begin) <= MOST_CROSSED:
+        tried = [np.array(one) for one in product(*values)]
+    else:
+        tried = [begin]
+        for i, others in enumerate(values):
+            tried += [np.where(np.arange(len(begin)) == i, one, begin) for one in others[1:]]
+    order = np.argsort([size(one) for one in tried], kind="stable")
+    step = COARSE_STEP if model.interpolated(begin) else None
+    fits = [_fit(model, parameters, scatter, tried[k], step, profiled=False) for k in order[:STARTS]]
+    return min(fits, key=lambda fit: fit.sum_of_squares).values
 
 
 def _parts(model: BoundaryModel) -> dict[str, NDArray[np.bool_]]:
@@ -161,58 +167,59 @@ def _parts(model: BoundaryModel) -> dict[str, NDArray[np.bool_]]:
 
 
 def _scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) -> Scatter:
-    """Standard deviations of what remains: of each kind of points, and common to the kinds with few."""
-    parts, squares = _parts(model), fit.residuals**2
-    counted = sum(int(np.sum(part)) for part in parts.values())
-    kept = max(
-        1.0 - len(fit.values) / counted, 1.0 / counted
-    )  # share of the points that is not used up by numbers
-    own = {name: float(np.sum(part)) >= ENOUGH and name != "distance" for name, part in parts.items()}
-    few = np.any([part for name, part in parts.items() if not own[name]], axis=0)
-    common = float(np.sqrt(np.mean(squares[few]) / kept)) if few.any() else float("nan")
-    sizes = dict[str, float]()
+    """Standard deviations of what remains, of each kind of points.
+
+    Of a kind with few points it is at least in the same proportion to the measured range as those of the others:
+    few points that happen to lie well would rule the fit.
+    """
+    freedom, parts = _freedom_by_kind(model, fit.values, before), _parts(model)
+    own = dict[str, float]()
     for name, most, now in zip(Scatter._fields, reach, before, strict=True):
-        part = parts[name]
-        size = float(np.sqrt(np.mean(squares[part]) / kept)) if own[name] else common
-        sizes[name] = max(now * size, LEAST_SCATTER * most) if np.isfinite(size) else np.nan
-    known = [sizes[name] / most for name, most in zip(Scatter._fields, reach, strict=True) if sizes[name] > 0.0]
-    share = float(np.median(known))
-    filled = [
-        sizes[name] if np.isfinite(sizes[name]) else share * most
-        for name, most in zip(Scatter._fields, reach, strict=True)
+        part = parts[name] | (parts["distance"] if name == "damping" else False)
+        if part.any():
+            nu = max(freedom[name] + (freedom["distance"] if name == "damping" else 0.0), 0.5)
+            own[name] = max(now * float(np.sqrt(np.sum(fit.residuals[part] ** 2) / nu)) / most, LEAST_SCATTER)
+    counts = {name: int(np.sum(parts[name])) for name in own}
+    known = [own[name] for name in own if counts[name] >= ENOUGH] or list(own.values())
+    usual = float(np.sqrt(np.mean(np.square(known))))
+    if "stiffness" in own and counts["stiffness"] < ENOUGH and "damping" in own:
+        usual = own["damping"]
+    shares = [
+        own.get(name, usual) if counts.get(name, 0) >= ENOUGH else max(own.get(name, usual), usual)
+        for name in Scatter._fields
     ]
-    return Scatter(*filled)
+    return Scatter(*(share * most for share, most in zip(shares, reach, strict=True)))
 
 
-def _freedom(model: BoundaryModel, fit: Fit, scatter: Scatter) -> float:
+def _shares(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, Floats]:
+    """In which shares (p,) the kinds of points tell each number; 0 of a number that they do not tell."""
+    jacobian = derivatives(model, vector, scatter)
+    parts = _parts(model)
+    information = jacobian[np.any(list(parts.values()), axis=0)]
+    inverse = np.linalg.pinv(information.T @ information)
+    size = np.maximum(np.diag(inverse), 1e-300)
+    return {
+        name: np.diag(inverse @ jacobian[part].T @ jacobian[part] @ inverse) / size for name, part in parts.items()
+    }
+
+
+def _freedom_by_kind(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, float]:
+    """Number of points of each kind, less the numbers that are told by them."""
+    shares, parts = _shares(model, vector, scatter), _parts(model)
+    return {name: float(np.sum(part)) - float(np.sum(shares[name])) for name, part in parts.items()}
+
+
+def _freedom(model: BoundaryModel, vector: Floats, scatter: Scatter) -> float:
     """Degrees of freedom by which the scatter is known (Satterthwaite), of the number that knows it least.
 
     The variance of a number is made of the variances of the kinds of points in the shares of their information.
     """
-    from scipy.optimize._numdiff import approx_derivative
-
-    jacobian = np.atleast_2d(
-        approx_derivative(lambda x: model.residuals(x, scatter), fit.values, method="2-point")
-    )
-    parts = _parts(model)
-    counted = sum(int(np.sum(part)) for part in parts.values())
-    kept = max(1.0 - len(fit.values) / counted, 1.0 / counted)
-    information = jacobian[np.any(list(parts.values()), axis=0)]
-    total = information.T @ information
-    inverse = np.linalg.pinv(total)
-    least = max(counted - len(fit.values), 1.0)
-    shares = dict[str, Floats]()
-    for name, part in parts.items():
-        J = jacobian[part]
-        shares[name] = np.diag(inverse @ J.T @ J @ inverse) / np.maximum(np.diag(inverse), 1e-300)
-    for i in range(len(fit.values)):
-        spread = sum(
-            float(shares[name][i]) ** 2 / max(float(np.sum(part)) * kept, 1e-9)
-            for name, part in parts.items()
-            if part.any()
-        )
-        least = min(least, 1.0 / spread) if spread > 0.0 else least
-    return max(least, 1.0)
+    shares, by_kind = _shares(model, vector, scatter), _freedom_by_kind(model, vector, scatter)
+    spreads = [
+        sum(float(shares[name][i]) ** 2 / max(nu, 0.5) for name, nu in by_kind.items()) for i in range(len(vector))
+    ]
+    largest = max(spreads)
+    return max(min(sum(by_kind.values()), 1.0 / largest if largest > 0.0 else np.inf), 1.0)
 
 
 def derivatives(model: BoundaryModel, vector: Floats, scatter: Scatter) -> Floats:

@@ -70,11 +70,11 @@ class Spectra:
     def response(self, into: str, out: str, estimator: str = "H1", reference: str = "") -> Complexes:
         """The response (n,) from channel `into` to channel `out`, differences undone.
 
-            H1 = S_yu/S_uu        noise in the reading alone
-            H2 = S_yy/S_uy        noise in the force alone
-            Hv = least squares of both, in equal shares of their powers (Vold; known at second hand):
-                 sqrt(S_yy/S_uu) in magnitude, the phase of S_yu
-            joint = S_yr/S_ur     noise that a loop feeds back from the reading to the force; needs a reference
+        H1 = S_yu/S_uu        noise in the reading alone
+        H2 = S_yy/S_uy        noise in the force alone
+        Hv = least squares of both, in equal shares of their powers (Vold; known at second hand):
+             sqrt(S_yy/S_uu) in magnitude, the phase of S_yu
+        joint = S_yr/S_ur     noise that a loop feeds back from the reading to the force; needs a reference
         """
         u, y = self.power(into), self.power(out)
         cross = self.of(out, into)
