@@ -21,7 +21,7 @@ LEAST_SCATTER: Final = 1e-9  # share of the measured range; less would be the ro
 ENOUGH: Final = 6  # points of a kind from which on their scatter is estimated from them alone
 ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
 SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
-STARTS: Final = 3  # fits from different vectors, of which the best is kept
+STARTS: Final = 2  # fits from different vectors, of which the best is kept
 MOST_CROSSED: Final = 2  # numbers whose starts are all combined
 COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
 

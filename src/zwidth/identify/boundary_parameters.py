@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 WIDEST: Final = np.log(1e6)  # factor either way within which a positive number is looked for, as logarithm
 HALVINGS: Final = 12  # of the way to where a number is no longer allowed
 SMALL: Final = 1e-3  # relative change by which it is tried whether a number can be varied alone
+THINNED: Final = 4  # chords that make one; crossings are moved onto the edge itself in any case
 FACTORS: Final = (0.003, 0.03, 0.3, 3.0, 30.0, 300.0)  # at which a fit looks for a start
 
 
@@ -112,10 +113,10 @@ class BoundaryParameters:
 
         device = self.device_with(vector)
         if self.damping is not None:
-            return self.damping.edge(device, self._damping_numbers(vector))
+            return self.damping.edge(device, self._damping_numbers(vector), THINNED)
         if device.given_plant is not None and device.given_plant.hysteresis is not None:
             return hysteretic_edge(device.at_point(self.point).loop)
-        return EdgeChords.of(self.chart(vector))
+        return EdgeChords.of(self.chart(vector)).thinned(THINNED)
 
     def contact_loop(self, vector: Floats) -> Loop:
         """The loop of a simulated contact with these numbers, without an operator. Raises ValueError."""

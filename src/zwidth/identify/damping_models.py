@@ -130,13 +130,13 @@ class DampingModel:
         loop = self._loop(device, numbers)
         return hysteretic_chart(loop) if self.name == HYSTERETIC else stability_chart(loop, decay=False)
 
-    def edge(self, device: Device, numbers: Floats) -> EdgeChords:
-        """The edge of that chart; with a loss factor see `chart.hysteretic_edge`."""
+    def edge(self, device: Device, numbers: Floats, thinned: int) -> EdgeChords:
+        """The edge of that chart, so many chords made one; with a loss factor see `chart.hysteretic_edge`."""
         from zwidth.chart.hysteretic_edge import hysteretic_edge
 
         if self.name == HYSTERETIC:
             return hysteretic_edge(self._loop(device, numbers))
-        return EdgeChords.of(self.chart(device, numbers))
+        return EdgeChords.of(self.chart(device, numbers)).thinned(thinned)
 
     def _loop(self, device: Device, numbers: Floats) -> Loop:
         """The loop with these numbers, held by the point's operator."""

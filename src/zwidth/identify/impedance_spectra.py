@@ -76,7 +76,7 @@ class MeasuredImpedance:
 
 
 def measured_impedance(spectra: Spectra, shorter: Spectra, highest: float) -> MeasuredImpedance:
-    """The impedance at the lines below `highest` [Hz] at which the coherence is no chance (95 %).
+    """The impedance at the lines below `highest` [Hz] at which the coherence is no chance.
 
     shorter  spectra of the same records with segments half as long
     """
@@ -84,7 +84,8 @@ def measured_impedance(spectra: Spectra, shorter: Spectra, highest: float) -> Me
 
     n = max(spectra.averages, 1.0 + 1e-9)
     coherence = spectra.coherence(FORCE, POSITION)
-    chance = 1.0 - (1.0 - LEVEL) ** (1.0 / (n - 1.0)) if n > 1.5 else 1.0
+    # so that no line of all passes by chance, with 95 %
+    chance = 1.0 - ((1.0 - LEVEL) / len(coherence)) ** (1.0 / (n - 1.0)) if n > 1.5 else 1.0
     power = spectra.power(FORCE)
     seen = (coherence > chance) & (spectra.frequency < highest) & (power > SILENT * np.max(power, initial=0.0))
     c, f = coherence[seen], spectra.frequency[seen]

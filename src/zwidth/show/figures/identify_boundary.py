@@ -19,7 +19,7 @@ POINT_STYLES = (
     (("stable",), "P", BLUE, True, "tried, stable"),
     (("unstable",), "X", BLACK, False, "tried, unstable"),
 )
-MARGIN = 0.06  # of the points' extent that is shown beyond them
+MARGIN = 0.12  # of the points' extent that is shown beyond them
 
 
 def draw_boundary(ax: Axes, identification: Identification) -> None:
