@@ -219,6 +219,33 @@ def test_faults_of_a_file_name_the_line(tmp_path, lines, words):
         identify_boundary(device(), [read_record(path, COLUMNS)], paths=[DELAY])
 
 
+def test_the_file_that_an_experiment_writes_is_read_as_it_is(tmp_path):
+    columns = points(scatter=0.002)
+    count = len(columns["edge"])
+    tip = np.array(columns["edge"]) == "tip"
+    K, B = (np.array(columns[name]) for name in ("stiffness_N_per_m", "damping_Ns_per_m"))
+    table = {
+        "stiffness_N_per_m": K,
+        "damping_Ns_per_m": B,
+        "edge": columns["edge"],
+        "stiffness_low_N_per_m": K - 1.0 * tip,
+        "stiffness_high_N_per_m": K + 1.0 * tip,
+        "damping_low_Ns_per_m": B - 0.1 * ~tip,
+        "damping_high_Ns_per_m": B + 0.1 * ~tip,
+        "trials": [3] * count,
+        "exact_stiffness_N_per_m": [""] * count,
+        "beyond": ["growing"] * count,
+        "amplitude_m": [0.001] * count,
+        "frequency_Hz": [""] * count,
+        "unsure": [False] * count,
+    }
+    path = tmp_path / "boundary.csv"
+    rows = [",".join(map(str, row)) for row in zip(*table.values(), strict=True)]
+    path.write_text("\n".join([",".join(table), *rows]) + "\n", encoding="utf-8")
+    result = identify_boundary(device(), [read_record(path, COLUMNS)], paths=[DELAY])
+    assert result[DELAY].low < 0.3 < result[DELAY].high
+
+
 def test_nothing_to_fit_is_a_fault_and_so_is_an_unknown_model():
     with pytest.raises(DeviceError, match="name the numbers to fit"):
         identify_boundary(device(), [record(points())])
