@@ -22,6 +22,7 @@ ENOUGH: Final = 6  # points of a kind from which on their scatter is estimated f
 ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
 SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
 STARTS: Final = 2  # fits from different vectors, of which the best is kept
+STARTS_OF_SEVERAL: Final = 4  # the same for two numbers and more
 CLOSE: Final = 1.0  # mean square in units of the first scatter, below which no other start is tried
 MOST_CROSSED: Final = 2  # numbers whose starts are all combined
 COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
@@ -146,9 +147,10 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
     order = np.argsort([size(one) for one in tried], kind="stable")
     step = COARSE_STEP if model.interpolated(begin) else None
     fits = list[Fit]()
-    for k in order[:STARTS]:
+    alone = len(begin) == 1  # several numbers have other minima near the points, too
+    for k in order[: STARTS if alone else STARTS_OF_SEVERAL]:
         fits.append(_fit(model, parameters, scatter, tried[k], step, profiled=False))
-        if fits[-1].sum_of_squares < CLOSE * len(fits[-1].residuals):
+        if alone and fits[-1].sum_of_squares < CLOSE * len(fits[-1].residuals):
             break
     return min(fits, key=lambda fit: fit.sum_of_squares).values
 
