@@ -39,7 +39,7 @@ __all__ = ["COLUMNS", "identify_boundary"]
 Floats = NDArray[np.float64]
 
 KIND: Final = "boundary"
-ROUTES: Final = ("", "chart", "experiment")
+ROUTES: Final = (None, "chart", "experiment")
 ALIKE: Final = 0.95  # correlation of two numbers, from which on a reader must know of it
 NOTHING: Final = 1e-9  # change of the points, in units of the scatter, that a number without effect makes
 OUTLIER: Final = 4.0  # standard deviations
@@ -55,7 +55,7 @@ def identify_boundary(
     point: OperatingPoint | None = None,
     paths: Sequence[str] = (),
     damping_models: str | Sequence[str] = (),
-    through: str = "",
+    through: str | None = None,
     disturbance: float | None = None,
     visible: float | None = None,
     progress: Progress | None = None,
@@ -67,7 +67,7 @@ def identify_boundary(
     paths           of the numbers to fit, as `--set` takes them
     damping_models  names of `damping_models.NUMBERS`, or "all": each is fitted, with the numbers of `paths`, in
                     place of the device's own damping, and they are compared; the estimates are those of the best
-    through         "chart", "experiment": what the points are compared with; "": the chart, and trials on the
+    through         "chart", "experiment": what the points are compared with; None: the chart, and trials on the
                     simulated device where it has dry friction or an estimate of velocity that is not linear
     disturbance     of those trials [m]; None: perturbation_N over the stiffness where the points have it, or 1 mm
     visible         amplitude up to which a vibration counts as none in those trials [m]; None: three encoder steps

@@ -104,7 +104,7 @@ class TrialPlan:
         )
 
 
-def needs_trials(point: OperatingPoint, through: str) -> bool:
+def needs_trials(point: OperatingPoint, through: str | None) -> bool:
     """Whether the points are to be compared with trials: by the user's word, or as friction wants it."""
     if through:
         return through == "experiment"

@@ -12,7 +12,16 @@ import click
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Callback, Question, example, refuse_empty, with_settings_option
+from zwidth.show.cli.heading import heading
+from zwidth.show.cli.options import (
+    Callback,
+    Finite,
+    Question,
+    about_a_device,
+    example,
+    refuse_empty,
+    with_settings_option,
+)
 from zwidth.show.output import destination, printable, write_text
 
 if TYPE_CHECKING:
@@ -20,6 +29,9 @@ if TYPE_CHECKING:
 
     from zwidth.identify.identification import Estimate, Identification
 
+device_option = click.option(
+    "--device", metavar="DEVICE", required=True, callback=refuse_empty, help="The device that was measured."
+)
 joint_option = click.option(
     "--joint",
     metavar="NAME",
@@ -28,8 +40,18 @@ joint_option = click.option(
 )
 
 
+def _refuse_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    for value in values:
+        refuse_empty(ctx, param, value)
+    return values
+
+
 class IdentifyCommand(Command):
-    """What all kinds have in common: records are read, and the numbers can be written into the device file."""
+    """What all kinds have in common: records are read, and the numbers can be written into the device file.
+
+    kind_options  names of the command's options that go to the function as they are
+    takes_point   whether the numbers are of the device at an operating point, and the command has its options
+    """
 
     outputs = (".png", ".svg", ".pdf", ".csv", ".json")
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: measured and fitted, .json)."
@@ -37,13 +59,17 @@ class IdentifyCommand(Command):
     takes_responses = True
     linear = False
     kind_options: ClassVar[tuple[str, ...]] = ()
+    takes_point: ClassVar[bool] = False
 
     def about(self, command: Callback) -> Callback:
+        if self.takes_point:
+            return _files(about_a_device(command, device=device_option))
+
         @wraps(command)
         def with_device(device: str, settings: Any, **more: Any) -> int:
             return command(Question(device, settings), **more)
 
-        return _files(_device(with_settings_option(with_device)))
+        return _files(device_option(with_settings_option(with_device)))
 
     def for_click(self) -> click.Command:
         made = super().for_click()
@@ -62,16 +88,24 @@ class IdentifyCommand(Command):
         destination(case.question.name, (".toml",))
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return {"name": case.device.name, "device": case.question.name, "files": list(case["files"])}
+        files = {"files": list(case["files"])}
+        if self.takes_point:
+            return case.question.circumstances(case.device) | files
+        return {"name": case.device.name, "device": case.question.name} | files
 
     def heading(self, case: CommandLine) -> str:
-        return f"{printable(case.device.name)}: {self.name} from {', '.join(map(printable, case['files']))}"
+        about = f"{self.name} from {', '.join(map(printable, case['files']))}"
+        if self.takes_point:
+            return f"{heading(case.question, case.device, linear=False)}\n{about}"
+        return f"{printable(case.device.name)}: {about}"
 
     def is_about_moments(self, case: CommandLine) -> bool:
         return False
 
     def compute(self, case: CommandLine) -> Identification:
         options = {name: case[name] for name in self.kind_options}
+        if self.takes_point:
+            options["point"] = case.point
         found: Identification = case.device.identify(
             self.name, list(case["files"]), progress=case.progress, **options
         )
@@ -116,7 +150,7 @@ class IdentifyCommand(Command):
             if one.path
         }
         path = destination(case.question.name, (".toml",))
-        values = {one.path: written_value(one) for one in result.estimates if one.path}
+        values = result.settings | {one.path: written_value(one) for one in result.estimates if one.path}
         write_text(path, edited_text(path, values, sources))
         return {"written": path}
 
@@ -126,18 +160,12 @@ class IdentifyCommand(Command):
         return identification_figure(result, *self.size)
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
-        return {"name": case.device.name}
+        return self.circumstances(case) if self.takes_point else {"name": case.device.name}
 
 
 def _files(command: Callback) -> Callback:
     """The records, of which there is one at least."""
     return click.argument("files", metavar="FILE...", nargs=-1, required=True)(command)
-
-
-def _device(command: Callback) -> Callback:
-    return click.option(
-        "--device", metavar="DEVICE", required=True, callback=refuse_empty, help="The device that was measured."
-    )(command)
 
 
 _write = click.Option(
@@ -177,7 +205,124 @@ class StiffnessCommand(IdentifyCommand):
     kind_options = ("joint", "side")
 
 
-KINDS: tuple[Callable[[], IdentifyCommand], ...] = (StiffnessCommand,)
+class BoundaryCommand(IdentifyCommand):
+    """Find numbers of DEVICE from a stability boundary that was measured on it.
+
+    FILE has columns stiffness_N_per_m, damping_Ns_per_m, perhaps frequency_Hz, edge (lower, upper, tip, stable,
+    unstable) and how it was measured: approach, perturbation_N, bias_force_N, held_by, watch_time_s, criterion,
+    amplitude_m. What `zwidth experiment --output FILE.csv` writes is one.
+    """
+
+    name = "boundary"
+    summary = "Damping, delay or an operator's numbers, from a measured stability boundary."
+    examples = (
+        "zwidth identify boundary edge.csv --device my-device.toml --parameter loop.delay_samples",
+        "zwidth identify boundary edge.csv --device my-device.toml --damping-model all --output boundary.svg",
+    )
+    options = (
+        click.option(
+            "--parameter",
+            "paths",
+            metavar="PATH",
+            multiple=True,
+            callback=_refuse_empty_items,
+            help="Number of the device file to be fitted, as --set takes it; repeatable.",
+        ),
+        click.option(
+            "--damping-model",
+            "damping_models",
+            metavar="NAME",
+            multiple=True,
+            help="modal, stiffness, mass, proportional, drive, hysteretic, or all: structural damping that is fitted "
+            "in place of the file's; several are compared; repeatable.",
+        ),
+        click.option(
+            "--through",
+            type=click.Choice(["chart", "experiment"]),
+            help="What the points are compared with. Default: the exact chart; simulated trials where dry friction "
+            "makes the boundary depend on the amplitude.",
+        ),
+        click.option("--disturbance", metavar="M", type=Finite(), help="Initial disturbance of those trials [m]."),
+        click.option(
+            "--visible", metavar="M", type=Finite(), help="Amplitude up to which those trials count as still [m]."
+        ),
+    )
+    kind_options = ("paths", "damping_models", "through", "disturbance", "visible")
+    takes_point = True
+    size = (5.6, 4.4)
+
+
+class ImpedanceCommand(IdentifyCommand):
+    """Find the impedance at the handle of DEVICE from the hand's force and the handle's position.
+
+    FILE has columns time_s, handle_force_N, handle_position_m, and perhaps wall (on, off). The answer stands
+    beside what `zwidth felt` predicts.
+    """
+
+    name = "impedance"
+    summary = "What the handle feels like over frequency, from force and position there."
+    examples = ("zwidth identify impedance shaken.csv --device my-device.toml --stiffness 2000 --damping 5",)
+    options = (
+        click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall that was on [N/m]."),
+        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall that was on [Ns/m]."),
+        click.option(
+            "--segment",
+            metavar="SAMPLES",
+            type=click.IntRange(16),
+            help="Samples of a segment of the spectra. Default: 15 in a record.",
+        ),
+    )
+    kind_options = ("stiffness", "damping", "segment")
+    takes_point = True
+
+
+class ArmCommand(IdentifyCommand):
+    """Find the dynamic parameters of DEVICE's mechanism from positions and torques of its joints.
+
+    FILE has columns time_s and, for each drive or its link, angle_rad.NAME (position_m.NAME), torque_Nm.NAME
+    (force_N.NAME) and perhaps velocity_rad_per_s.NAME. Move all joints together, for 20 s or more.
+    """
+
+    name = "arm"
+    summary = "Inertia, friction and effective mass of a mechanism, from its joints."
+    examples = (
+        "zwidth identify arm moved.csv --device my-device.toml --gravity 0,-9.81",
+        "zwidth identify arm moved.csv --device my-device.toml --torque commanded --write",
+    )
+    options = (
+        click.option(
+            "--side",
+            type=click.Choice(["joint", "motor"]),
+            default="joint",
+            show_default=True,
+            help="Where angles and torques were recorded: at the links' joints, or at the motors' shafts.",
+        ),
+        click.option(
+            "--torque",
+            type=click.Choice(["measured", "commanded"]),
+            default="measured",
+            show_default=True,
+            help="Whether the torque acted when it was recorded, or is the computer's command, which acts after the "
+            "loop's delay and is held for a period.",
+        ),
+        click.option(
+            "--rotors",
+            type=click.Choice(["fitted", "known"]),
+            default="fitted",
+            show_default=True,
+            help="Whether the rotors' inertias are fitted, or taken from DEVICE.",
+        ),
+    )
+    kind_options = ("side", "torque", "rotors")
+    takes_point = True
+
+
+KINDS: tuple[Callable[[], IdentifyCommand], ...] = (
+    StiffnessCommand,
+    ImpedanceCommand,
+    BoundaryCommand,
+    ArmCommand,
+)
 
 
 @click.group(

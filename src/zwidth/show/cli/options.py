@@ -253,13 +253,18 @@ LOAD_OPTIONS: Final = (
 )
 
 
-def about_a_device(command: Callback, loads: bool = True) -> Callback:
+DEVICE: Final = click.argument("device", metavar="DEVICE", callback=refuse_empty)
+
+
+def about_a_device(command: Callback, loads: bool = True, device: Any = DEVICE) -> Callback:
     """Give a command DEVICE and the options of posture, direction, load, model and operator, as one `Question`.
 
-    loads  whether it has the options of a load
+    loads   whether it has the options of a load
+    device  the argument, or the option, that names the device
     """
     return _with_device_options(
         command,
+        device,
         click.option(
             "--at",
             type=PostureType(),
@@ -312,6 +317,7 @@ def about_a_workspace(command: Callback) -> Callback:
     choice = "|".join(EXTREMES)
     return _with_device_options(
         with_extreme,
+        DEVICE,
         click.option(
             "--direction",
             type=DirectionType(f"DX,DY[,DZ]|{choice}", (2, 3), f"0,1, or one of {', '.join(EXTREMES)}"),
@@ -322,10 +328,10 @@ def about_a_workspace(command: Callback) -> Callback:
     )
 
 
-def _with_device_options(command: Callback, *where: Any) -> Callback:
-    """DEVICE, the options `where`, and those that every question about a device has."""
+def _with_device_options(command: Callback, device: Any, *where: Any) -> Callback:
+    """The device, the options `where`, and those that every question about a device has."""
     decorators = [
-        click.argument("device", metavar="DEVICE", callback=refuse_empty),
+        device,
         *where,
         click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
         click.option(
