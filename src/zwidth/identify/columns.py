@@ -8,6 +8,8 @@ from typing import Final
 
 from zwidth.device.text_file import header_fault
 
+EACH: Final = ".*"  # behind a name: of each part of the device that it is followed by
+
 # Unit that a column is named by -> units that people record it in, and by what they are multiplied.
 OTHER_UNITS: Final = {
     "rad": {
@@ -33,7 +35,11 @@ OTHER_UNITS: Final = {
 class Columns:
     """Columns that a kind of measurement has.
 
-    needed    each of them, or one of several where they are alternatives: ("time_s", ("force_N", "torque_Nm"))
+    needed    each of them, or one of several where they are alternatives: ("time_s", ("force_N", "torque_Nm")).
+              A name that ends in ".*" stands for all columns that begin so, one or more, each of another part of
+              the device: "angle_rad.*" for angle_rad.upper and angle_rad.lower; or for angle_rad alone, of a device
+              with one such part. Alternatives with ".*" may stand beside each other. MATLAB's names have no dot:
+              angle_rad_upper is read, too
     optional  numbers that are read where they are there
     text      the same, words or numbers: names of joints, of those who held the device
     """
@@ -52,13 +58,14 @@ class Columns:
         chosen, faults = list[str](), list[str]()
         for one in self.needed:
             choices = (one,) if isinstance(one, str) else one
-            present = [name for name in choices if name in names]
-            if len(present) > 1:
+            several = any(choice.endswith(EACH) for choice in choices)
+            present = [name for choice in choices for name in _matching(choice, names)]
+            if len(present) > 1 and not several:
                 faults.append(f"columns {' and '.join(present)} are alternatives; keep one of them")
             elif not present:
                 faults.append(f"column {' or '.join(choices)} is missing{self._other_unit(choices, names)}")
-            chosen += present[:1]
-        chosen += [name for name in (*self.optional, *self.text) if name in names]
+            chosen += present if several else present[:1]
+        chosen += [name for one in (*self.optional, *self.text) for name in _matching(one, names)]
         if twice := header_fault(names, [], chosen).partition(";")[0]:
             faults.append(twice)
         if faults and not any("multiply" in fault for fault in faults):
@@ -70,9 +77,23 @@ class Columns:
     def _other_unit(choices: Sequence[str], names: Sequence[str]) -> str:
         """A hint where a column of the same quantity in another unit is there."""
         for choice in choices:
-            quantity, _, unit = choice.partition("_")
+            quantity, _, unit = choice.removesuffix(EACH).partition("_")
+            each = EACH if choice.endswith(EACH) else ""
             for other, factor in OTHER_UNITS.get(unit, {}).items():
-                if f"{quantity}_{other}" in names:
+                for there in _matching(f"{quantity}_{other}{each}", names):
                     by = f"multiply by {factor}" if factor else "multiply by the value of one"
-                    return f"; {quantity}_{other} is there: {by} and name it {choice}"
+                    named = there.replace(f"{quantity}_{other}", f"{quantity}_{unit}", 1)
+                    return f"; {there} is there: {by} and name it {named}"
         return ""
+
+
+def _matching(wanted: str, names: Sequence[str]) -> list[str]:
+    """The columns that a wanted name stands for, in their order.
+
+    >>> _matching("angle_rad.*", ["time_s", "angle_rad.upper", "angle_rad_lower"])
+    ['angle_rad.upper', 'angle_rad_lower']
+    """
+    if not wanted.endswith(EACH):
+        return [wanted] if wanted in names else []
+    stem = wanted.removesuffix(EACH)
+    return [name for name in dict.fromkeys(names) if name == stem or name.startswith((f"{stem}.", f"{stem}_"))]
