@@ -1,0 +1,208 @@
+"""What a record of a mechanism's joints must be before its torques are fitted, and what is said where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.faults import comma_list
+from zwidth.identify.arm.channels import Channels
+from zwidth.identify.arm.smoothing import convolved
+from zwidth.identify.identification import Check
+from zwidth.identify.record import Piece
+
+Floats = NDArray[np.float64]
+
+COUNTS: Final = 10.0  # that every joint must move, at least
+SLOPE: Final = 0.1  # by which a recorded velocity may differ from the derivative of the position
+ALIKE: Final = 0.9  # correlation between them, at least
+CLIPPED: Final = 0.04  # share of the samples at one extreme torque: a sine that is counted finely has less
+OVER_LIMIT: Final = 0.01  # share of the samples beyond the drive's limit
+RATIOS: Final = {
+    180.0 / np.pi: "in degrees",
+    np.pi / 180.0: "in radians where degrees are meant",
+    1000.0: "in thousandths",
+    0.001: "in thousands",
+    1.0 / (2.0 * np.pi): "in revolutions",
+    30.0 / np.pi: "in revolutions per minute",
+    -1.0: "with the other sign",
+}
+BETTER: Final = 0.3  # share of the unexplained torque, below which another reading of the columns explains it
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is seen of the first rows of a record.
+
+    rows          of its longest stretch among the first ones, a piece of the record
+    coordinates, forces  (n, d)  of the drives
+    """
+
+    rows: Piece
+    coordinates: Floats
+    forces: Floats
+
+
+def motion_check(drives: Sequence[str], surveys: Sequence[Survey], counts: Floats, turning: Floats) -> Check:
+    """That the joints move by more than ten counts.
+
+    counts   (d,) of the encoders, at the joint [rad], [m]; nan where not known: the least step that is seen
+    turning  (d,) whether a coordinate is an angle
+    """
+    spans = np.max([np.ptp(one.coordinates, axis=0) for one in surveys], axis=0)
+    steps = np.max([_least_steps(one.coordinates) for one in surveys], axis=0)
+    steps = np.where(np.isfinite(counts), counts, steps)
+    still = [k for k in range(len(drives)) if not spans[k] > COUNTS * steps[k] or spans[k] == 0.0]
+    far = [k for k in range(len(drives)) if turning[k] and spans[k] > 8.0 * np.pi]
+    if far:
+        named = comma_list([f"{drives[k]} by {spans[k]:.3g} rad" for k in far])
+        return Check("motion", False, f"{named}, which is several turns: are these angles in degrees or counts?")
+    if still:
+        named = comma_list([f"{drives[k]} by {spans[k]:.3g} ({spans[k] / max(steps[k], 1e-300):.3g} counts)" for k in still])
+        reason = f"too little motion: {named}; move every joint by more than {COUNTS:g} counts"
+        return Check("motion", False, reason, warning=len(still) < len(drives))
+    least = comma_list([f"{name} by {span:.3g}" for name, span in zip(drives, spans, strict=True)])
+    worst = float(np.min(spans / np.maximum(steps, 1e-300)))
+    return Check("motion", True, f"{least} (rad or m), {worst:.3g} counts at least")
+
+
+def _least_steps(values: Floats) -> Floats:
+    """The least steps (d,) between values that differ."""
+    steps = np.abs(np.diff(values[:200_000], axis=0))
+    steps[steps == 0.0] = np.inf
+    least = np.min(steps, axis=0, initial=np.inf)
+    return np.where(np.isfinite(least), least, 0.0)
+
+
+def torque_check(drives: Sequence[str], surveys: Sequence[Survey], limits: Floats) -> Check:
+    """That torques vary, stay within the drives' limits (d,) at the joint, and are not cut."""
+    constant, cut, beyond = list[str](), list[str](), list[str]()
+    for k, name in enumerate(drives):
+        forces = np.concatenate([one.forces[:, k] for one in surveys])
+        most = float(np.max(np.abs(forces)))
+        if np.ptp(forces) == 0.0:
+            constant.append(name)
+            continue
+        share = _clipped_share(forces)
+        if np.mean(np.abs(forces) > 1.001 * limits[k]) > OVER_LIMIT:
+            beyond.append(f"{name} (to {most:.3g} of {limits[k]:.3g})")
+        elif share > CLIPPED or np.mean(np.abs(forces) > 0.9999 * limits[k]) > OVER_LIMIT:
+            cut.append(f"{name} ({100.0 * max(share, float(np.mean(np.abs(forces) > 0.9999 * limits[k]))):.2g} %)")
+    if constant:
+        return Check("torque", False, f"the torque of {comma_list(constant)} is constant; record what acts")
+    if beyond:
+        reason = f"torques beyond the drives' limits in the device file: {comma_list(beyond)}"
+        return Check("torque", False, f"{reason}; record what acts, not what is commanded, or correct torque_limit_Nm")
+    if cut:
+        reason = f"a part of the samples stands at the largest torque: {comma_list(cut)}"
+        return Check("torque", False, f"{reason}; where a sensor is saturated, move less violently", warning=True)
+    return Check("torque", True, "varies, and is not cut")
+
+
+def _clipped_share(forces: Floats) -> float:
+    """Share of the samples that stand, five and more in a row, at the largest or the least value."""
+    shares = list[float]()
+    for extreme in (np.max(forces), np.min(forces)):
+        at = np.concatenate([[0], (forces == extreme).astype(int), [0]])
+        edges = np.flatnonzero(np.diff(at))
+        lengths = edges[1::2] - edges[::2]
+        shares.append(float(np.sum(lengths[lengths >= 5]) / len(forces)))
+    return sum(shares)
+
+
+def velocity_check(
+    drives: Sequence[str], channels: Channels, survey: Survey, rate_taps: Floats, taps: Floats
+) -> Check | None:
+    """That recorded velocities are the derivatives of the positions; None where there are none.
+
+    rate_taps, taps   kernels that differentiate and that only smooth
+    """
+    given = [k for k, name in enumerate(channels.velocity) if name]
+    if not given:
+        return None
+    own = np.stack([survey.rows[name] for name in channels.coordinate], axis=1)
+    if len(own) <= len(taps):
+        return None
+    rates = convolved(own, rate_taps)
+    faults = list[str]()
+    for k in given:
+        velocity = convolved(survey.rows[channels.velocity[k]], taps)
+        alike = [_correlation(velocity, rates[:, j]) for j in range(len(drives))]
+        best = int(np.argmax(np.abs(alike)))
+        slope = float(velocity @ rates[:, k] / max(rates[:, k] @ rates[:, k], 1e-300))
+        column = channels.velocity[k]
+        if best != k and abs(alike[best]) > ALIKE and abs(alike[k]) < ALIKE:
+            faults.append(f"{column} follows the derivative of {channels.coordinate[best]}: columns are swapped")
+        elif not abs(alike[k]) > ALIKE:
+            faults.append(
+                f"{column} does not follow the derivative of {channels.coordinate[k]} (correlation {alike[k]:.2f})"
+            )
+        elif not abs(slope - 1.0) < SLOPE:
+            known = next((text for ratio, text in RATIOS.items() if abs(slope / ratio - 1.0) < SLOPE), "in another unit")
+            faults.append(f"{column} is {slope:.4g} times the derivative of {channels.coordinate[k]}: {known}")
+    if faults:
+        return Check("velocity", False, f"{'; '.join(faults)}; correct the columns, or leave the velocities out")
+    return Check("velocity", True, "recorded velocities are the derivatives of the positions, which are used")
+
+
+def _correlation(one: Floats, other: Floats) -> float:
+    a, b = one - np.mean(one), other - np.mean(other)
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def other_readings(
+    names: Sequence[str], columns: Sequence[Floats], torques: Sequence[Floats]
+) -> tuple[str, float, float]:
+    """A reading of the torques' columns, other signs or two swapped, that explains them far better.
+
+    columns  (n, d, b) of each stretch;   torques  (n, d)
+    Returns  what it is, "" where there is none; and the shares that are left unexplained, as it is and so
+    """
+    X = np.concatenate([one for one in columns])
+    y = np.concatenate([one for one in torques])
+    scale = np.std(y, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+
+    def unexplained(read: Floats, weights: Floats) -> float:
+        A, b = (X / weights[:, None]).reshape(-1, X.shape[2]), (read / weights).reshape(-1)
+        size = np.linalg.norm(A, axis=0)
+        A = A / np.where(size > 0.0, size, 1.0)
+        left = b - A @ np.linalg.lstsq(A, b, rcond=1e-9)[0]
+        return float(left @ left) / max(float(b @ b), 1e-300)
+
+    now = unexplained(y, scale)
+    tried = list[tuple[float, str]]()
+    d = len(names)
+    for k in range(d if d > 1 else 0):
+        sign = np.ones(d)
+        sign[k] = -1.0
+        tried.append((unexplained(y * sign, scale), f"the torque of {names[k]} has the other sign"))
+    for i, j in combinations(range(d), 2):
+        order = np.arange(d)
+        order[[i, j]] = j, i
+        tried.append((unexplained(y[:, order], scale[order]), f"the torques of {names[i]} and {names[j]} are swapped"))
+    best, text = min(tried, default=(np.inf, ""))
+    return (text if best < BETTER * now else ""), now, best
+
+
+def sign_check(
+    names: Sequence[str], labels: Sequence[str], predicted: Sequence[Floats], measured: Sequence[Floats]
+) -> Check | None:
+    """That no torque has another sign in one record than in the others; None where it has not.
+
+    predicted, measured  (n, d) of each record
+    """
+    faults = list[str]()
+    for label, one, other in zip(labels, predicted, measured, strict=True):
+        for k, name in enumerate(names):
+            if len(one) and _correlation(one[:, k], other[:, k]) < -0.5:
+                faults.append(f"the torque of {name} in {label}")
+    if not faults:
+        return None
+    return Check("signs", False, f"{comma_list(faults)} has the other sign than what all records tell; turn it round")

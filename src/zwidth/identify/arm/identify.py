@@ -1,0 +1,565 @@
+"""Masses, first moments, inertias and friction of a mechanism from the motion and the torques of its joints.
+
+The torques are linear in the parameters (`parameters`). They are compared in a band without delay (`smoothing`), by
+least squares whose weights follow the errors (`regression`). Positions with noise make accelerations with noise, which
+draws least squares towards 0; by how much is seen by adding as much noise again, of both signs, and the fit is moved
+back by as much (simulation and extrapolation, Cook and Stefanski 1994, known at second hand).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.device.device import Device
+from zwidth.device.faults import comma_list, fail, quote
+from zwidth.identify.arm.channels import Channels, Side, channels_of, check_mechanism, left_out
+from zwidth.identify.arm.checks import (
+    Survey,
+    motion_check,
+    other_readings,
+    sign_check,
+    torque_check,
+    velocity_check,
+)
+from zwidth.identify.arm.comparison import Compared, Comparison, UnreachedError
+from zwidth.identify.arm.consistent_links import ConsistentLinks, consistent_links
+from zwidth.identify.arm.effective_masses import EffectiveMass, effective_masses, mass_columns
+from zwidth.identify.arm.estimates import base_estimates, delay_estimate, friction_estimates, link_settings, mass_estimates
+from zwidth.identify.arm.parameters import BaseParameters, Parameters, base_parameters
+from zwidth.identify.arm.regression import Regression, regress
+from zwidth.identify.arm.smoothing import Band, Stretch, TorqueTiming, choose_band, smoothed
+from zwidth.identify.identification import Check, Identification, refused
+from zwidth.identify.record import Record
+from zwidth.identify.sampling import Sampling, check_sampling
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.mechanism import PRISMATIC, Mechanism
+from zwidth.progress import Progress
+
+Floats = NDArray[np.float64]
+Torque = Literal["measured", "commanded"]
+Rotors = Literal["fitted", "known"]
+
+KIND: Final = "arm"
+FITTED: Final = 0.7  # share of a single record that is fitted; the rest is for validation
+SEEN: Final = 400_000  # rows of a record that are looked at first
+FLEXIBLE: Final = 0.2  # share of the lowest flexible mode up to which the model of rigid links is used
+PAIRS: Final = 2  # of noise of either sign, by which the bias is seen
+FEWEST: Final = 10  # compared samples for each base parameter
+WORSE: Final = 3.0  # deviations per base parameter by which a consistent set may miss
+POOR: Final = 0.5  # share explained, below which a reader is warned
+GRAVITY: Final = 0.3  # share of the unexplained torque that gravity explains, from which it is told
+SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
+
+
+@dataclass(frozen=True, repr=False)
+class ArmIdentification(Identification):
+    """Numbers of a mechanism from the torques of its joints.
+
+    numbers   path -> number or list of numbers: of the links, that reproduce the base parameters and that bodies
+              can have, as the device file takes them
+    """
+
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Path -> value of all numbers that a device file holds, as `Device.with_` takes them."""
+        return {**super().settings, **self.numbers}
+
+    def document(self) -> dict[str, Any]:
+        """Keys and values of --json."""
+        return {**super().document(), "numbers": dict(self.numbers)}
+
+
+def identify_arm(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    point: OperatingPoint | None = None,
+    gravity: ArrayLike | None = None,
+    side: Side = "joint",
+    torque: Torque = "measured",
+    rotors: Rotors = "fitted",
+    progress: Progress | None = None,
+) -> ArmIdentification:
+    """Base parameters, friction and effective masses of a mechanism, with 95 % intervals.
+
+    records   of one sampling period, in the columns `COLUMNS`; the last of several is not fitted but predicted, of
+              a single one its last 30 %
+    point     posture and directions of the effective masses; None: the device's reference
+    gravity   (2,) or (3,) [m/s^2]; None: that of the file's [load], or none
+    side      "joint": coordinates of the links' joints and torques at the joints; "motor": angles and torques of
+              the motors. Either way the torques are the motors', which accelerate the rotors too
+    torque    "measured": it acts when it is recorded; "commanded": the computer's command, which acts after the
+              loop's delay and is held for a period
+    rotors    "fitted": their inertias are parameters; "known": those of the file are taken as they are
+    Raises    DeviceError  for columns that are missing, options that do not fit, and devices without a mechanism
+    """
+    mechanism = check_mechanism(device)
+    for name, value, allowed in (
+        ("side", side, ("joint", "motor")),
+        ("torque", torque, ("measured", "commanded")),
+        ("rotors", rotors, ("fitted", "known")),
+    ):
+        if value not in allowed:
+            raise fail(device.label, name, f"must be one of {', '.join(allowed)}, got {quote(value)}")
+    if not records:
+        raise fail(device.label, "identify arm", "needs at least one record")
+    if rotors == "known" and not np.isfinite(mechanism.drives.motor_inertia).all():
+        raise fail(device.label, "rotors", 'are not known: the file leaves motor_inertia_kg_m2 out; use "fitted"')
+    at = device.at() if point is None else point
+    if at.shape or at.posture is None:
+        raise fail(device.label, "point", "must be a single posture of the device's mechanism")
+    weight = _gravity(device, gravity)
+    work = _Work(device, mechanism, tuple(records), at, weight, side, torque, rotors, progress or (lambda *_: None))
+    return work.identified()
+
+
+def _gravity(device: Device, gravity: ArrayLike | None) -> Floats:
+    """Gravity (3,) [m/s^2]: as given, or the file's."""
+    if gravity is None:
+        return np.zeros(3) if device.load is None else np.asarray(device.load.weight, dtype=np.float64)
+    given = np.asarray(gravity, dtype=np.float64)
+    if given.shape not in ((2,), (3,)) or not np.isfinite(given).all():
+        raise fail(device.label, "gravity", f"must be two or three finite numbers [m/s^2], got {given.tolist()}")
+    return np.append(given, np.zeros(3 - len(given)))
+
+
+@dataclass(frozen=True)
+class _Work:
+    """One identification on its way."""
+
+    device: Device
+    mechanism: Mechanism
+    records: tuple[Record, ...]
+    point: OperatingPoint
+    gravity: Floats
+    side: Side
+    torque: Torque
+    rotors: Rotors
+    progress: Progress
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        return self.mechanism.drives.names
+
+    def refusal(self, checks: Sequence[Check]) -> ArmIdentification | None:
+        """What failed checks leave."""
+        result = refused(KIND, self.device.label, checks)
+        return None if result is None else ArmIdentification(KIND, self.device.label, result.checks)
+
+    def identified(self) -> ArmIdentification:
+        """Checks, fit, validation."""
+        channels = [channels_of(self.device, record, self.side) for record in self.records]
+        checks, samplings = self._sampled()
+        if stop := self.refusal(checks):
+            return stop
+        surveys = [self._survey(r, s, c) for r, s, c in zip(self.records, samplings, channels, strict=True)]
+        checks += self._seen(surveys)
+        if stop := self.refusal(checks):
+            return stop
+        band = choose_band([one.coordinates for one in surveys], samplings, self._highest())
+        checks += self._band_checks(band, samplings, channels, surveys)
+        if stop := self.refusal(checks):
+            return stop
+        stretches = list(self._smoothed(samplings, channels, band))
+        fitted, unseen = _split(stretches)
+        parameters = Parameters.of(self.mechanism, self.rotors == "fitted")
+        start = self._start()
+        base = base_parameters(parameters, start, self.gravity)
+        comparison = Comparison(base, band, self.gravity, self._known_rotors(), start)
+        try:
+            self.progress("torques", 0, 1)
+            weights = self._other_gravity()
+            seen = _compared(comparison, fitted, weights)
+            validation = _compared(comparison, unseen)
+        except UnreachedError as error:
+            reason = f"{error}; check the angles' signs, zeros and unit (radians), and the assembly"
+            return self._refused_with([*checks, Check("posture", False, reason)])
+        checks.append(Check("posture", True, "every loop closes at every sample"))
+        checks.append(_length_check(seen, validation, base))
+        if stop := self.refusal(checks):
+            return stop
+        fit = regress([one.columns for one in seen], [one.torques for one in seen])
+        beta = self._unbiased(comparison, fitted, fit)
+        checks += self._fit_checks(fit, base, beta, seen, validation, weights, band)
+        if stop := self.refusal(checks):
+            return stop
+        return self._result(checks, base, fit, beta, band, validation)
+
+    # --- before the fit ---------------------------------------------------------------------------------
+
+    def _sampled(self) -> tuple[list[Check], list[Sampling]]:
+        checks, samplings = list[Check](), list[Sampling]()
+        for number, record in enumerate(self.records):
+            self.progress("checking", number, len(self.records))
+            sampling, check = check_sampling(record)
+            checks.append(check)
+            if sampling is not None:
+                samplings.append(sampling)
+        if len(samplings) == len(self.records):
+            periods = np.array([one.period for one in samplings])
+            if np.ptp(periods) > 1e-3 * periods[0]:
+                listed = comma_list([f"{period:.6g} s" for period in periods])
+                checks.append(Check("sampling", False, f"records of different periods, {listed}; give those of one"))
+            period = self.device.controller.sampling_period
+            if self.torque == "commanded" and abs(periods[0] / period - 1.0) > 1e-3:
+                reason = f"rows come every {periods[0]:.6g} s, but the computer commands every {period:.6g} s"
+                checks.append(Check("sampling", False, f"{reason}; correct loop.sampling_period_s, or the time"))
+        return checks, samplings
+
+    def _survey(self, record: Record, sampling: Sampling, channels: Channels) -> Survey:
+        """The longest stretch among the first rows."""
+        best, rows = None, 0
+        for piece in sampling.stretches(record):
+            rows += len(piece["time_s"])
+            if best is None or len(piece["time_s"]) > len(best["time_s"]):
+                best = {name: values[:SEEN] for name, values in piece.items()}
+            if rows >= SEEN:
+                break
+        assert best is not None
+        return Survey(best, channels.coordinates(best), channels.forces(best))
+
+    def _seen(self, surveys: Sequence[Survey]) -> list[Check]:
+        drives, links = self.mechanism.drives, self.mechanism.links
+        counts = 2.0 * np.pi / (np.asarray(drives.encoder_counts) * drives.transmission)
+        turning = np.array([links.joint[joint] != PRISMATIC for joint in drives.joint], dtype=float)
+        limits = drives.torque_limit * drives.transmission
+        return [motion_check(drives.names, surveys, counts, turning), torque_check(drives.names, surveys, limits)]
+
+    def _highest(self) -> float:
+        """The highest frequency at which the drives may be taken for rigid [Hz]."""
+        drives = self.mechanism.drives
+        if not np.isfinite(drives.stiffness).any() or self.device.missing.get("dynamics"):
+            return np.inf
+        lowest = self._flexible_mode()
+        return FLEXIBLE * lowest if lowest > 0.0 else np.inf
+
+    def _flexible_mode(self) -> float:
+        """Lowest natural frequency of the links on their drives' springs, the motors held [Hz]."""
+        drives, posture = self.mechanism.drives, self.point.posture
+        assert posture is not None
+        spring = drives.stiffness * drives.transmission**2
+        soft = np.isfinite(spring)
+        compliance = np.diag(np.where(soft, 1.0 / np.where(soft, spring, 1.0), 0.0))
+        largest = float(np.max(np.linalg.eigvals(compliance @ posture.mass_matrix).real))
+        return 1.0 / (2.0 * np.pi * np.sqrt(largest)) if largest > 0.0 else np.inf
+
+    def _band_checks(
+        self, band: Band, samplings: Sequence[Sampling], channels: Sequence[Channels], surveys: Sequence[Survey]
+    ) -> list[Check]:
+        checks = list[Check]()
+        wide, narrow = band.wide, band.narrow
+        needed = 2.5 * (4.0 * wide.reach + 2.0 * narrow.reach)
+        longest = max(one.longest * one.period for one in samplings)
+        if longest < needed or longest / band.period < 300:
+            reason = f"the longest stretch without a gap lasts {longest:.4g} s, {needed:.4g} s are needed"
+            return [Check("length", False, f"{reason} at this sampling; record longer, or sample faster")]
+        for channel, survey in zip(channels, surveys, strict=True):
+            taps = wide.taps(band.period), wide.taps(band.period, 1)
+            check = velocity_check(self.drives, channel, survey, taps[1], taps[0])
+            if check is not None:
+                checks.append(check)
+        soft = self._highest() / FLEXIBLE
+        if band.motion > FLEXIBLE * soft:
+            reason = (
+                f"the motion reaches {band.motion:.3g} Hz, the lowest mode of the links on the drives' springs is at "
+                f"{soft:.3g} Hz; compared is up to {band.edge:.3g} Hz, where rigid drives make masses wrong by "
+                f"{100.0 * (band.edge / soft) ** 2:.2g} % at most; move more slowly, or measure at the links"
+            )
+            checks.append(Check("flexible drives", False, reason, warning=True))
+        if left := left_out(self.device):
+            checks.append(Check("device", False, f"left out: {comma_list(left)}", warning=True))
+        return checks
+
+    def _smoothed(
+        self, samplings: Sequence[Sampling], channels: Sequence[Channels], band: Band
+    ) -> Iterator[Stretch]:
+        timing = TorqueTiming()
+        if self.torque == "commanded":
+            controller, T = self.device.controller, band.period
+            lag = controller.actuator_time_constant
+            timing = TorqueTiming((controller.delay + 0.5) * T + lag, T**2 / 24.0 + 0.5 * lag**2)
+        for number, (record, sampling, channel) in enumerate(zip(self.records, samplings, channels, strict=True)):
+            self.progress("smoothing", number, len(self.records))
+            yield from smoothed(record, number, sampling, channel, band, timing)
+
+    def _start(self) -> Floats:
+        posture = self.point.posture
+        assert posture is not None
+        return np.asarray(posture.angles)
+
+    def _known_rotors(self) -> Floats:
+        drives = self.mechanism.drives
+        if self.rotors == "fitted":
+            return np.zeros(len(drives.names))
+        return np.asarray(drives.motor_inertia * drives.transmission**2)
+
+    def _other_gravity(self) -> list[Floats]:
+        """Directions in which there might be gravity, where none is given."""
+        return [] if np.any(self.gravity) else list(np.eye(3))
+
+    def _refused_with(self, checks: Sequence[Check]) -> ArmIdentification:
+        result = self.refusal(checks)
+        assert result is not None
+        return result
+
+    # --- the fit ------------------------------------------------------------------------------------------
+
+    def _unbiased(self, comparison: Comparison, fitted: Sequence[Stretch], fit: Regression) -> Floats:
+        """The parameters, moved back by what the noise of the positions draws them to."""
+        rng = np.random.default_rng(0)
+        found = list[Floats]()
+        for number in range(PAIRS):
+            self.progress("noise", number, PAIRS)
+            noise = [comparison.band.noise_of(len(one.time), rng) for one in fitted]
+            for sign in (1.0, -1.0):
+                noisy = [
+                    replace(
+                        one,
+                        coordinates=one.coordinates + sign * q,
+                        rates=one.rates + sign * v,
+                        accelerations=one.accelerations + sign * a,
+                    )
+                    for one, (q, v, a) in zip(fitted, noise, strict=True)
+                ]
+                try:
+                    seen = _compared(comparison, noisy)
+                except UnreachedError:  # at the edge of what the loops allow
+                    return fit.values
+                found.append(fit.refitted([one.columns for one in seen], [one.torques for one in seen]))
+        return np.asarray(2.0 * fit.values - np.mean(found, axis=0))
+
+    def _fit_checks(
+        self,
+        fit: Regression,
+        base: BaseParameters,
+        beta: Floats,
+        seen: Sequence[Compared],
+        validation: Sequence[Compared],
+        weights: Sequence[Floats],
+        band: Band,
+    ) -> list[Check]:
+        by_record = {one.record for one in (*seen, *validation)}
+        groups = [[one for one in (*seen, *validation) if one.record == number] for number in sorted(by_record)]
+        measured = [np.concatenate([one.torques for one in group]) for group in groups]
+        predicted = [np.concatenate([one.columns[..., :-1] @ beta for one in group]) for group in groups]
+        labels = [self.records[number].label for number in sorted(by_record)]
+        checks = [sign_check(self.drives, labels, predicted, measured) if len(groups) > 1 else None]
+        text, now, then = other_readings(self.drives, [o.columns for o in seen], [o.torques for o in seen])
+        if text:
+            reason = f"{100.0 * now:.3g} % of the torque is left unexplained, {100.0 * then:.3g} % if {text}"
+            checks.append(Check("signs", False, f"{reason}; check the columns"))
+        checks += [
+            self._excitation_check(fit, base, beta),
+            self._positive_check(base, beta, fit),
+            _gravity_check(seen, fit, beta) if weights else None,
+            self._timing_check(fit, band.period),
+        ]
+        return [one for one in checks if one is not None]
+
+    def _excitation_check(self, fit: Regression, base: BaseParameters, beta: Floats) -> Check:
+        """How well the record tells the parameters apart."""
+        inertial = [k for k, j in enumerate(base.kept) if j < base.parameters.friction.start]
+        deviations = fit.deviations
+        loose = [k for k in inertial if 1.96 * deviations[k] > abs(beta[k])]
+        seen = f"{len(base.kept)} base parameters, condition number {fit.condition:.3g}"
+        if len(loose) == len(inertial):
+            reason = f"{seen}; no mass or inertia is known to better than 100 %"
+            return Check("excitation", False, f"{reason}; accelerate every joint more, and more of them together")
+        if loose:
+            named = comma_list([base.names[k] for k in loose], 6)
+            reason = f"{seen}; not told from 0: {named}"
+            return Check("excitation", False, f"{reason}; move more joints together, faster", warning=True)
+        return Check("excitation", True, f"{seen}; all are known to better than 100 %")
+
+    def _positive_check(self, base: BaseParameters, beta: Floats, fit: Regression) -> Check | None:
+        """That torques accelerate the joints in their own direction."""
+        values = np.zeros(len(base.parameters.names))
+        values[list(base.kept)] = beta
+        inertial = base.parameters.friction.start
+        M = mass_columns(base.parameters, self._start()) @ values[:inertial] + np.diag(self._known_rotors())
+        wrong = [name for name, own in zip(self.drives, np.diag(M), strict=True) if own < 0.0]
+        if not wrong:
+            return None
+        reason = f"the inertia seen by {comma_list(wrong)} is negative"
+        return Check("signs", False, f"{reason}: turn the sign of its torque or of its angle round")
+
+    def _timing_check(self, fit: Regression, period: float) -> Check:
+        """That torques act when they are recorded."""
+        shift, deviation = fit.delay, fit.delay_deviation
+        seen = f"torques act {abs(shift):.2g} s (+-{2.0 * deviation:.1g} s) {'after' if shift > 0.0 else 'before'} "
+        if abs(shift) < SHIFT * period or abs(shift) < 4.0 * deviation:
+            return Check("timing", True, f"{seen}their time stamps, within half a period")
+        advice = "correct the loop's delay" if self.torque == "commanded" else 'if they are commands, torque = "commanded"'
+        reason = f"{seen}their time stamps; the fit allows for it, up to a few periods; {advice}"
+        return Check("timing", False, reason, warning=True)
+
+    # --- the result ---------------------------------------------------------------------------------------
+
+    def _result(
+        self,
+        checks: Sequence[Check],
+        base: BaseParameters,
+        fit: Regression,
+        beta: Floats,
+        band: Band,
+        validation: Sequence[Compared],
+    ) -> ArmIdentification:
+        links = consistent_links(base, self.mechanism, beta, fit.information)
+        values = np.zeros(len(base.parameters.names))
+        values[list(base.kept)] = beta
+        masses = self._masses(base, values, links)
+        numbers, remarks = link_settings(self.device, self.mechanism, base.parameters, links.values)
+        best = np.append(beta, fit.delay)
+        shares, total = _explained(validation, best)
+        checks = [*checks, _consistency_check(links), _validation_check(self.drives, shares)]
+        estimates = [
+            *mass_estimates(self.point, masses, base, fit),
+            *friction_estimates(self.device, self.mechanism, base, fit, beta),
+            *base_estimates(base, fit, beta),
+            delay_estimate(fit),
+        ]
+        remarks = (
+            f"torques were {self.torque}, at the {self.side}s; the rotors' inertias were {self.rotors}",
+            f"compared up to {band.edge:.3g} Hz",
+            *remarks,
+        )
+        last = max(one.record for one in validation)
+        what = f"the last record, {self.records[last].label}" if len(self.records) > 1 else "the last 30 % of the record"
+        return ArmIdentification(
+            kind=KIND,
+            label=self.device.label,
+            checks=tuple(checks),
+            estimates=tuple(estimates),
+            validation=total,
+            validated_on=f"share of the torque of {what} that its motion and the numbers predict, mean of the joints",
+            remarks=remarks,
+            curves=self._curves(validation, best),
+            details={
+                "validation_by_drive": dict(zip(self.drives, shares, strict=True)),
+                "condition_number": fit.condition,
+                "band_Hz": band.edge,
+                "side": self.side,
+                "torque": self.torque,
+                "rotors": self.rotors,
+                "gravity_m_per_s2": self.gravity.tolist(),
+            },
+            numbers=numbers,
+        )
+
+    def _masses(self, base: BaseParameters, values: Floats, links: ConsistentLinks) -> Iterator[EffectiveMass]:
+        """The effective masses: by the base parameters where they determine them, else by the whole set of links.
+        """
+        known = self._known_rotors()
+        own = effective_masses(base.parameters, self.point, values, known)
+        whole = effective_masses(base.parameters, self.point, links.values, known)
+        for one, other in zip(own, whole, strict=True):
+            determined = one.gradient is None or base.determines(one.gradient)
+            yield one if determined and np.isfinite(one.value) else other
+
+    def _curves(self, validation: Sequence[Compared], best: Floats) -> dict[str, Sequence[Any]]:
+        """Measured and predicted torques of the unseen part, at most 20000 rows."""
+        time = np.concatenate([one.time for one in validation])
+        measured = np.concatenate([one.torques for one in validation])
+        predicted = np.concatenate([one.columns @ best for one in validation])
+        some = slice(None, None, max(len(time) // 20_000, 1))
+        columns: dict[str, Sequence[Any]] = {"time_s": time[some].tolist()}
+        for k, name in enumerate(self.drives):
+            slides = self.mechanism.links.joint[self.mechanism.drives.joint[k]] == PRISMATIC
+            unit = "force_N" if slides else "torque_Nm"
+            columns[f"measured_{unit}.{name}"] = measured[some, k].tolist()
+            columns[f"predicted_{unit}.{name}"] = predicted[some, k].tolist()
+        return columns
+
+
+def _split(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[Stretch]]:
+    """What is fitted and what is predicted: the last record, or of a single one its last part."""
+    last = stretches[-1].record if stretches else 0
+    if stretches and stretches[0].record != last:
+        return [one for one in stretches if one.record != last], [one for one in stretches if one.record == last]
+    count, seen = sum(len(one.time) for one in stretches), 0
+    fitted, unseen = list[Stretch](), list[Stretch]()
+    for one in stretches:
+        cut = int(np.clip(FITTED * count - seen, 0, len(one.time)))
+        seen += len(one.time)
+        fitted += [one.part(slice(0, cut))] if cut else []
+        unseen += [one.part(slice(cut, None))] if cut < len(one.time) else []
+    return fitted, unseen
+
+
+def _compared(
+    comparison: Comparison, stretches: Sequence[Stretch], static: Sequence[Floats] = ()
+) -> list[Compared]:
+    """The stretches that are long enough for the kernel."""
+    least = 2 * comparison.band.narrow.half(comparison.band.step) + 1
+    return [comparison.of(one, static) for one in stretches if len(one.time) > least]
+
+
+def _length_check(seen: Sequence[Compared], validation: Sequence[Compared], base: BaseParameters) -> Check:
+    count = sum(one.torques.size for one in seen)
+    left = sum(len(one.time) for one in validation)
+    wanted = FEWEST * len(base.kept)
+    if count < wanted or left < FEWEST:
+        reason = f"{count} torques in the analysed band to fit {len(base.kept)} parameters, {wanted} are needed"
+        return Check("length", False, f"{reason}, and {FEWEST} to validate, of which there are {left}; record longer")
+    return Check("length", True, f"{count} torques in the analysed band to fit, {left} samples to validate")
+
+
+def _gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Check | None:
+    """That the torque has no part that depends on the posture as gravity does."""
+    best = np.append(beta, fit.delay)
+    residual = np.concatenate([one.torques - one.columns @ best for one in seen])
+    scale = np.std(residual, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    b = (residual / scale).reshape(-1)
+    X = (np.concatenate([one.columns for one in seen]) / scale[:, None]).reshape(len(b), -1)
+    G = (np.concatenate([one.static for one in seen]) / scale[:, None]).reshape(len(b), -1)
+    size = np.linalg.norm(X, axis=0)
+    Q = np.linalg.qr(X / np.where(size > 0.0, size, 1.0))[0]
+    G = G - Q @ (Q.T @ G)
+    b = b - Q @ (Q.T @ b)
+    if not np.any(G):
+        return None
+    left, values, _ = np.linalg.svd(G, full_matrices=False)
+    left = left[:, values > 1e-6 * values[0]]
+    share = float(np.sum((left.T @ b) ** 2) / max(float(b @ b), 1e-300))
+    if share < GRAVITY or len(b) < 5 * left.shape[1]:
+        return None
+    reason = f"{100.0 * share:.3g} % of the unexplained torque depends on the posture as gravity's does"
+    return Check("gravity", False, f"{reason}; state gravity, as gravity = (0, 0, -9.81)", warning=True)
+
+
+def _consistency_check(links: ConsistentLinks) -> Check:
+    if links.deviation < WORSE:
+        reason = f"links that can exist have these base parameters, to {links.deviation:.2g} deviations"
+        return Check("physical consistency", True, reason)
+    reason = (
+        f"the nearest links that can exist miss the base parameters by {links.deviation:.3g} deviations; "
+        "the model or the torques are wrong by more than noise"
+    )
+    return Check("physical consistency", False, reason, warning=True)
+
+
+def _explained(validation: Sequence[Compared], best: Floats) -> tuple[list[float], float]:
+    """Share of each joint's torque that parameters and delay explain, and their mean."""
+    torques = np.concatenate([one.torques for one in validation])
+    residuals = np.concatenate([one.torques - one.columns @ best for one in validation])
+    variance = np.var(torques, axis=0)
+    shares = 1.0 - np.mean(residuals**2, axis=0) / np.where(variance > 0.0, variance, np.nan)
+    return [float(share) for share in shares], float(np.mean(shares))
+
+
+def _validation_check(drives: Sequence[str], shares: Sequence[float]) -> Check:
+    listed = comma_list([f"{name} {100.0 * share:.4g} %" for name, share in zip(drives, shares, strict=True)])
+    if min(shares) > POOR:
+        return Check("validation", True, f"of the unseen torque are explained: {listed}")
+    reason = f"of the unseen torque are explained only: {listed}"
+    advice = "what acts there is not in the model, or torques are noise"
+    return Check("validation", False, f"{reason}; {advice}", warning=True)

@@ -1,0 +1,244 @@
+"""Linear least squares of torques whose errors hang together in time and between joints.
+
+The errors of a band-limited torque are not independent from sample to sample, and those of an acceleration grow with
+the frequency. Each joint's residuals are therefore described by an autoregression, by which torques and columns are
+filtered alike (Cochrane and Orcutt 1949, known at second hand), and what is left is weighted by its covariance
+between the joints:
+
+    (sum_k X_k^T S^-1 X_k) beta = sum_k X_k^T S^-1 y_k         covariance of beta: the inverse of the sum
+
+X_k (d, b) and y_k (d,) the filtered columns and torques of sample k.
+
+Torques that act later by a time s than their time stamps say are, to first order, X beta + s y': the torques' own
+derivative is one more column. Its s is fitted with the others, since viscous friction hangs on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+MOST_TERMS: Final = 12  # of an autoregression
+BLOCKS: Final = 30  # of the filtered samples, between which errors are taken for independent
+ROUNDS: Final = 3  # of residuals and their description
+FLOOR: Final = 1e-5  # share of the residuals' variance that is white: what filters cut off is not to be amplified
+UNSEEN: Final = 1e-11  # share of the largest eigenvalue, of columns of unit length, that is rounding
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Parameters of d joints' torques, b of them.
+
+    values       (b,)
+    information  (b, b)  inverse of the covariance of their errors
+    covariance   (b, b)  of what the data tell; see `unseen`
+    unseen       (b, u)  directions of parameters that change no torque, orthonormal in units of `size`
+    size         (b,)    units of the parameters: one over the length of the filtered column
+    whitening    (d, t)  coefficients of the joints' filters, the first 1
+    weight       (d, d)  L^-1 of the filtered residuals' covariance L L^T
+    freedom      filtered samples of all joints, less parameters
+    delay, delay_deviation  s, by which the torques act after their time stamps, and its standard deviation [s]
+    """
+
+    values: Floats
+    information: Floats
+    covariance: Floats
+    unseen: Floats
+    size: Floats
+    whitening: Floats
+    weight: Floats
+    freedom: float
+    delay: float
+    delay_deviation: float
+
+    @property
+    def deviations(self) -> Floats:
+        """Standard deviations (b,) of the parameters; inf of those that the data leave open."""
+        sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return np.where(self.open_along(np.eye(len(self.values))), np.inf, sigma)
+
+    def deviation(self, gradient: Floats) -> float:
+        """Standard deviation of a function of the parameters by its gradient (b,); inf where the data leave it
+        open."""
+        if bool(self.open_along(gradient[None])[0]):
+            return float(np.inf)
+        return float(np.sqrt(max(gradient @ self.covariance @ gradient, 0.0)))
+
+    def open_along(self, gradients: Floats) -> NDArray[np.bool_]:
+        """Of each gradient (k, b) whether parameters that change no torque change the function."""
+        scaled = gradients * self.size
+        length = np.linalg.norm(scaled, axis=1)
+        return np.asarray(np.linalg.norm(scaled @ self.unseen, axis=1) > 1e-5 * length)
+
+    @property
+    def condition(self) -> float:
+        """Ratio of the largest to the least singular value of the filtered columns, each of unit length."""
+        if self.unseen.shape[1]:
+            return float(np.inf)
+        eigenvalues = np.linalg.eigvalsh(self.information * self.size[:, None] * self.size)
+        return float(np.sqrt(eigenvalues[-1] / eigenvalues[0]))
+
+    def refitted(self, columns: Sequence[Floats], torques: Sequence[Floats]) -> Floats:
+        """The parameters (b,) of other columns and torques by the same filters and weights."""
+        return _solve(*_without_delay(*_sums(columns, torques, self.whitening, self.weight)))[0]
+
+
+def regress(columns: Sequence[Floats], torques: Sequence[Floats]) -> Regression:
+    """The parameters of torques, and the covariance of their errors.
+
+    columns  (n, d, b + 1) of each stretch, n samples, the last the derivative of the torques
+    torques  (n, d)
+    """
+    d = torques[0].shape[1]
+    whitening = np.ones((d, 1))
+    spread = np.std(np.concatenate(torques), axis=0)
+    weight = np.diag(1.0 / np.where(spread > 0.0, spread, 1.0))
+    values = _solve(*_sums(columns, torques, whitening, weight))[0]
+    for _ in range(ROUNDS):
+        residuals = [y - X @ values for X, y in zip(columns, torques, strict=True)]
+        whitening = _autoregressions(residuals)
+        white = np.concatenate([_filtered(r, whitening) for r in residuals])
+        weight = _inverse_factor(white.T @ white / max(len(white) - len(values) / d - whitening.shape[1], 1.0))
+        information, moment = _sums(columns, torques, whitening, weight)
+        values = _solve(information, moment)[0]
+    freedom = float(max(white.size - len(values), 1))
+    weight = weight / np.sqrt(_excess(columns, torques, values, information, whitening, weight))
+    information, moment = _sums(columns, torques, whitening, weight)
+    whole, delay = np.asarray(_solve(information, moment)[1]), float(values[-1])
+    information, moment = _without_delay(information, moment)
+    values, covariance, unseen, size = _solve(information, moment)
+    deviation = float(np.sqrt(max(whole[-1, -1], 0.0)))
+    return Regression(
+        values, information, covariance, unseen, size, whitening, weight, freedom, delay, deviation
+    )
+
+
+def _excess(
+    columns: Sequence[Floats],
+    torques: Sequence[Floats],
+    values: Floats,
+    information: Floats,
+    whitening: Floats,
+    weight: Floats,
+) -> float:
+    """By what factor the parameters' variance is larger than it would be of white residuals; at least 1.
+
+        tr(H^-1 sum_g s_g s_g^T) / b,      s_g = sum of X_k^T S^-1 r_k over block g
+
+    (the sandwich of White 1980 by blocks, known at second hand, averaged over the parameters, which makes it steady).
+    """
+    length = max(sum(len(y) for y in torques) // BLOCKS, 2 * whitening.shape[1])
+    total, blocks = np.zeros_like(information), 0
+    for X, y in zip(columns, torques, strict=True):
+        if len(y) <= whitening.shape[1]:
+            continue
+        both = np.concatenate([X, (y - X @ values)[..., None]], axis=2)
+        both = np.einsum("ij,njb->nib", weight, _filtered(both, whitening))
+        scores = np.einsum("nib,ni->nb", both[..., :-1], both[..., -1])
+        for begin in range(0, len(scores), length):
+            score = np.sum(scores[begin : begin + length], axis=0)
+            total += np.outer(score, score)
+            blocks += 1
+    covariance, unseen = _solve(information, np.zeros(len(values)))[1:3]
+    seen = len(values) - unseen.shape[1]
+    return max(float(np.sum(covariance * total)) / seen * blocks / max(blocks - 1, 1), 1.0)
+
+
+def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]:
+    """What the sums say of the parameters with the last one, the delay, at its best."""
+    own, with_others = float(information[-1, -1]), information[:-1, -1]
+    if not own > 0.0:
+        return information[:-1, :-1], moment[:-1]
+    return information[:-1, :-1] - np.outer(with_others, with_others) / own, moment[:-1] - with_others * moment[-1] / own
+
+
+def _inverse_factor(covariance: Floats) -> Floats:
+    """L^-1 of a covariance L L^T; a variance of 0, of data without errors, is replaced by a small one."""
+    scale = np.sqrt(np.diag(covariance))
+    scale = np.where(scale > 0.0, scale, max(float(np.max(scale, initial=0.0)), 1e-150))
+    correlation = covariance / scale[:, None] / scale + 1e-9 * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
+
+
+def _sums(
+    columns: Sequence[Floats], torques: Sequence[Floats], whitening: Floats, weight: Floats
+) -> tuple[Floats, Floats]:
+    """The sums of X^T S^-1 X (b, b) and X^T S^-1 y (b,) over all stretches."""
+    b = columns[0].shape[2]
+    information, moment = np.zeros((b, b)), np.zeros(b)
+    for X, y in zip(columns, torques, strict=True):
+        if len(y) <= whitening.shape[1]:
+            continue
+        both = _filtered(np.concatenate([X, y[..., None]], axis=2), whitening)
+        both = np.einsum("ij,njb->nib", weight, both).reshape(-1, b + 1)
+        products = both.T @ both
+        information += products[:b, :b]
+        moment += products[:b, b]
+    return information, moment
+
+
+def _solve(information: Floats, moment: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Parameters, their covariance, the directions that change nothing and the units of these."""
+    length = np.sqrt(np.diag(information))
+    size = 1.0 / np.where(length > 0.0, length, 1.0)
+    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
+    seen = eigenvalues > UNSEEN * max(float(eigenvalues[-1]), 1e-300)
+    half = vectors[:, seen] / np.sqrt(eigenvalues[seen])
+    covariance = np.asarray((half @ half.T) * size[:, None] * size)
+    return covariance @ moment, covariance, vectors[:, ~seen], size
+
+
+def _filtered(signals: Floats, whitening: Floats) -> Floats:
+    """Signals (n, d, ...) through each joint's filter, without the first samples."""
+    order = whitening.shape[1] - 1
+    n = len(signals) - order
+    if n <= 0:
+        return signals[:0]
+    shape = (1, -1) + (1,) * (signals.ndim - 2)
+    out = np.zeros_like(signals[:n])
+    for k in range(order + 1):
+        out += whitening[:, k].reshape(shape) * signals[order - k : order - k + n]
+    return out
+
+
+def _autoregressions(residuals: Sequence[Floats]) -> Floats:
+    """Filters (d, t + 1) that leave white noise of each joint's residuals, by Yule and Walker's equations; their
+    order by Schwarz's criterion."""
+    count = sum(len(r) for r in residuals)
+    most = int(min(MOST_TERMS, count // 20, min(len(r) for r in residuals) // 3))
+    d = residuals[0].shape[1]
+    if most < 1:
+        return np.ones((d, 1))
+    lagged = np.zeros((most + 1, d))
+    for r in residuals:
+        for k in range(most + 1):
+            lagged[k] += np.einsum("nd,nd->d", r[: len(r) - k], r[k:])
+    filters = [_levinson(row / count, count) for row in lagged.T]
+    longest = max(len(one) for one in filters)
+    return np.stack([np.pad(one, (0, longest - len(one))) for one in filters])
+
+
+def _levinson(correlation: Floats, count: int) -> Floats:
+    """The filter of least order by Schwarz's criterion, from correlations at the lags 0, 1, ..."""
+    a, best = np.ones(1), np.ones(1)
+    error = correlation[0] * (1.0 + FLOOR)
+    if not error > 0.0:
+        return best
+    criterion = count * np.log(error)
+    for k in range(1, len(correlation)):
+        reflection = -float(a @ correlation[k:0:-1]) / error
+        longer = np.append(a, 0.0)
+        a = longer + reflection * longer[::-1]
+        error *= 1.0 - reflection**2
+        if not error > 0.0:
+            break
+        value = count * np.log(error) + np.log(count) * k
+        if value < criterion:
+            criterion, best = value, a
+    return best
