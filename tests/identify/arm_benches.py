@@ -161,9 +161,10 @@ def chain_device(chains, s, gravity_axis=False, period=PERIOD, delay=0.5, counts
         "mechanism": {
             "links": links,
             "drives": drives,
-            "handle": {"link": names[min(n, 2) - 1]} if n < 3 else {"link": names[-1], "controls": "pose"},
+            "handle": {"link": names[-1]} if n < 3 else {"link": names[-1], "controls": "pose"},
             "assemblies": {"only": {"joints_rad": dict(zip(names, map(float, start), strict=True))}},
-            "reference": {"position_m": position, "direction": [0.6, 0.8], "assembly": "only"},
+            "reference": {"position_m": position, "direction": [0.6, 0.8], "assembly": "only"}
+            | ({"orientation_rad": [0.0, 0.0, float(np.sum(start))]} if n > 2 else {}),
             "damping": {"mode_ratio": 0.05},
         },
         "loop": {"sampling_period_s": period, "delay_samples": delay},

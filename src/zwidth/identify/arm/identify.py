@@ -49,6 +49,7 @@ FITTED: Final = 0.7  # share of a single record that is fitted; the rest is for 
 SEEN: Final = 400_000  # rows of a record that are looked at first
 FLEXIBLE: Final = 0.2  # share of the lowest flexible mode up to which the model of rigid links is used
 PAIRS: Final = 2  # of noise of either sign, by which the bias is seen
+LAGS: Final = 24  # of the errors' autocovariances
 FEWEST: Final = 10  # compared samples for each base parameter
 WORSE: Final = 3.0  # deviations per base parameter by which a consistent set may miss
 POOR: Final = 0.5  # share explained, below which a reader is warned
@@ -186,8 +187,11 @@ class _Work:
         checks.append(_length_check(seen, validation, base))
         if stop := self.refusal(checks):
             return stop
-        fit = regress([one.columns for one in seen], [one.torques for one in seen])
-        beta = self._unbiased(comparison, fitted, fit)
+        first = regress([one.columns for one in seen], [one.torques for one in seen])
+        noisy = list(self._noisy(comparison, fitted))
+        sources = error_sources(band, first, seen, noisy)
+        fit = regress([one.columns for one in seen], [one.torques for one in seen], sources)
+        beta = _unbiased(fit, noisy)
         checks += self._fit_checks(fit, base, beta, seen, validation, weights, band)
         if stop := self.refusal(checks):
             return stop
@@ -312,29 +316,17 @@ class _Work:
 
     # --- the fit ------------------------------------------------------------------------------------------
 
-    def _unbiased(self, comparison: Comparison, fitted: Sequence[Stretch], fit: Regression) -> Floats:
-        """The parameters, moved back by what the noise of the positions draws them to."""
+    def _noisy(self, comparison: Comparison, fitted: Sequence[Stretch]) -> Iterator[list[Compared]]:
+        """The fitted part with as much noise of the positions again, and then with the same of the other sign."""
         rng = np.random.default_rng(0)
-        found = list[Floats]()
         for number in range(PAIRS):
             self.progress("noise", number, PAIRS)
             noise = [comparison.band.noise_of(len(one.time), rng) for one in fitted]
             for sign in (1.0, -1.0):
-                noisy = [
-                    replace(
-                        one,
-                        coordinates=one.coordinates + sign * q,
-                        rates=one.rates + sign * v,
-                        accelerations=one.accelerations + sign * a,
-                    )
-                    for one, (q, v, a) in zip(fitted, noise, strict=True)
-                ]
                 try:
-                    seen = _compared(comparison, noisy)
+                    yield _compared(comparison, [_with_noise(*one, sign) for one in zip(fitted, noise, strict=True)])
                 except UnreachedError:  # at the edge of what the loops allow
-                    return fit.values
-                found.append(fit.refitted([one.columns for one in seen], [one.torques for one in seen]))
-        return np.asarray(2.0 * fit.values - np.mean(found, axis=0))
+                    return
 
     def _fit_checks(
         self,
@@ -500,6 +492,43 @@ def _compared(
     """The stretches that are long enough for the kernel."""
     least = 2 * comparison.band.narrow.half(comparison.band.step) + 1
     return [comparison.of(one, static) for one in stretches if len(one.time) > least]
+
+
+def _with_noise(stretch: Stretch, noise: tuple[Floats, Floats, Floats], sign: float) -> Stretch:
+    q, v, a = noise
+    return replace(
+        stretch,
+        coordinates=stretch.coordinates + sign * q,
+        rates=stretch.rates + sign * v,
+        accelerations=stretch.accelerations + sign * a,
+    )
+
+
+def _unbiased(fit: Regression, noisy: Sequence[Sequence[Compared]]) -> Floats:
+    """The parameters, moved back by what the noise of the positions draws them to."""
+    whole = len(noisy) - len(noisy) % 2
+    if not whole:
+        return fit.values
+    found = [fit.refitted([o.columns for o in one], [o.torques for o in one]) for one in noisy[:whole]]
+    return np.asarray(2.0 * fit.values - np.mean(found, axis=0))
+
+
+def error_sources(
+    band: Band, fit: Regression, seen: Sequence[Compared], noisy: Sequence[Sequence[Compared]]
+) -> list[Floats]:
+    """Autocovariances (t, d) of what noise of the torques, and noise of the positions, makes of the residuals."""
+    taps, thin = band.narrow.taps(band.step), band.thinning
+    own = np.convolve(taps, taps[::-1])[len(taps) - 1 :: thin]
+    lags = min(len(own), LAGS)
+    white = np.tile(own[:lags, None], (1, seen[0].torques.shape[1]))
+    best = np.append(fit.values, 0.0)
+    moved = np.zeros_like(white)
+    for plus, minus in zip(noisy[::2], noisy[1::2], strict=False):
+        for one, other in zip(plus, minus, strict=True):
+            error = 0.5 * ((one.columns - other.columns) @ best)
+            for k in range(min(lags, len(error))):
+                moved[k] += np.sum(error[: len(error) - k] * error[k:], axis=0)
+    return [white, moved]
 
 
 def _length_check(seen: Sequence[Compared], validation: Sequence[Compared], base: BaseParameters) -> Check:

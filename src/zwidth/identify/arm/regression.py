@@ -1,9 +1,11 @@
 """Linear least squares of torques whose errors hang together in time and between joints.
 
 The errors of a band-limited torque are not independent from sample to sample, and those of an acceleration grow with
-the frequency. Each joint's residuals are therefore described by an autoregression, by which torques and columns are
-filtered alike (Cochrane and Orcutt 1949, known at second hand), and what is left is weighted by its covariance
-between the joints:
+the frequency. Their sources are known, and so are the autocovariances of what each of them makes: noise of the torques,
+and noise of the positions. Only their levels are fitted to the residuals, by Whittle's likelihood, and torques and
+columns are filtered alike by the autoregression that makes such errors white (Cochrane and Orcutt 1949, known at
+second hand). What the residuals then still have of their own is described by a second, short autoregression, if they
+are many; and what is left is weighted by its covariance between the joints:
 
     (sum_k X_k^T S^-1 X_k) beta = sum_k X_k^T S^-1 y_k         covariance of beta: the inverse of the sum
 
@@ -26,6 +28,7 @@ Floats = NDArray[np.float64]
 
 MOST_TERMS: Final = 12  # of an autoregression
 BLOCKS: Final = 30  # of the filtered samples, between which errors are taken for independent
+WHITTLE: Final = 8  # rounds of the levels' search
 ROUNDS: Final = 3  # of residuals and their description
 FLOOR: Final = 1e-5  # share of the residuals' variance that is white: what filters cut off is not to be amplified
 UNSEEN: Final = 1e-11  # share of the largest eigenvalue, of columns of unit length, that is rounding
@@ -89,11 +92,15 @@ class Regression:
         return _solve(*_without_delay(*_sums(columns, torques, self.whitening, self.weight)))[0]
 
 
-def regress(columns: Sequence[Floats], torques: Sequence[Floats]) -> Regression:
+def regress(
+    columns: Sequence[Floats], torques: Sequence[Floats], sources: Sequence[Floats] = ()
+) -> Regression:
     """The parameters of torques, and the covariance of their errors.
 
     columns  (n, d, b + 1) of each stretch, n samples, the last the derivative of the torques
     torques  (n, d)
+    sources  (t, d) of each source of errors: its autocovariance in each joint's torque at the lags 0, 1, ... in any
+             unit; none: errors are described by their own alone
     """
     d = torques[0].shape[1]
     whitening = np.ones((d, 1))
@@ -102,9 +109,9 @@ def regress(columns: Sequence[Floats], torques: Sequence[Floats]) -> Regression:
     values = _solve(*_sums(columns, torques, whitening, weight))[0]
     for _ in range(ROUNDS):
         residuals = [y - X @ values for X, y in zip(columns, torques, strict=True)]
-        whitening = _autoregressions(residuals)
+        whitening = _whitening(residuals, sources)
         white = np.concatenate([_filtered(r, whitening) for r in residuals])
-        weight = _inverse_factor(white.T @ white / max(len(white) - len(values) / d - whitening.shape[1], 1.0))
+        weight = _inverse_factor(white.T @ white / max(len(white) - len(values) / d - 2.0, 1.0))
         information, moment = _sums(columns, torques, whitening, weight)
         values = _solve(information, moment)[0]
     freedom = float(max(white.size - len(values), 1))
@@ -207,6 +214,62 @@ def _filtered(signals: Floats, whitening: Floats) -> Floats:
     return out
 
 
+def _whitening(residuals: Sequence[Floats], sources: Sequence[Floats]) -> Floats:
+    """Filters (d, t) that leave white noise of each joint's residuals."""
+    d = residuals[0].shape[1]
+    lags = min(len(r) for r in residuals) // 3
+    if lags < 2 or not sources:
+        return _autoregressions(residuals)
+    filters = list[Floats]()
+    for j in range(d):
+        shapes = np.stack([source[:lags, j] for source in sources])
+        shapes = shapes[shapes[:, 0] > 0.0]
+        if not len(shapes):
+            filters.append(np.ones(1))
+            continue
+        shapes = shapes / shapes[:, :1]
+        levels = _levels([r[:, j] for r in residuals], shapes)
+        filters.append(_levinson(levels @ shapes, 0))
+    first = _alike(filters)
+    second = _autoregressions([_filtered(r, first) for r in residuals])
+    return _alike([np.convolve(a, b) for a, b in zip(first, second, strict=True)])
+
+
+def _alike(filters: Sequence[Floats]) -> Floats:
+    """Filters as rows, the shorter ones with zeros behind."""
+    longest = max(len(one) for one in filters)
+    return np.stack([np.pad(one, (0, longest - len(one))) for one in filters])
+
+
+def _levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
+    """Levels (s,) of sources with autocovariances (s, t) that make residuals, stretch by stretch, likeliest.
+
+    The periodogram I of n samples is, in the mean, sum_k r_k (1 - k/n) cos(w k), and spread as much as it is large:
+    levels minimise sum ((I - S)/S)^2 over and over, S that of the levels before (Whittle 1953, known at second hand).
+    """
+    from scipy.optimize import nnls
+
+    power, made = list[Floats](), list[Floats]()
+    lags = np.arange(shapes.shape[1])
+    for r in residuals:
+        n = len(r)
+        power.append((np.abs(np.fft.rfft(r)) ** 2 / n)[1 : (n + 1) // 2])
+        angle = 2.0 * np.pi * np.arange(1, (n + 1) // 2)[:, None] / n * lags
+        weights = np.where(lags > 0, 2.0, 1.0) * np.maximum(1.0 - lags / n, 0.0)
+        made.append((weights * np.cos(angle)) @ shapes.T)
+    I, A = np.concatenate(power), np.maximum(np.concatenate(made), 0.0)
+    scale = float(np.mean(I)) or 1.0
+    S = A @ np.full(len(shapes), scale)
+    levels = np.full(len(shapes), scale)
+    for _ in range(WHITTLE):
+        S = np.maximum(S, FLOOR * float(np.max(S)) + 1e-300)
+        levels = nnls(A / S[:, None], I / S)[0]
+        if not levels.any():
+            return np.full(len(shapes), scale)
+        S = A @ levels
+    return np.asarray(levels)
+
+
 def _autoregressions(residuals: Sequence[Floats]) -> Floats:
     """Filters (d, t + 1) that leave white noise of each joint's residuals, by Yule and Walker's equations; their
     order by Schwarz's criterion."""
@@ -219,13 +282,12 @@ def _autoregressions(residuals: Sequence[Floats]) -> Floats:
     for r in residuals:
         for k in range(most + 1):
             lagged[k] += np.einsum("nd,nd->d", r[: len(r) - k], r[k:])
-    filters = [_levinson(row / count, count) for row in lagged.T]
-    longest = max(len(one) for one in filters)
-    return np.stack([np.pad(one, (0, longest - len(one))) for one in filters])
+    return _alike([_levinson(row / count, count) for row in lagged.T])
 
 
 def _levinson(correlation: Floats, count: int) -> Floats:
-    """The filter of least order by Schwarz's criterion, from correlations at the lags 0, 1, ..."""
+    """The filter of least order by Schwarz's criterion, from correlations at the lags 0, 1, ... of so many samples;
+    of known correlations, count 0, that of the highest order."""
     a, best = np.ones(1), np.ones(1)
     error = correlation[0] * (1.0 + FLOOR)
     if not error > 0.0:
@@ -239,6 +301,6 @@ def _levinson(correlation: Floats, count: int) -> Floats:
         if not error > 0.0:
             break
         value = count * np.log(error) + np.log(count) * k
-        if value < criterion:
+        if value < criterion or not count:
             criterion, best = value, a
     return best
