@@ -37,9 +37,9 @@ class Columns:
 
     needed    each of them, or one of several where they are alternatives: ("time_s", ("force_N", "torque_Nm")).
               A name that ends in ".*" stands for all columns that begin so, one or more, each of another part of
-              the device: "angle_rad.*" for angle_rad.upper and angle_rad.lower; or for angle_rad alone, of a device
-              with one such part. Alternatives with ".*" may stand beside each other. MATLAB's names have no dot:
-              angle_rad_upper is read, too
+              the device: "angle_rad.*" for angle_rad.upper and angle_rad.lower; or for angle_rad alone, of a
+              device with one such part. Alternatives with ".*" may stand beside each other. MATLAB's names have no
+              dot: angle_rad_upper is read, too
     optional  numbers that are read where they are there
     text      the same, words or numbers: names of joints, of those who held the device
     """

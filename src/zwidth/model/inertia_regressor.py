@@ -53,8 +53,12 @@ def inertia_regressor(
     N, c = coordinates.shape
     out = np.full((N, c, PARAMETERS * mech.bodies.size), np.nan)
     angles = np.full((N, mech.parent.size), np.nan)
-    arrays = [np.array(x, dtype=np.float64, order="C") for x in (start, coordinates, rates, accelerations, gravity)]
-    reached = _regressors(mech, *arrays, angles, out)
+
+    def own(array: Floats) -> Floats:  # a copy: kernels are compiled once for arrays that can be written to
+        return np.array(array, dtype=np.float64, order="C")
+
+    given = own(start), own(coordinates), own(rates), own(accelerations), own(gravity)
+    reached = _regressors(mech, *given, angles, out)
     out[reached:], angles[reached:] = np.nan, np.nan
     return out, angles, int(reached)
 

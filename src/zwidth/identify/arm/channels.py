@@ -56,7 +56,8 @@ class Channels:
 def channels_of(device: Device, record: Record, side: Side) -> Channels:
     """The columns of a record of this device, each named by the link of its joint, or by its drive.
 
-    side   "joint": coordinates of the links' joints, torques at the joints; "motor": the motors' angles and torques
+    side   "joint": coordinates of the links' joints, torques at the joints; "motor": the motors' angles and
+           torques
     Raises DeviceError  for columns that are missing or given twice
     """
     mechanism = device.mechanism

@@ -1,4 +1,4 @@
-"""What a record of a mechanism's joints must be before its torques are fitted, and what is said where it is not."""
+"""What a record of a mechanism's joints must be before its torques are fitted."""
 
 from __future__ import annotations
 
@@ -63,7 +63,9 @@ def motion_check(drives: Sequence[str], surveys: Sequence[Survey], counts: Float
         named = comma_list([f"{drives[k]} by {spans[k]:.3g} rad" for k in far])
         return Check("motion", False, f"{named}, which is several turns: are these angles in degrees or counts?")
     if still:
-        named = comma_list([f"{drives[k]} by {spans[k]:.3g} ({spans[k] / max(steps[k], 1e-300):.3g} counts)" for k in still])
+        named = comma_list(
+            [f"{drives[k]} by {spans[k]:.3g} ({spans[k] / max(steps[k], 1e-300):.3g} counts)" for k in still]
+        )
         reason = f"too little motion: {named}; move every joint by more than {COUNTS:g} counts"
         return Check("motion", False, reason, warning=len(still) < len(drives))
     least = comma_list([f"{name} by {span:.3g}" for name, span in zip(drives, spans, strict=True)])
@@ -97,7 +99,9 @@ def torque_check(drives: Sequence[str], surveys: Sequence[Survey], limits: Float
         return Check("torque", False, f"the torque of {comma_list(constant)} is constant; record what acts")
     if beyond:
         reason = f"torques beyond the drives' limits in the device file: {comma_list(beyond)}"
-        return Check("torque", False, f"{reason}; record what acts, not what is commanded, or correct torque_limit_Nm")
+        return Check(
+            "torque", False, f"{reason}; record what acts, not what is commanded, or correct torque_limit_Nm"
+        )
     if cut:
         reason = f"a part of the samples stands at the largest torque: {comma_list(cut)}"
         return Check("torque", False, f"{reason}; where a sensor is saturated, move less violently", warning=True)
@@ -134,7 +138,7 @@ def velocity_check(
         velocity = convolved(survey.rows[channels.velocity[k]], taps)
         alike = [_correlation(velocity, rates[:, j]) for j in range(len(drives))]
         best = int(np.argmax(np.abs(alike)))
-        slope = float(velocity @ rates[:, k] / max(rates[:, k] @ rates[:, k], 1e-300))
+        slope = float(velocity @ rates[:, k]) / max(float(rates[:, k] @ rates[:, k]), 1e-300)
         column = channels.velocity[k]
         if best != k and abs(alike[best]) > ALIKE and abs(alike[k]) < ALIKE:
             faults.append(f"{column} follows the derivative of {channels.coordinate[best]}: columns are swapped")
@@ -143,7 +147,9 @@ def velocity_check(
                 f"{column} does not follow the derivative of {channels.coordinate[k]} (correlation {alike[k]:.2f})"
             )
         elif not abs(slope - 1.0) < SLOPE:
-            known = next((text for ratio, text in RATIOS.items() if abs(slope / ratio - 1.0) < SLOPE), "in another unit")
+            known = next(
+                (text for ratio, text in RATIOS.items() if abs(slope / ratio - 1.0) < SLOPE), "in another unit"
+            )
             faults.append(f"{column} is {slope:.4g} times the derivative of {channels.coordinate[k]}: {known}")
     if faults:
         return Check("velocity", False, f"{'; '.join(faults)}; correct the columns, or leave the velocities out")
@@ -164,8 +170,8 @@ def other_readings(
     columns  (n, d, b) of each stretch;   torques  (n, d)
     Returns  what it is, "" where there is none; and the shares that are left unexplained, as it is and so
     """
-    X = np.concatenate([one for one in columns])
-    y = np.concatenate([one for one in torques])
+    X = np.concatenate(list(columns))
+    y = np.concatenate(list(torques))
     scale = np.std(y, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
 
@@ -186,8 +192,10 @@ def other_readings(
     for i, j in combinations(range(d), 2):
         order = np.arange(d)
         order[[i, j]] = j, i
-        tried.append((unexplained(y[:, order], scale[order]), f"the torques of {names[i]} and {names[j]} are swapped"))
-    best, text = min(tried, default=(np.inf, ""))
+        tried.append(
+            (unexplained(y[:, order], scale[order]), f"the torques of {names[i]} and {names[j]} are swapped")
+        )
+    best, text = min(tried, default=(float("inf"), ""))
     return (text if best < BETTER * now else ""), now, best
 
 
@@ -205,4 +213,6 @@ def sign_check(
                 faults.append(f"the torque of {name} in {label}")
     if not faults:
         return None
-    return Check("signs", False, f"{comma_list(faults)} has the other sign than what all records tell; turn it round")
+    return Check(
+        "signs", False, f"{comma_list(faults)} has the other sign than what all records tell; turn it round"
+    )

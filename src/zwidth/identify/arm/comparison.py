@@ -74,7 +74,9 @@ class Comparison:
             columns.append(np.ascontiguousarray(all_columns[:, :, kept]))
             if static:
                 still = np.zeros_like(one.rates)
-                further.append(np.concatenate([self._links(one, angles, still, still, g)[0] for g in static], axis=2))
+                further.append(
+                    np.concatenate([self._links(one, angles, still, still, g)[0] for g in static], axis=2)
+                )
             angles = places[-1]
         torques = stretch.forces - self.known_rotors * stretch.accelerations
         none = np.zeros((*torques.shape, 0))

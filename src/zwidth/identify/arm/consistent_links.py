@@ -1,18 +1,18 @@
 """Masses, centres of mass and inertias that bodies can have, nearest to the file's, for given base parameters.
 
-Ten numbers are those of a body of positive density if and only if its pseudo-inertia is positive definite (Wensing,
-Kim and Slotine 2018, known at second hand):
+Ten numbers are those of a body of positive density if and only if its pseudo-inertia is positive definite
+(Wensing, Kim and Slotine 2018, known at second hand):
 
     P = [[S, h], [h^T, m]],   S = tr(I)/2 1 - I,   h = m c,   I about the frame's origin
 
-It is P = L V V^T L^T with L L^T the file's and V an upper triangle with positive diagonal exp(x), whose other entries
-are coordinates, too: every vector x of ten numbers is a body, and x = 0 the file's (log-Cholesky coordinates; Rucker
-and Wensing 2022, known at second hand). The numbers are those that minimise
+It is P = L V V^T L^T with L L^T the file's and V an upper triangle with positive diagonal exp(x), whose other
+entries are coordinates, too: every vector x of ten numbers is a body, and x = 0 the file's (log-Cholesky
+coordinates; Rucker and Wensing 2022, known at second hand). The numbers are those that minimise
 
     (G Phi(x) - beta)^T H (G Phi(x) - beta) + |x|^2 / s^2
 
-with H the information of the base parameters beta: where the data say much, they decide, and where they say nothing
-the file does.
+with H the information of the base parameters beta: where the data say much, they decide, and where they say
+nothing the file does.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def consistent_links(
 
     parameters = base.parameters
     file = pseudo_inertias(mechanism, parameters.bodies)
-    roots = np.linalg.cholesky(file)
+    roots = np.asarray(np.linalg.cholesky(file), dtype=np.float64)
     rotor = np.array([_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
     size = np.sqrt(np.diag(information))
     size = 1.0 / np.where(size > 0.0, size, 1.0)
@@ -95,7 +95,9 @@ def consistent_links(
     def slopes(x: Floats) -> Floats:
         return np.concatenate([rest @ (G @ all_parameters(x)[1]), np.eye(count) / WIDE])
 
-    solved = least_squares(residuals, np.zeros(count), jac=slopes, xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200)
+    solved = least_squares(
+        residuals, np.zeros(count), jac=slopes, xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200
+    )
     values = all_parameters(np.asarray(solved.x))[0]
     moved = rest @ (G @ values - beta[dynamic])
     deviation = float(np.sqrt(np.sum(moved**2) / max(len(dynamic), 1)))

@@ -2,9 +2,9 @@
 
     m = 1 / (h^T A^-1 h),   dm = m^2 x^T dA x,   x = A^-1 h
 
-A being the mass matrix of the links (link side), n^2 J of the rotors (motor side), or both (rigid); it is linear in
-the parameters: column s of it is what the torques of a unit acceleration of coordinate s are, at rest and without
-gravity.
+A being the mass matrix of the links (link side), n^2 J of the rotors (motor side), or both (rigid); it is linear
+in the parameters: column s of it is what the torques of a unit acceleration of coordinate s are, at rest and
+without gravity.
 """
 
 from __future__ import annotations
@@ -83,8 +83,8 @@ def effective_masses(
 
 
 def mass_columns(parameters: Parameters, angles: Floats) -> Floats:
-    """The mass matrix (d, d, P') of links and fitted rotors per unit of each inertial parameter, at a posture given
-    by its joint coordinates (n,)."""
+    """The mass matrix (d, d, P') of links and fitted rotors per unit of each inertial parameter, at a posture
+    given by its joint coordinates (n,)."""
     mech = parameters.mech
     c = mech.driven
     at = np.tile(mech.to_drive[0] @ angles[mech.joint[-c:]], (c, 1))

@@ -36,8 +36,8 @@ def quantile(fit: Regression) -> float:
 def mass_estimates(
     point: OperatingPoint, masses: Iterable[EffectiveMass], base: BaseParameters, fit: Regression
 ) -> Iterator[Estimate]:
-    """Effective masses at a point; their intervals are those of their logarithm, without bound where the data leave
-    a part of them open."""
+    """Effective masses at a point; their intervals are those of their logarithm, without bound where the data
+    leave a part of them open."""
     q = quantile(fit)
     assert point.directions is not None
     for mass in masses:
@@ -79,7 +79,11 @@ def friction_estimates(
         link = mechanism.links.names[drives.joint[i]]
         name, path, unit, scale = base.names[row], "", base.parameters.units[j], 1.0
         if what == 0:
-            path, unit, scale = f"mechanism.drives.{drives.names[i]}.coulomb_Nm", "N m", float(drives.transmission[i])
+            path, unit, scale = (
+                f"mechanism.drives.{drives.names[i]}.coulomb_Nm",
+                "N m",
+                float(drives.transmission[i]),
+            )
         elif what == 1 and drives.coupling is None:
             key = "joint_damping_Ns_per_m" if slides else "joint_damping_Nms_per_rad"
             path = f"mechanism.links.{link}.{key}"
@@ -95,7 +99,9 @@ def base_estimates(base: BaseParameters, fit: Regression, beta: Floats) -> Itera
     for k, j in enumerate(base.kept):
         if j < base.parameters.friction.start:
             width = q * float(deviations[k])
-            yield Estimate(base.names[k], float(beta[k]), beta[k] - width, beta[k] + width, base.parameters.units[j])
+            yield Estimate(
+                base.names[k], float(beta[k]), beta[k] - width, beta[k] + width, base.parameters.units[j]
+            )
 
 
 def delay_estimate(fit: Regression) -> Estimate:
@@ -130,7 +136,7 @@ def link_settings(
         else:
             missing.append(mechanism.drives.names[i])
     remarks = [
-        "of the links' own numbers only the base parameters are told by the data; the rest is the file's, as near as "
+        "of the links' own numbers the data tell only the base parameters; the rest is the file's, as near as "
         "bodies that can exist allow"
     ]
     if missing:

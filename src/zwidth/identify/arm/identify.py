@@ -1,9 +1,9 @@
 """Masses, first moments, inertias and friction of a mechanism from the motion and the torques of its joints.
 
-The torques are linear in the parameters (`parameters`). They are compared in a band without delay (`smoothing`), by
-least squares whose weights follow the errors (`regression`). Positions with noise make accelerations with noise, which
-draws least squares towards 0; by how much is seen by adding as much noise again, of both signs, and the fit is moved
-back by as much (simulation and extrapolation, Cook and Stefanski 1994, known at second hand).
+The torques are linear in the parameters (`parameters`). They are compared in a band without delay (`smoothing`),
+by least squares whose weights follow the errors (`regression`). Positions with noise make accelerations with
+noise, which draws least squares towards 0; by how much is seen by adding as much noise again, of both signs, and
+the fit is moved back by as much (simulation and extrapolation, Cook and Stefanski 1994, known at second hand).
 """
 
 from __future__ import annotations
@@ -28,8 +28,23 @@ from zwidth.identify.arm.checks import (
 )
 from zwidth.identify.arm.comparison import Compared, Comparison, UnreachedError
 from zwidth.identify.arm.consistent_links import ConsistentLinks, consistent_links
-from zwidth.identify.arm.effective_masses import EffectiveMass, effective_masses, mass_columns
-from zwidth.identify.arm.estimates import base_estimates, delay_estimate, friction_estimates, link_settings, mass_estimates
+from zwidth.identify.arm.effective_masses import EffectiveMass, effective_masses
+from zwidth.identify.arm.estimates import (
+    base_estimates,
+    delay_estimate,
+    friction_estimates,
+    link_settings,
+    mass_estimates,
+)
+from zwidth.identify.arm.fit_checks import (
+    consistency_check,
+    excitation_check,
+    gravity_check,
+    length_check,
+    positive_check,
+    timing_check,
+    validation_check,
+)
 from zwidth.identify.arm.parameters import BaseParameters, Parameters, base_parameters
 from zwidth.identify.arm.regression import Regression, regress
 from zwidth.identify.arm.smoothing import Band, Stretch, TorqueTiming, choose_band, smoothed
@@ -49,12 +64,7 @@ FITTED: Final = 0.7  # share of a single record that is fitted; the rest is for 
 SEEN: Final = 400_000  # rows of a record that are looked at first
 FLEXIBLE: Final = 0.2  # share of the lowest flexible mode up to which the model of rigid links is used
 PAIRS: Final = 2  # of noise of either sign, by which the bias is seen
-LAGS: Final = 24  # of the errors' autocovariances
-FEWEST: Final = 10  # compared samples for each base parameter
-WORSE: Final = 3.0  # deviations per base parameter by which a consistent set may miss
-POOR: Final = 0.5  # share explained, below which a reader is warned
-GRAVITY: Final = 0.3  # share of the unexplained torque that gravity explains, from which it is told
-SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
+LAGS: Final = 16  # of the errors' autocovariances
 
 
 @dataclass(frozen=True, repr=False)
@@ -117,7 +127,9 @@ def identify_arm(
     if at.shape or at.posture is None:
         raise fail(device.label, "point", "must be a single posture of the device's mechanism")
     weight = _gravity(device, gravity)
-    work = _Work(device, mechanism, tuple(records), at, weight, side, torque, rotors, progress or (lambda *_: None))
+    work = _Work(
+        device, mechanism, tuple(records), at, weight, side, torque, rotors, progress or (lambda *_: None)
+    )
     return work.identified()
 
 
@@ -184,7 +196,7 @@ class _Work:
             reason = f"{error}; check the angles' signs, zeros and unit (radians), and the assembly"
             return self._refused_with([*checks, Check("posture", False, reason)])
         checks.append(Check("posture", True, "every loop closes at every sample"))
-        checks.append(_length_check(seen, validation, base))
+        checks.append(length_check(seen, validation, base))
         if stop := self.refusal(checks):
             return stop
         first = regress([one.columns for one in seen], [one.torques for one in seen])
@@ -211,7 +223,9 @@ class _Work:
             periods = np.array([one.period for one in samplings])
             if np.ptp(periods) > 1e-3 * periods[0]:
                 listed = comma_list([f"{period:.6g} s" for period in periods])
-                checks.append(Check("sampling", False, f"records of different periods, {listed}; give those of one"))
+                checks.append(
+                    Check("sampling", False, f"records of different periods, {listed}; give those of one")
+                )
             period = self.device.controller.sampling_period
             if self.torque == "commanded" and abs(periods[0] / period - 1.0) > 1e-3:
                 reason = f"rows come every {periods[0]:.6g} s, but the computer commands every {period:.6g} s"
@@ -273,8 +287,8 @@ class _Work:
         soft = self._highest() / FLEXIBLE
         if band.motion > FLEXIBLE * soft:
             reason = (
-                f"the motion reaches {band.motion:.3g} Hz, the lowest mode of the links on the drives' springs is at "
-                f"{soft:.3g} Hz; compared is up to {band.edge:.3g} Hz, where rigid drives make masses wrong by "
+                f"the motion reaches {band.motion:.3g} Hz, the lowest mode of the links on the drives' springs is "
+                f"at {soft:.3g} Hz; compared is up to {band.edge:.3g} Hz, where rigid drives make masses wrong by "
                 f"{100.0 * (band.edge / soft) ** 2:.2g} % at most; move more slowly, or measure at the links"
             )
             checks.append(Check("flexible drives", False, reason, warning=True))
@@ -324,7 +338,9 @@ class _Work:
             noise = [comparison.band.noise_of(len(one.time), rng) for one in fitted]
             for sign in (1.0, -1.0):
                 try:
-                    yield _compared(comparison, [_with_noise(*one, sign) for one in zip(fitted, noise, strict=True)])
+                    yield _compared(
+                        comparison, [_with_noise(*one, sign) for one in zip(fitted, noise, strict=True)]
+                    )
                 except UnreachedError:  # at the edge of what the loops allow
                     return
 
@@ -344,54 +360,19 @@ class _Work:
         predicted = [np.concatenate([one.columns[..., :-1] @ beta for one in group]) for group in groups]
         labels = [self.records[number].label for number in sorted(by_record)]
         checks = [sign_check(self.drives, labels, predicted, measured) if len(groups) > 1 else None]
-        text, now, then = other_readings(self.drives, [o.columns for o in seen], [o.torques for o in seen])
+        text, now, then = other_readings(
+            self.drives, [o.columns[..., :-1] for o in seen], [o.torques for o in seen]
+        )
         if text:
             reason = f"{100.0 * now:.3g} % of the torque is left unexplained, {100.0 * then:.3g} % if {text}"
             checks.append(Check("signs", False, f"{reason}; check the columns"))
         checks += [
-            self._excitation_check(fit, base, beta),
-            self._positive_check(base, beta, fit),
-            _gravity_check(seen, fit, beta) if weights else None,
-            self._timing_check(fit, band.period),
+            excitation_check(fit, base, beta),
+            positive_check(self.drives, base, beta, self._start(), self._known_rotors()),
+            gravity_check(seen, fit, beta) if weights else None,
+            timing_check(fit, band.period, self.torque),
         ]
         return [one for one in checks if one is not None]
-
-    def _excitation_check(self, fit: Regression, base: BaseParameters, beta: Floats) -> Check:
-        """How well the record tells the parameters apart."""
-        inertial = [k for k, j in enumerate(base.kept) if j < base.parameters.friction.start]
-        deviations = fit.deviations
-        loose = [k for k in inertial if 1.96 * deviations[k] > abs(beta[k])]
-        seen = f"{len(base.kept)} base parameters, condition number {fit.condition:.3g}"
-        if len(loose) == len(inertial):
-            reason = f"{seen}; no mass or inertia is known to better than 100 %"
-            return Check("excitation", False, f"{reason}; accelerate every joint more, and more of them together")
-        if loose:
-            named = comma_list([base.names[k] for k in loose], 6)
-            reason = f"{seen}; not told from 0: {named}"
-            return Check("excitation", False, f"{reason}; move more joints together, faster", warning=True)
-        return Check("excitation", True, f"{seen}; all are known to better than 100 %")
-
-    def _positive_check(self, base: BaseParameters, beta: Floats, fit: Regression) -> Check | None:
-        """That torques accelerate the joints in their own direction."""
-        values = np.zeros(len(base.parameters.names))
-        values[list(base.kept)] = beta
-        inertial = base.parameters.friction.start
-        M = mass_columns(base.parameters, self._start()) @ values[:inertial] + np.diag(self._known_rotors())
-        wrong = [name for name, own in zip(self.drives, np.diag(M), strict=True) if own < 0.0]
-        if not wrong:
-            return None
-        reason = f"the inertia seen by {comma_list(wrong)} is negative"
-        return Check("signs", False, f"{reason}: turn the sign of its torque or of its angle round")
-
-    def _timing_check(self, fit: Regression, period: float) -> Check:
-        """That torques act when they are recorded."""
-        shift, deviation = fit.delay, fit.delay_deviation
-        seen = f"torques act {abs(shift):.2g} s (+-{2.0 * deviation:.1g} s) {'after' if shift > 0.0 else 'before'} "
-        if abs(shift) < SHIFT * period or abs(shift) < 4.0 * deviation:
-            return Check("timing", True, f"{seen}their time stamps, within half a period")
-        advice = "correct the loop's delay" if self.torque == "commanded" else 'if they are commands, torque = "commanded"'
-        reason = f"{seen}their time stamps; the fit allows for it, up to a few periods; {advice}"
-        return Check("timing", False, reason, warning=True)
 
     # --- the result ---------------------------------------------------------------------------------------
 
@@ -408,10 +389,10 @@ class _Work:
         values = np.zeros(len(base.parameters.names))
         values[list(base.kept)] = beta
         masses = self._masses(base, values, links)
-        numbers, remarks = link_settings(self.device, self.mechanism, base.parameters, links.values)
+        numbers, noted = link_settings(self.device, self.mechanism, base.parameters, links.values)
         best = np.append(beta, fit.delay)
         shares, total = _explained(validation, best)
-        checks = [*checks, _consistency_check(links), _validation_check(self.drives, shares)]
+        checks = [*checks, consistency_check(links), validation_check(self.drives, shares)]
         estimates = [
             *mass_estimates(self.point, masses, base, fit),
             *friction_estimates(self.device, self.mechanism, base, fit, beta),
@@ -421,17 +402,21 @@ class _Work:
         remarks = (
             f"torques were {self.torque}, at the {self.side}s; the rotors' inertias were {self.rotors}",
             f"compared up to {band.edge:.3g} Hz",
-            *remarks,
+            *noted,
         )
         last = max(one.record for one in validation)
-        what = f"the last record, {self.records[last].label}" if len(self.records) > 1 else "the last 30 % of the record"
+        what = (
+            f"the last record, {self.records[last].label}"
+            if len(self.records) > 1
+            else "the last 30 % of the record"
+        )
         return ArmIdentification(
             kind=KIND,
             label=self.device.label,
             checks=tuple(checks),
             estimates=tuple(estimates),
             validation=total,
-            validated_on=f"share of the torque of {what} that its motion and the numbers predict, mean of the joints",
+            validated_on=f"torque of {what} by its motion, mean of the joints",
             remarks=remarks,
             curves=self._curves(validation, best),
             details={
@@ -447,8 +432,7 @@ class _Work:
         )
 
     def _masses(self, base: BaseParameters, values: Floats, links: ConsistentLinks) -> Iterator[EffectiveMass]:
-        """The effective masses: by the base parameters where they determine them, else by the whole set of links.
-        """
+        """The effective masses: by the base parameters where these determine them, else by all of the links."""
         known = self._known_rotors()
         own = effective_masses(base.parameters, self.point, values, known)
         whole = effective_masses(base.parameters, self.point, links.values, known)
@@ -531,51 +515,6 @@ def error_sources(
     return [white, moved]
 
 
-def _length_check(seen: Sequence[Compared], validation: Sequence[Compared], base: BaseParameters) -> Check:
-    count = sum(one.torques.size for one in seen)
-    left = sum(len(one.time) for one in validation)
-    wanted = FEWEST * len(base.kept)
-    if count < wanted or left < FEWEST:
-        reason = f"{count} torques in the analysed band to fit {len(base.kept)} parameters, {wanted} are needed"
-        return Check("length", False, f"{reason}, and {FEWEST} to validate, of which there are {left}; record longer")
-    return Check("length", True, f"{count} torques in the analysed band to fit, {left} samples to validate")
-
-
-def _gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Check | None:
-    """That the torque has no part that depends on the posture as gravity does."""
-    best = np.append(beta, fit.delay)
-    residual = np.concatenate([one.torques - one.columns @ best for one in seen])
-    scale = np.std(residual, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    b = (residual / scale).reshape(-1)
-    X = (np.concatenate([one.columns for one in seen]) / scale[:, None]).reshape(len(b), -1)
-    G = (np.concatenate([one.static for one in seen]) / scale[:, None]).reshape(len(b), -1)
-    size = np.linalg.norm(X, axis=0)
-    Q = np.linalg.qr(X / np.where(size > 0.0, size, 1.0))[0]
-    G = G - Q @ (Q.T @ G)
-    b = b - Q @ (Q.T @ b)
-    if not np.any(G):
-        return None
-    left, values, _ = np.linalg.svd(G, full_matrices=False)
-    left = left[:, values > 1e-6 * values[0]]
-    share = float(np.sum((left.T @ b) ** 2) / max(float(b @ b), 1e-300))
-    if share < GRAVITY or len(b) < 5 * left.shape[1]:
-        return None
-    reason = f"{100.0 * share:.3g} % of the unexplained torque depends on the posture as gravity's does"
-    return Check("gravity", False, f"{reason}; state gravity, as gravity = (0, 0, -9.81)", warning=True)
-
-
-def _consistency_check(links: ConsistentLinks) -> Check:
-    if links.deviation < WORSE:
-        reason = f"links that can exist have these base parameters, to {links.deviation:.2g} deviations"
-        return Check("physical consistency", True, reason)
-    reason = (
-        f"the nearest links that can exist miss the base parameters by {links.deviation:.3g} deviations; "
-        "the model or the torques are wrong by more than noise"
-    )
-    return Check("physical consistency", False, reason, warning=True)
-
-
 def _explained(validation: Sequence[Compared], best: Floats) -> tuple[list[float], float]:
     """Share of each joint's torque that parameters and delay explain, and their mean."""
     torques = np.concatenate([one.torques for one in validation])
@@ -583,12 +522,3 @@ def _explained(validation: Sequence[Compared], best: Floats) -> tuple[list[float
     variance = np.var(torques, axis=0)
     shares = 1.0 - np.mean(residuals**2, axis=0) / np.where(variance > 0.0, variance, np.nan)
     return [float(share) for share in shares], float(np.mean(shares))
-
-
-def _validation_check(drives: Sequence[str], shares: Sequence[float]) -> Check:
-    listed = comma_list([f"{name} {100.0 * share:.4g} %" for name, share in zip(drives, shares, strict=True)])
-    if min(shares) > POOR:
-        return Check("validation", True, f"of the unseen torque are explained: {listed}")
-    reason = f"of the unseen torque are explained only: {listed}"
-    advice = "what acts there is not in the model, or torques are noise"
-    return Check("validation", False, f"{reason}; {advice}", warning=True)

@@ -2,16 +2,17 @@
 
     torque_i = (Y phi)_i + n_i^2 J_i p_i'' + C_i sign(p_i') + b_i p_i' + o_i
 
-phi being ten numbers of each link (`model.inertia_regressor`), J_i the rotor's inertia behind the ratio n_i, C_i, b_i
-and o_i dry friction, viscous friction and a constant offset, which with C_i makes dry friction of two directions.
+phi being ten numbers of each link (`model.inertia_regressor`), J_i the rotor's inertia behind the ratio n_i, C_i,
+b_i and o_i dry friction, viscous friction and a constant offset, which with C_i makes dry friction of two
+directions.
 
-Of these no more than the columns' rank can be told from any motion. The columns are gone through in a fixed order and
-each is kept that those before it do not span over random states; the others, W_d = W_k K, add to them:
+Of these no more than the columns' rank can be told from any motion. The columns are gone through in a fixed order
+and each is kept that those before it do not span over random states; the others, W_d = W_k K, add to them:
 
     beta = Phi_k + K Phi_d         base parameters                           (Gautier 1991, known at second hand)
 
-The order keeps what people read easily: friction, moments of inertia about the joint axes, products of inertia, first
-moments, masses, rotors.
+The order keeps what people read easily: friction, moments of inertia about the joint axes, products of inertia,
+first moments, masses, rotors.
 """
 
 from __future__ import annotations
@@ -97,7 +98,11 @@ class Parameters:
             out[:, i, self.inertial + k] = self.ratio_squared[i] * accelerations[:, i]
         first = self.friction.start
         for i in range(d):
-            out[:, i, first + i], out[:, i, first + d + i], out[:, i, first + 2 * d + i] = signs[:, i], rates[:, i], 1.0
+            out[:, i, first + i], out[:, i, first + d + i], out[:, i, first + 2 * d + i] = (
+                signs[:, i],
+                rates[:, i],
+                1.0,
+            )
         return out
 
     @cached_property
@@ -132,7 +137,7 @@ class BaseParameters:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """"I_zz(upper) + 0.0216 m(distal)", and so on."""
+        """ "I_zz(upper) + 0.0216 m(distal)", and so on."""
         return tuple(self._name(row) for row in range(len(self.kept)))
 
     def _name(self, row: int) -> str:
@@ -160,7 +165,7 @@ def base_parameters(parameters: Parameters, start: Floats, gravity: Floats) -> B
     W = _random_columns(parameters, start, gravity)
     size = np.sqrt(np.einsum("rp,rp->p", W, W))
     scaled = W / np.where(size > 0.0, size, 1.0)
-    P, kept, basis = W.shape[1], list[int](), np.zeros((W.shape[0], 0))
+    kept, basis = list[int](), np.zeros((W.shape[0], 0))
     felt = size > DEPENDENT * np.max(size[: parameters.inertial], initial=0.0) * 1e-4
     for j in parameters.order:
         left = scaled[:, j]

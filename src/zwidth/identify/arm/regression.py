@@ -1,11 +1,11 @@
 """Linear least squares of torques whose errors hang together in time and between joints.
 
-The errors of a band-limited torque are not independent from sample to sample, and those of an acceleration grow with
-the frequency. Their sources are known, and so are the autocovariances of what each of them makes: noise of the torques,
-and noise of the positions. Only their levels are fitted to the residuals, by Whittle's likelihood, and torques and
-columns are filtered alike by the autoregression that makes such errors white (Cochrane and Orcutt 1949, known at
-second hand). What the residuals then still have of their own is described by a second, short autoregression, if they
-are many; and what is left is weighted by its covariance between the joints:
+The errors of a band-limited torque are not independent from sample to sample, and those of an acceleration grow
+with the frequency. Their sources are known, and so are the autocovariances of what each of them makes: noise of
+the torques, and noise of the positions. Only their levels are fitted to the residuals, by Whittle's likelihood,
+and torques and columns are filtered alike by the autoregression that makes such errors white (Cochrane and Orcutt
+1949, known at second hand). What the residuals then still have of their own is described by a second, short
+autoregression, if they are many; and what is left is weighted by its covariance between the joints:
 
     (sum_k X_k^T S^-1 X_k) beta = sum_k X_k^T S^-1 y_k         covariance of beta: the inverse of the sum
 
@@ -71,7 +71,7 @@ class Regression:
         open."""
         if bool(self.open_along(gradient[None])[0]):
             return float(np.inf)
-        return float(np.sqrt(max(gradient @ self.covariance @ gradient, 0.0)))
+        return float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
 
     def open_along(self, gradients: Floats) -> NDArray[np.bool_]:
         """Of each gradient (k, b) whether parameters that change no torque change the function."""
@@ -92,15 +92,13 @@ class Regression:
         return _solve(*_without_delay(*_sums(columns, torques, self.whitening, self.weight)))[0]
 
 
-def regress(
-    columns: Sequence[Floats], torques: Sequence[Floats], sources: Sequence[Floats] = ()
-) -> Regression:
+def regress(columns: Sequence[Floats], torques: Sequence[Floats], sources: Sequence[Floats] = ()) -> Regression:
     """The parameters of torques, and the covariance of their errors.
 
     columns  (n, d, b + 1) of each stretch, n samples, the last the derivative of the torques
     torques  (n, d)
-    sources  (t, d) of each source of errors: its autocovariance in each joint's torque at the lags 0, 1, ... in any
-             unit; none: errors are described by their own alone
+    sources  (t, d) of each source of errors: its autocovariance in each joint's torque at the lags 0, 1, ... in
+             any unit; none: errors are described by their own alone
     """
     d = torques[0].shape[1]
     whitening = np.ones((d, 1))
@@ -121,9 +119,7 @@ def regress(
     information, moment = _without_delay(information, moment)
     values, covariance, unseen, size = _solve(information, moment)
     deviation = float(np.sqrt(max(whole[-1, -1], 0.0)))
-    return Regression(
-        values, information, covariance, unseen, size, whitening, weight, freedom, delay, deviation
-    )
+    return Regression(values, information, covariance, unseen, size, whitening, weight, freedom, delay, deviation)
 
 
 def _excess(
@@ -138,7 +134,8 @@ def _excess(
 
         tr(H^-1 sum_g s_g s_g^T) / b,      s_g = sum of X_k^T S^-1 r_k over block g
 
-    (the sandwich of White 1980 by blocks, known at second hand, averaged over the parameters, which makes it steady).
+    (the sandwich of White 1980 by blocks, known at second hand, averaged over the parameters, which makes it
+    steady).
     """
     length = max(sum(len(y) for y in torques) // BLOCKS, 2 * whitening.shape[1])
     total, blocks = np.zeros_like(information), 0
@@ -154,7 +151,8 @@ def _excess(
             blocks += 1
     covariance, unseen = _solve(information, np.zeros(len(values)))[1:3]
     seen = len(values) - unseen.shape[1]
-    return max(float(np.sum(covariance * total)) / seen * blocks / max(blocks - 1, 1), 1.0)
+    share = float(np.sum(covariance * total)) / seen
+    return float(max(share * blocks / max(blocks - 1, 1), 1.0))
 
 
 def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]:
@@ -162,7 +160,9 @@ def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]
     own, with_others = float(information[-1, -1]), information[:-1, -1]
     if not own > 0.0:
         return information[:-1, :-1], moment[:-1]
-    return information[:-1, :-1] - np.outer(with_others, with_others) / own, moment[:-1] - with_others * moment[-1] / own
+    return information[:-1, :-1] - np.outer(with_others, with_others) / own, moment[:-1] - with_others * moment[
+        -1
+    ] / own
 
 
 def _inverse_factor(covariance: Floats) -> Floats:
@@ -244,8 +244,9 @@ def _alike(filters: Sequence[Floats]) -> Floats:
 def _levels(residuals: Sequence[Floats], shapes: Floats) -> Floats:
     """Levels (s,) of sources with autocovariances (s, t) that make residuals, stretch by stretch, likeliest.
 
-    The periodogram I of n samples is, in the mean, sum_k r_k (1 - k/n) cos(w k), and spread as much as it is large:
-    levels minimise sum ((I - S)/S)^2 over and over, S that of the levels before (Whittle 1953, known at second hand).
+    The periodogram I of n samples is, in the mean, sum_k r_k (1 - k/n) cos(w k), and spread as much as it is
+    large: levels minimise sum ((I - S)/S)^2 over and over, S that of the levels before (Whittle 1953, known at
+    second hand).
     """
     from scipy.optimize import nnls
 
@@ -286,13 +287,13 @@ def _autoregressions(residuals: Sequence[Floats]) -> Floats:
 
 
 def _levinson(correlation: Floats, count: int) -> Floats:
-    """The filter of least order by Schwarz's criterion, from correlations at the lags 0, 1, ... of so many samples;
-    of known correlations, count 0, that of the highest order."""
+    """The filter of least order by Schwarz's criterion, from correlations at the lags 0, 1, ... of so many
+    samples; of known correlations, count 0, that of the highest order."""
     a, best = np.ones(1), np.ones(1)
     error = correlation[0] * (1.0 + FLOOR)
     if not error > 0.0:
         return best
-    criterion = count * np.log(error)
+    criterion, penalty = count * np.log(error), np.log(max(count, 1))
     for k in range(1, len(correlation)):
         reflection = -float(a @ correlation[k:0:-1]) / error
         longer = np.append(a, 0.0)
@@ -300,7 +301,7 @@ def _levinson(correlation: Floats, count: int) -> Floats:
         error *= 1.0 - reflection**2
         if not error > 0.0:
             break
-        value = count * np.log(error) + np.log(count) * k
+        value = count * np.log(error) + penalty * k
         if value < criterion or not count:
             criterion, best = value, a
     return best

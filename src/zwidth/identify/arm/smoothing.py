@@ -8,7 +8,8 @@ derivatives:
 h' and h'' are derived in closed form, so that their samples have the responses j w H and -w^2 H to rounding, as
 long as H is nothing at the Nyquist frequency. Positions pass a wide band (`WIDE` times the analysed one); torques,
 and the torques that the model makes of the positions, then pass the analysed band alike. What the positions lose
-above the wide band then changes nothing within the analysed one, as far as masses do not vary within a period of it.
+above the wide band then changes nothing within the analysed one, as far as masses do not vary within a period of
+it.
 
 The analysed band ends where the positions' spectrum comes down to its floor: beyond, accelerations are noise.
 """
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -64,7 +66,7 @@ class Kernel:
         half = self.half(period)
         t = np.arange(-half, half + 1) * period - shift
         x, s2 = 2.0 * np.pi * self.edge, self.width**2
-        g = np.exp(-0.5 * t**2 / s2)
+        g: Floats = np.exp(-0.5 * t**2 / s2)
         # sin(x t)/t and its derivatives, by their series about 0
         near = np.abs(x * t) < 1e-2
         u = np.where(near, 1.0, t)
@@ -80,12 +82,14 @@ class Kernel:
         first = -t / s2
         second = t**2 / s2**2 - 1.0 / s2
         h = (k0, k1 + k0 * first, k2 + 2.0 * k1 * first + k0 * second)[derivative]
-        return _exact_for_powers(h * g * period / np.pi, g, t, derivative)
+        return _exact_for_powers(
+            np.asarray(h * g * period / np.pi), g, np.asarray(t, dtype=np.float64), derivative
+        )
 
 
 def _exact_for_powers(taps: Floats, g: Floats, t: Floats, derivative: int) -> Floats:
-    """Taps that differentiate 1, t and t^2 without error, which ends and rounding would leave on them: a joint that
-    stands at 1 rad would seem to accelerate by 1e-3 rad/s^2."""
+    """Taps that differentiate 1, t and t^2 without error, which ends and rounding would leave on them: a joint
+    that stands at 1 rad would seem to accelerate by 1e-3 rad/s^2."""
     powers = ((0,), (1,), (0, 2))[derivative]
     wanted = ((1.0,), (-1.0,), (0.0, 2.0))[derivative]
     bumps = np.stack([g * t**power for power in powers])
@@ -171,7 +175,7 @@ STRETCH: Final = ("time", "coordinates", "rates", "accelerations", "signs", "for
 class TorqueTiming:
     """When a recorded torque acts: `shift` later [s], with `spread` [s^2], half its second moment about then.
 
-        hold and delay of a command: shift = delay + T/2 + lag, spread = T^2/24 + lag^2/2
+    hold and delay of a command: shift = delay + T/2 + lag, spread = T^2/24 + lag^2/2
     """
 
     shift: float = 0.0
@@ -186,9 +190,7 @@ def convolved(signals: Floats, taps: Floats) -> Floats:
     return np.asarray(oaconvolve(signals, kernel, mode="valid", axes=0))
 
 
-def choose_band(
-    positions: Sequence[Floats], sampling: Sequence[Sampling], highest: float = np.inf
-) -> Band:
+def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highest: float = np.inf) -> Band:
     """The band in which records of one period are analysed.
 
     positions  (n, d) of each record, its longest stretch or the beginning of that
@@ -227,7 +229,7 @@ def _floor(frequency: Floats, density: Floats) -> float:
     """The level of the noise: the least median over parts of the upper half of the spectrum."""
     top = float(frequency[-1])
     edges = np.linspace(0.5, 0.95, 5) * top
-    inside = [density[(frequency >= a) & (frequency < b)] for a, b in zip(edges, edges[1:], strict=False)]
+    inside = [density[(frequency >= a) & (frequency < b)] for a, b in pairwise(edges)]
     return min((float(np.median(part)) for part in inside if len(part)), default=0.0)
 
 

@@ -1,0 +1,126 @@
+"""What the fit of a mechanism's torques must be, and what is said of it where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.faults import comma_list
+from zwidth.identify.arm.comparison import Compared
+from zwidth.identify.arm.consistent_links import ConsistentLinks
+from zwidth.identify.arm.effective_masses import mass_columns
+from zwidth.identify.arm.parameters import BaseParameters
+from zwidth.identify.arm.regression import Regression
+from zwidth.identify.identification import Check
+
+Floats = NDArray[np.float64]
+
+FEWEST: Final = 25  # torques of all joints that are compared for each base parameter: fewer make narrow intervals
+UNSEEN: Final = 10  # samples to validate, at least
+WORSE: Final = 3.0  # deviations per base parameter by which a consistent set may miss
+POOR: Final = 0.5  # share explained, below which a reader is warned
+GRAVITY: Final = 0.3  # share of the unexplained torque that gravity explains, from which it is told
+SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
+
+
+def length_check(seen: Sequence[Compared], validation: Sequence[Compared], base: BaseParameters) -> Check:
+    count = sum(one.torques.size for one in seen)
+    left = sum(len(one.time) for one in validation)
+    wanted = FEWEST * len(base.kept)
+    if count < wanted or left < UNSEEN:
+        reason = f"{count} torques in the analysed band to fit {len(base.kept)} parameters, {wanted} are needed"
+        return Check(
+            "length",
+            False,
+            f"{reason}, and {UNSEEN} samples to validate, of which there are {left}; record longer",
+        )
+    return Check("length", True, f"{count} torques in the analysed band to fit, {left} samples to validate")
+
+
+def excitation_check(fit: Regression, base: BaseParameters, beta: Floats) -> Check:
+    """How well the record tells the parameters apart."""
+    inertial = [k for k, j in enumerate(base.kept) if j < base.parameters.friction.start]
+    deviations = fit.deviations
+    loose = [k for k in inertial if 1.96 * deviations[k] > abs(beta[k])]
+    seen = f"{len(base.kept)} base parameters, condition number {fit.condition:.3g}"
+    if len(loose) == len(inertial):
+        reason = f"{seen}; no mass or inertia is known to better than 100 %"
+        return Check("excitation", False, f"{reason}; accelerate every joint more, and more of them together")
+    if loose:
+        named = comma_list([base.names[k] for k in loose], 6)
+        reason = f"{seen}; not told from 0: {named}"
+        return Check("excitation", False, f"{reason}; move more joints together, faster", warning=True)
+    return Check("excitation", True, f"{seen}; all are known to better than 100 %")
+
+
+def positive_check(
+    drives: Sequence[str], base: BaseParameters, beta: Floats, angles: Floats, known_rotors: Floats
+) -> Check | None:
+    """That torques accelerate the joints in their own direction."""
+    values = np.zeros(len(base.parameters.names))
+    values[list(base.kept)] = beta
+    inertial = base.parameters.friction.start
+    M = mass_columns(base.parameters, angles) @ values[:inertial] + np.diag(known_rotors)
+    wrong = [name for name, own in zip(drives, np.diag(M), strict=True) if own < 0.0]
+    if not wrong:
+        return None
+    reason = f"the inertia seen by {comma_list(wrong)} is negative"
+    return Check("signs", False, f"{reason}: turn the sign of its torque or of its angle round")
+
+
+def timing_check(fit: Regression, period: float, torque: str) -> Check:
+    """That torques act when they are recorded."""
+    shift, deviation = fit.delay, fit.delay_deviation
+    seen = f"torques act {abs(shift):.2g} s (+-{2.0 * deviation:.1g} s) {'after' if shift > 0.0 else 'before'} "
+    if abs(shift) < SHIFT * period or abs(shift) < 4.0 * deviation:
+        return Check("timing", True, f"{seen}their time stamps, within half a period")
+    advice = "correct the loop's delay" if torque == "commanded" else 'if they are commands, torque = "commanded"'
+    reason = f"{seen}their time stamps; the fit allows for it, up to a few periods; {advice}"
+    return Check("timing", False, reason, warning=True)
+
+
+def gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Check | None:
+    """That the torque has no part that depends on the posture as gravity does."""
+    best = np.append(beta, fit.delay)
+    residual = np.concatenate([one.torques - one.columns @ best for one in seen])
+    scale = np.std(residual, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    b = (residual / scale).reshape(-1)
+    X = (np.concatenate([one.columns for one in seen]) / scale[:, None]).reshape(len(b), -1)
+    G = (np.concatenate([one.static for one in seen]) / scale[:, None]).reshape(len(b), -1)
+    size = np.linalg.norm(X, axis=0)
+    Q = np.linalg.qr(X / np.where(size > 0.0, size, 1.0))[0]
+    G = G - Q @ (Q.T @ G)
+    b = b - Q @ (Q.T @ b)
+    if not np.any(G):
+        return None
+    left, values, _ = np.linalg.svd(G, full_matrices=False)
+    left = left[:, values > 1e-6 * values[0]]
+    share = float(np.sum((left.T @ b) ** 2) / max(float(b @ b), 1e-300))
+    if share < GRAVITY or len(b) < 5 * left.shape[1]:
+        return None
+    reason = f"{100.0 * share:.3g} % of the unexplained torque depends on the posture as gravity's does"
+    return Check("gravity", False, f"{reason}; state gravity, as gravity = (0, 0, -9.81)", warning=True)
+
+
+def consistency_check(links: ConsistentLinks) -> Check:
+    if links.deviation < WORSE:
+        reason = f"links that can exist have these base parameters, to {links.deviation:.2g} deviations"
+        return Check("physical consistency", True, reason)
+    reason = (
+        f"the nearest links that can exist miss the base parameters by {links.deviation:.3g} deviations; "
+        "the model or the torques are wrong by more than noise"
+    )
+    return Check("physical consistency", False, reason, warning=True)
+
+
+def validation_check(drives: Sequence[str], shares: Sequence[float]) -> Check:
+    listed = comma_list([f"{name} {100.0 * share:.4g} %" for name, share in zip(drives, shares, strict=True)])
+    if min(shares) > POOR:
+        return Check("validation", True, f"of the unseen torque are explained: {listed}")
+    reason = f"of the unseen torque are explained only: {listed}"
+    advice = "what acts there is not in the model, or torques are noise"
+    return Check("validation", False, f"{reason}; {advice}", warning=True)
