@@ -280,7 +280,9 @@ def five_bar_device(bar, wrong=1.0, period=PERIOD):
             "name": name,
             "parent": "base" if i in (0, 2) else names[i - 1],
             "joint": "revolute",
-            "origin_m": [bar.apart * (i / 2 - 0.5), 0.0, 0.0] if i in (0, 2) else [float(bar.length[i - 1]), 0.0, 0.0],
+            "origin_m": [bar.apart * (i / 2 - 0.5), 0.0, 0.0]
+            if i in (0, 2)
+            else [float(bar.length[i - 1]), 0.0, 0.0],
             "length_m": float(bar.length[i]),
             "mass_kg": wrong * float(bar.mass[i]),
             "center_of_mass_m": [float(bar.center[i].real), float(bar.center[i].imag)],

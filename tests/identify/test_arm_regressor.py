@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.identify.arm_benches import five_bar_device, random_five_bar
+from tests.identify.arm_benches import chain_device, five_bar_device, random_chains, random_five_bar
+from tests.identify.arm_truth import link_parameters
 from tests.model.random_mechanisms import unit
 from zwidth.device.load import from_document
 from zwidth.identify.arm.parameters import Parameters, base_parameters
 from zwidth.model.bias import bias_batch
 from zwidth.model.inertia_regressor import inertia_regressor
+from zwidth.model.mechanism import PRISMATIC
 from zwidth.model.mechanism_arrays import pack
 
 GRAVITY = np.array([0.4, -9.0, 2.0])
@@ -59,25 +61,6 @@ def spatial_document(rng, links=3):
     }
 
 
-def all_parameters(mechanism, parameters):
-    """The values (P,) of the file's links and rotors, without friction."""
-    values, links = np.zeros(len(parameters.names)), mechanism.links
-    for k, i in enumerate(parameters.bodies):
-        m, c, inertia = links.mass[i], links.center_of_mass[i], links.inertia[i]
-        about = inertia + m * (c @ c * np.eye(3) - np.outer(c, c))
-        values[10 * k : 10 * k + 10] = [
-            m,
-            *(m * c),
-            *np.diag(about),
-            about[0, 1],
-            about[0, 2],
-            about[1, 2],
-        ]
-    for k, i in enumerate(parameters.rotors):
-        values[parameters.inertial + k] = mechanism.drives.motor_inertia[i]
-    return values
-
-
 def test_torques_of_a_loop_are_the_mass_matrix_and_the_velocity_and_gravity_forces():
     rng = np.random.default_rng(3)
     device = five_bar_device(random_five_bar(rng))
@@ -89,7 +72,7 @@ def test_torques_of_a_loop_are_the_mass_matrix_and_the_velocity_and_gravity_forc
     forces = np.empty((states, 2))
     places = np.tile(posture.angles, (states, 1))
     bias_batch(mech, np.zeros(states, dtype=np.int64), places, rates, GRAVITY, forces)
-    phi = all_parameters(mechanism, Parameters.of(mechanism, rotors=False))[: Y.shape[2]]
+    phi = link_parameters(mechanism, Parameters.of(mechanism, rotors=False))[: Y.shape[2]]
     assert reached == states
     assert np.allclose(angles, places, atol=1e-12)
     assert np.allclose(Y @ phi, accelerations @ posture.mass_matrix + forces, rtol=0.0, atol=1e-13)
@@ -103,21 +86,19 @@ def test_torques_of_a_spatial_chain_are_those_of_pinocchio(seed):
     links, mech = mechanism.links, pack(mechanism)
     model = pin.Model()
     model.gravity.linear = GRAVITY
-    from scipy.spatial.transform import Rotation
-
     for i, name in enumerate(links.names):
         place = pin.SE3(links.rotation[i], links.origin[i])
         axis = links.axis[i]
-        joint = pin.JointModelPrismaticUnaligned(axis) if links.joint[i] == 2 else pin.JointModelRevoluteUnaligned(axis)
+        slides = links.joint[i] == PRISMATIC
+        joint = (pin.JointModelPrismaticUnaligned if slides else pin.JointModelRevoluteUnaligned)(axis)
         number = model.addJoint(int(links.parent[i]) + 1, joint, place, name)
         body = pin.Inertia(float(links.mass[i]), links.center_of_mass[i], links.inertia[i])
         model.appendBodyToJoint(number, body, pin.SE3.Identity())
-    assert Rotation is not None
     data, states = model.createData(), 6
     q, v, a = rng.normal(size=(3, states, 3)) * 0.4
     Y, _, reached = inertia_regressor(mech, np.zeros(3), q, v, a, GRAVITY)
     assert reached == states
-    phi = all_parameters(mechanism, Parameters.of(mechanism, rotors=False))[: Y.shape[2]]
+    phi = link_parameters(mechanism, Parameters.of(mechanism, rotors=False))[: Y.shape[2]]
     # its order: m, m c, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz
     order = np.array([0, 1, 2, 3, 4, 7, 5, 8, 9, 6])
     for k in range(states):
@@ -141,12 +122,12 @@ def test_base_parameters_are_as_many_as_the_columns_rank_and_make_the_same_torqu
     assert len(base.kept) == np.linalg.matrix_rank(scaled, tol=1e-8)
     phi = rng.normal(size=len(parameters.names))
     whole = W @ phi
-    assert np.allclose(W[:, list(base.kept)] @ (base.matrix @ phi), whole, rtol=0.0, atol=1e-9 * np.abs(whole).max())
+    assert np.allclose(
+        W[:, list(base.kept)] @ (base.matrix @ phi), whole, rtol=0.0, atol=1e-9 * np.abs(whole).max()
+    )
 
 
 def test_base_parameters_of_two_links_are_named_as_people_write_them():
-    from tests.identify.arm_benches import chain_device, random_chains
-
     device = chain_device(random_chains(np.random.default_rng(1), 2, 1), 0)
     mechanism = device.mechanism
     base = base_parameters(Parameters.of(mechanism, rotors=True), device.at().posture.angles, np.zeros(3))
