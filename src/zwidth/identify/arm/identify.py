@@ -202,7 +202,8 @@ class _Work:
         first = regress([one.columns for one in seen], [one.torques for one in seen])
         noisy = list(self._noisy(comparison, fitted))
         sources = error_sources(band, first, seen, noisy)
-        fit = regress([one.columns for one in seen], [one.torques for one in seen], sources)
+        groups = np.array([int(j >= parameters.friction.start) for j in base.kept] + [0])
+        fit = regress([one.columns for one in seen], [one.torques for one in seen], sources, groups)
         beta = _unbiased(fit, noisy)
         checks += self._fit_checks(fit, base, beta, seen, validation, weights, band)
         if stop := self.refusal(checks):

@@ -92,13 +92,19 @@ class Regression:
         return _solve(*_without_delay(*_sums(columns, torques, self.whitening, self.weight)))[0]
 
 
-def regress(columns: Sequence[Floats], torques: Sequence[Floats], sources: Sequence[Floats] = ()) -> Regression:
+def regress(
+    columns: Sequence[Floats],
+    torques: Sequence[Floats],
+    sources: Sequence[Floats] = (),
+    groups: NDArray[np.int64] | None = None,
+) -> Regression:
     """The parameters of torques, and the covariance of their errors.
 
     columns  (n, d, b + 1) of each stretch, n samples, the last the derivative of the torques
     torques  (n, d)
     sources  (t, d) of each source of errors: its autocovariance in each joint's torque at the lags 0, 1, ... in
              any unit; none: errors are described by their own alone
+    groups   (b + 1,) number of the group of parameters whose variances are corrected alike; None: one group
     """
     d = torques[0].shape[1]
     whitening = np.ones((d, 1))
@@ -113,13 +119,15 @@ def regress(columns: Sequence[Floats], torques: Sequence[Floats], sources: Seque
         information, moment = _sums(columns, torques, whitening, weight)
         values = _solve(information, moment)[0]
     freedom = float(max(white.size - len(values), 1))
-    weight = weight / np.sqrt(_excess(columns, torques, values, information, whitening, weight))
-    information, moment = _sums(columns, torques, whitening, weight)
+    spread = np.sqrt(_excess(columns, torques, values, information, whitening, weight, groups))
     whole, delay = np.asarray(_solve(information, moment)[1]), float(values[-1])
     information, moment = _without_delay(information, moment)
     values, covariance, unseen, size = _solve(information, moment)
-    deviation = float(np.sqrt(max(whole[-1, -1], 0.0)))
-    return Regression(values, information, covariance, unseen, size, whitening, weight, freedom, delay, deviation)
+    both = np.outer(spread[:-1], spread[:-1])
+    deviation = float(spread[-1] * np.sqrt(max(whole[-1, -1], 0.0)))
+    return Regression(
+        values, information / both, covariance * both, unseen, size, whitening, weight, freedom, delay, deviation
+    )
 
 
 def _excess(
@@ -129,13 +137,15 @@ def _excess(
     information: Floats,
     whitening: Floats,
     weight: Floats,
-) -> float:
-    """By what factor the parameters' variance is larger than it would be of white residuals; at least 1.
+    groups: NDArray[np.int64] | None,
+) -> Floats:
+    """By what factors (b + 1,), at least 1, the parameters' variances are larger than of white residuals.
 
-        tr(H^-1 sum_g s_g s_g^T) / b,      s_g = sum of X_k^T S^-1 r_k over block g
+        (H^-1 J H^-1)_ii / (H^-1)_ii,    J = sum_g s_g s_g^T,   s_g = sum of X_k^T S^-1 r_k over block g
 
-    (the sandwich of White 1980 by blocks, known at second hand, averaged over the parameters, which makes it
-    steady).
+    (the sandwich of White 1980 by blocks, known at second hand), averaged over the parameters of each group, which
+    makes it steady. Counts are coarser where a joint turns round, which is where it accelerates most: inertias
+    have other factors than friction.
     """
     length = max(sum(len(y) for y in torques) // BLOCKS, 2 * whitening.shape[1])
     total, blocks = np.zeros_like(information), 0
@@ -149,10 +159,16 @@ def _excess(
             score = np.sum(scores[begin : begin + length], axis=0)
             total += np.outer(score, score)
             blocks += 1
-    covariance, unseen = _solve(information, np.zeros(len(values)))[1:3]
-    seen = len(values) - unseen.shape[1]
-    share = float(np.sum(covariance * total)) / seen
-    return float(max(share * blocks / max(blocks - 1, 1), 1.0))
+    covariance = _solve(information, np.zeros(len(values)))[1]
+    usual = np.diag(covariance)
+    ratio = np.diag(covariance @ total @ covariance) / np.where(usual > 0.0, usual, 1.0)
+    ratio = ratio * blocks / max(blocks - 1, 1)
+    own = np.zeros(len(values), dtype=np.int64) if groups is None else groups
+    factors = np.ones(len(values))
+    for group in np.unique(own):
+        inside = (own == group) & (usual > 0.0)
+        factors[own == group] = max(float(np.mean(ratio[inside])), 1.0) if inside.any() else 1.0
+    return factors
 
 
 def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]:
