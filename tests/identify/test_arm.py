@@ -11,8 +11,12 @@ from tests.identify.arm_truth import chain_results, five_bar_results, held, link
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document
 from zwidth.identify.arm import COLUMNS, identify_arm
+from zwidth.identify.arm.channels import channels_of
 from zwidth.identify.arm.parameters import Parameters, base_parameters
+from zwidth.identify.arm.smoothing import choose_band
+from zwidth.identify.arm.stretches import TorqueTiming, smoothed
 from zwidth.identify.record import record_of
+from zwidth.identify.sampling import check_sampling
 
 SEEDS = 1000
 
@@ -301,12 +305,23 @@ def test_an_unknown_mass_in_the_file_is_no_obstacle(chain):
     assert mass_of(filled, "rigid_mass") == pytest.approx(truth[name], rel=0.01)
 
 
-def test_long_records_are_smoothed_in_pieces(chain, result, monkeypatch):
-    from zwidth.identify import record
-
-    whole = record_of(chain[1], COLUMNS)
-    pieces = type(whole).pieces
-    monkeypatch.setattr(type(whole), "pieces", lambda self, rows=record.ROWS: pieces(self, 1777))
-    again = identify_arm(chain_device(chain[0], 0, wrong=1.3), [whole])
-    assert again["m c_x(link-2)"].value == pytest.approx(result["m c_x(link-2)"].value, rel=0.02)
-    assert again.validation > 0.99
+@pytest.mark.parametrize("period", [0.002, 0.0001])
+def test_records_are_smoothed_in_pieces_as_at_once(period, monkeypatch):
+    chains, columns, device = one_chain(period=period, duration=12.0, counts=80_000)
+    columns = {name: np.delete(values, slice(40, 50)) for name, values in columns.items()}
+    record = record_of(columns, COLUMNS)
+    sampling = check_sampling(record)[0]
+    channels = channels_of(device, record, "joint")
+    band = choose_band([channels.coordinates(columns)], [sampling])
+    assert (band.coarse > 1) == (period < 0.001)
+    whole = list(smoothed(record, 0, sampling, channels, band, TorqueTiming()))
+    pieces = type(record).pieces
+    monkeypatch.setattr(type(record), "pieces", lambda self, rows=0: pieces(self, 1777))
+    parts = list(smoothed(record, 0, sampling, channels, band, TorqueTiming()))
+    assert len(whole) == len(parts) == 1
+    for name in ("time", "coordinates", "rates", "accelerations", "signs", "forces"):
+        one, other = getattr(whole[0], name), getattr(parts[0], name)
+        assert np.allclose(one, other, rtol=0.0, atol=1e-9 * np.max(np.abs(one))), name
+    truth = true_values(device, chains.coulomb[0], chains.viscous[0], np.zeros(3))
+    mass = identify_arm(device, [record])["rigid mass along (0.6, 0.8, 0)"]
+    assert mass.value == pytest.approx(truth["rigid mass along (0.6, 0.8, 0)"], abs=mass.high - mass.low)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.identify.arm.parameters import BaseParameters
-from zwidth.identify.arm.smoothing import Band, Stretch, convolved
+from zwidth.identify.arm.smoothing import Band, convolved
+from zwidth.identify.arm.stretches import Stretch
 from zwidth.model.closed_posture import moved_posture
 from zwidth.model.inertia_regressor import inertia_regressor
 from zwidth.model.mechanism import REVOLUTE
@@ -82,10 +83,10 @@ class Comparison:
         none = np.zeros((*torques.shape, 0))
         parts = np.concatenate(columns), torques, np.concatenate(further) if static else none
         narrow, step = self.band.narrow, self.band.step
-        taps, half, thin = narrow.taps(step), narrow.half(step), slice(None, None, self.band.thinning)
-        made, torque, weights = (convolved(part, taps)[thin] for part in parts)
-        rate = convolved(torques, narrow.taps(step, 1))[thin]
-        time = stretch.time[half : len(stretch.time) - half][thin]
+        taps, half, thin = narrow.taps(step), narrow.half(step), self.band.thinning
+        made, torque, weights = (convolved(part, taps, thin) for part in parts)
+        rate = convolved(torques, narrow.taps(step, 1), thin)
+        time = stretch.time[half : len(stretch.time) - half : thin]
         return Compared(stretch.record, time, np.concatenate([made, rate[..., None]], axis=2), torque, weights)
 
     def _links(

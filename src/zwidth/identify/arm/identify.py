@@ -47,7 +47,8 @@ from zwidth.identify.arm.fit_checks import (
 )
 from zwidth.identify.arm.parameters import BaseParameters, Parameters, base_parameters
 from zwidth.identify.arm.regression import Regression, regress
-from zwidth.identify.arm.smoothing import Band, Stretch, TorqueTiming, choose_band, smoothed
+from zwidth.identify.arm.smoothing import Band, choose_band
+from zwidth.identify.arm.stretches import Stretch, TorqueTiming, smoothed
 from zwidth.identify.identification import Check, Identification, refused
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling

@@ -16,7 +16,7 @@ The analysed band ends where the positions' spectrum comes down to its floor: be
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -24,10 +24,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.identify.arm.channels import Channels
-from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling
-from zwidth.memory_limit import check_memory
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +32,9 @@ WIDE: Final = 1.6  # edge of the positions' band over that of the analysed one
 WIDTH: Final = 1.2  # s f of the wide kernel: H is flat to 1e-4 up to f/2, 0.5 at f, and 1e-4 at 1.5 f
 ENDS: Final = 5.2  # s of a kernel, beyond which it is 1e-6 of its middle
 SAMPLES: Final = 4.0  # of the positions per period of the wide band's edge
+FINE: Final = 8  # samples that are smoothed, and signs of rates, for each smoothed position
+GUARD: Final = 0.45  # edge of the kernel before thinning, in samples per period of what is left
+SHARP: Final = 0.9  # s f of that kernel
 NARROW: Final = 0.6  # s f of the analysed band's kernel
 ABOVE: Final = 6.0  # times the floor of the spectrum, from which on it is motion
 RESOLUTION: Final = 2048  # samples of a piece of which spectra are averaged, at least
@@ -131,6 +131,17 @@ class Band:
         return self.stride * self.period
 
     @property
+    def coarse(self) -> int:
+        """Samples of the record for one that is smoothed: records are thinned before, where that is many."""
+        return max(self.stride // FINE, 1)
+
+    @property
+    def guard(self) -> Kernel:
+        """The low pass before that: flat over all that the positions' kernel passes."""
+        edge = GUARD / (self.coarse * self.period)
+        return Kernel(edge, SHARP / edge)
+
+    @property
     def thinning(self) -> int:
         """Smoothed samples for one that is compared."""
         return max(int(1.0 / (3.0 * self.edge * self.step)), 1)
@@ -144,50 +155,12 @@ class Band:
         return first, second, third
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """A part of a record without gaps, smoothed, n samples.
-
-    record   number of the record
-    time     (n,) [s]
-    coordinates, rates, accelerations  (n, d)  of the drives
-    signs    (n, d)  the sign of the rates, smoothed as the torques are
-    forces   (n, d)
-    """
-
-    record: int
-    time: Floats
-    coordinates: Floats
-    rates: Floats
-    accelerations: Floats
-    signs: Floats
-    forces: Floats
-
-    def part(self, rows: slice) -> Stretch:
-        """Some of its samples."""
-        return Stretch(self.record, *(getattr(self, name)[rows] for name in STRETCH))
-
-
-STRETCH: Final = ("time", "coordinates", "rates", "accelerations", "signs", "forces")
-
-
-@dataclass(frozen=True)
-class TorqueTiming:
-    """When a recorded torque acts: `shift` later [s], with `spread` [s^2], half its second moment about then.
-
-    hold and delay of a command: shift = delay + T/2 + lag, spread = T^2/24 + lag^2/2
-    """
-
-    shift: float = 0.0
-    spread: float = 0.0
-
-
-def convolved(signals: Floats, taps: Floats) -> Floats:
-    """Columns (n, ...) convolved with taps (2 h + 1,), where they overlap in full: (n - 2 h, ...)."""
+def convolved(signals: Floats, taps: Floats, down: int = 1) -> Floats:
+    """Columns (n, ...) convolved with taps (2 h + 1,) where they overlap in full, one sample of `down`."""
     from scipy.signal import oaconvolve
 
     kernel = taps.reshape((-1,) + (1,) * (signals.ndim - 1))
-    return np.asarray(oaconvolve(signals, kernel, mode="valid", axes=0))
+    return np.asarray(oaconvolve(signals, kernel, mode="valid", axes=0)[::down])
 
 
 def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highest: float = np.inf) -> Band:
@@ -211,6 +184,7 @@ def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highe
     most = min(1.0 / (SAMPLES * 1.5 * WIDE * period), LONGEST / (SAMPLES * 1.5 * WIDE * length), highest)
     analysed = min(max(edge, lowest), most)
     stride = max(int(1.0 / (SAMPLES * 1.5 * WIDE * analysed * period)), 1)
+    stride = stride if stride < FINE else FINE * (stride // FINE)
     return Band(analysed, period, stride, noise, edge)
 
 
@@ -231,76 +205,3 @@ def _floor(frequency: Floats, density: Floats) -> float:
     edges = np.linspace(0.5, 0.95, 5) * top
     inside = [density[(frequency >= a) & (frequency < b)] for a, b in pairwise(edges)]
     return min((float(np.median(part)) for part in inside if len(part)), default=0.0)
-
-
-def smoothed(
-    record: Record, number: int, sampling: Sampling, channels: Channels, band: Band, timing: TorqueTiming
-) -> Iterator[Stretch]:
-    """The stretches of a record, smoothed and thinned; those too short for the kernel are left out."""
-    check_memory(
-        8.0 * 6.0 * len(channels.force) * sampling.rows / band.stride,
-        f"the smoothed samples of {record.label}",
-        "give a shorter record",
-    )
-    buffer: list[Floats] = []
-    first, begin = -1, -1
-    parts = list[Stretch]()
-    reach = 2 * band.wide.half(band.period)  # of the rates, and of their signs' kernel
-    for piece in sampling.stretches(record):
-        rows = piece["row"]
-        if not len(rows):
-            continue
-        time, q, force = piece["time_s"], channels.coordinates(piece), channels.forces(piece)
-        own = np.concatenate([time[:, None], q, force], axis=1)
-        follows = buffer and rows[0] == first + len(buffer[0]) and not np.isin(rows[0], sampling.runs[:, 0])
-        if follows:
-            own = np.concatenate([buffer[0], own])
-        else:
-            if parts:
-                yield _joined(parts)
-                parts = []
-            first, begin = int(rows[0]), int(rows[0]) + reach
-        buffer = [own]
-        count = (first + len(own) - reach - begin - 1) // band.stride + 1
-        if count <= 0:
-            continue
-        parts.append(_smooth(own, number, begin - first, count, band, timing, q.shape[1]))
-        begin += count * band.stride
-        kept = begin - reach - first
-        buffer, first = [own[kept:]], first + kept
-    if parts:
-        yield _joined(parts)
-
-
-def _joined(parts: Sequence[Stretch]) -> Stretch:
-    return Stretch(parts[0].record, *(np.concatenate([getattr(one, name) for one in parts]) for name in STRETCH))
-
-
-def _smooth(
-    table: Floats, number: int, middle: int, count: int, band: Band, timing: TorqueTiming, d: int
-) -> Stretch:
-    """Smoothed samples about rows middle, middle + stride, ..., of a table of time, coordinates and forces."""
-    kernel, period = band.wide, band.period
-    half, last = kernel.half(period), (count - 1) * band.stride
-    around = slice(middle - 2 * half, middle + last + 2 * half + 1)
-    near, thinned = slice(half, 3 * half + last + 1), slice(None, None, band.stride)
-    q, force = table[around, 1 : 1 + d], table[around, 1 + d :][near]
-    taps = [kernel.taps(period, k) for k in range(3)]
-    late = kernel.taps(period, 0, timing.shift) + timing.spread * kernel.taps(period, 2, timing.shift)
-    rates = convolved(q, taps[1])
-    return Stretch(
-        number,
-        table[middle : middle + last + 1 : band.stride, 0],
-        convolved(q[near], taps[0])[thinned],
-        rates[half : half + last + 1][thinned],
-        convolved(q[near], taps[2])[thinned],
-        convolved(_signs(rates, band), taps[0])[thinned],
-        convolved(force, late)[thinned],
-    )
-
-
-def _signs(rates: Floats, band: Band) -> Floats:
-    """Signs of rates, going through 0 in a straight line where noise decides on them."""
-    kernel, period = band.wide, band.period
-    size = np.sqrt(band.noise / (2.0 * period) * float(np.sum(kernel.taps(period, 1) ** 2)))
-    return np.clip(rates / np.maximum(2.0 * size, 1e-300), -1.0, 1.0)

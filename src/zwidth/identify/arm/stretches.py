@@ -1,0 +1,149 @@
+"""The parts of a record without gaps, smoothed and thinned piece by piece, so that memory stays flat."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.arm.channels import Channels
+from zwidth.identify.arm.smoothing import Band, convolved
+from zwidth.identify.record import Record
+from zwidth.identify.sampling import Sampling
+from zwidth.memory_limit import check_memory
+
+Floats = NDArray[np.float64]
+Table = tuple[bool, Floats]  # whether a stretch begins with it; time, coordinates and forces (n, 1 + 2 d)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a record without gaps, smoothed, n samples.
+
+    record   number of the record
+    time     (n,) [s]
+    coordinates, rates, accelerations  (n, d)  of the drives
+    signs    (n, d)  the sign of the rates, smoothed as the torques are
+    forces   (n, d)
+    """
+
+    record: int
+    time: Floats
+    coordinates: Floats
+    rates: Floats
+    accelerations: Floats
+    signs: Floats
+    forces: Floats
+
+    def part(self, rows: slice) -> Stretch:
+        """Some of its samples."""
+        return Stretch(self.record, *(getattr(self, name)[rows] for name in STRETCH))
+
+
+STRETCH: Final = ("time", "coordinates", "rates", "accelerations", "signs", "forces")
+
+
+@dataclass(frozen=True)
+class TorqueTiming:
+    """When a recorded torque acts: `shift` later [s], with `spread` [s^2], half its second moment about then.
+
+    hold and delay of a command: shift = delay + T/2 + lag, spread = T^2/24 + lag^2/2
+    """
+
+    shift: float = 0.0
+    spread: float = 0.0
+
+
+def smoothed(
+    record: Record, number: int, sampling: Sampling, channels: Channels, band: Band, timing: TorqueTiming
+) -> Iterator[Stretch]:
+    """The stretches of a record, smoothed and thinned; those too short for the kernel are left out."""
+    check_memory(
+        6.0 * len(channels.force) * sampling.rows / band.stride,
+        f"the smoothed samples of {record.label}",
+        "give a shorter record",
+    )
+    tables, period = _tables(record, sampling, channels), band.period
+    if band.coarse > 1:
+        tables, period = _guarded(tables, band), band.coarse * period
+    half = band.wide.half(period)
+    parts = list[Stretch]()
+    for begins, table in _windows(tables, 2 * half, band.stride // band.coarse):
+        if begins and parts:
+            yield _joined(parts)
+            parts = []
+        parts.append(_smooth(table, number, band, period, timing))
+    if parts:
+        yield _joined(parts)
+
+
+def _tables(record: Record, sampling: Sampling, channels: Channels) -> Iterator[Table]:
+    """The pieces of the record's stretches."""
+    starts = set(sampling.runs[:, 0].tolist())
+    for piece in sampling.stretches(record):
+        if len(piece["row"]):
+            parts = piece["time_s"][:, None], channels.coordinates(piece), channels.forces(piece)
+            yield int(piece["row"][0]) in starts, np.concatenate(parts, axis=1)
+
+
+def _windows(tables: Iterator[Table], reach: int, stride: int) -> Iterator[Table]:
+    """Each stretch in tables that overlap: every `stride`th row from row `reach` on, as far as as many rows stand
+    behind it; these rows follow each other from table to table."""
+    rest, begins = np.zeros((0, 0)), True
+    for starts, table in tables:
+        own = table if starts else np.concatenate([rest, table])
+        begins = begins or starts
+        count = (len(own) - 2 * reach - 1) // stride + 1
+        if count > 0:
+            yield begins, own[: 2 * reach + (count - 1) * stride + 1]
+            begins = False
+        rest = own[max(count, 0) * stride :].copy()
+
+
+def _guarded(tables: Iterator[Table], band: Band) -> Iterator[Table]:
+    """Tables thinned to one row of `coarse`, by a short kernel that takes nothing from the positions' band."""
+    from scipy.signal import upfirdn
+
+    half, down = band.guard.half(band.period), band.coarse
+    taps = band.guard.taps(band.period)
+    before = -2 * half % down  # rows of zeros, so that the first full sum is one of those that are kept
+    for begins, table in _windows(tables, half, down):
+        rows = np.ascontiguousarray(table.T[1:])
+        rows = np.concatenate([np.zeros((len(rows), before)), rows], axis=1)
+        kept = (2 * half + before) // down
+        time = table[half : len(table) - half : down, 0]
+        yield begins, np.column_stack([time, upfirdn(taps, rows, 1, down)[:, kept : kept + len(time)].T])
+
+
+def _joined(parts: Sequence[Stretch]) -> Stretch:
+    return Stretch(parts[0].record, *(np.concatenate([getattr(one, name) for one in parts]) for name in STRETCH))
+
+
+def _smooth(table: Floats, number: int, band: Band, period: float, timing: TorqueTiming) -> Stretch:
+    """The smoothed samples of a table that reaches two kernels' halves beyond them."""
+    kernel, down, d = band.wide, band.stride // band.coarse, table.shape[1] // 2
+    half = kernel.half(period)
+    near, middle = slice(half, len(table) - half), slice(2 * half, len(table) - 2 * half, down)
+    q, force = table[:, 1 : 1 + d], table[near, 1 + d :]
+    taps = [kernel.taps(period, k) for k in range(3)]
+    late = kernel.taps(period, 0, timing.shift) + timing.spread * kernel.taps(period, 2, timing.shift)
+    rates = convolved(q, taps[1])
+    return Stretch(
+        number,
+        table[middle, 0],
+        convolved(q[near], taps[0], down),
+        rates[half : len(rates) - half : down],
+        convolved(q[near], taps[2], down),
+        convolved(_signs(rates, band, period), taps[0], down),
+        convolved(force, late, down),
+    )
+
+
+def _signs(rates: Floats, band: Band, period: float) -> Floats:
+    """Signs of rates, going through 0 in a straight line where noise decides on them."""
+    taps = band.wide.taps(period, 1)
+    size = np.sqrt(band.noise / (2.0 * period) * float(taps @ taps))
+    return np.clip(rates / np.maximum(2.0 * size, 1e-300), -1.0, 1.0)
