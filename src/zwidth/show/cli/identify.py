@@ -233,14 +233,14 @@ class BoundaryCommand(IdentifyCommand):
             "damping_models",
             metavar="NAME",
             multiple=True,
-            help="modal, stiffness, mass, proportional, drive, hysteretic, or all: structural damping that is fitted "
-            "in place of the file's; several are compared; repeatable.",
+            help="modal, stiffness, mass, proportional, drive, hysteretic, or all: structural damping that is "
+            "fitted in place of the file's; several are compared; repeatable.",
         ),
         click.option(
             "--through",
             type=click.Choice(["chart", "experiment"]),
-            help="What the points are compared with. Default: the exact chart; simulated trials where dry friction "
-            "makes the boundary depend on the amplitude.",
+            help="What the points are compared with. Default: the exact chart; simulated trials where dry "
+            "friction makes the boundary depend on the amplitude.",
         ),
         click.option("--disturbance", metavar="M", type=Finite(), help="Initial disturbance of those trials [m]."),
         click.option(
@@ -302,8 +302,8 @@ class ArmCommand(IdentifyCommand):
             type=click.Choice(["measured", "commanded"]),
             default="measured",
             show_default=True,
-            help="Whether the torque acted when it was recorded, or is the computer's command, which acts after the "
-            "loop's delay and is held for a period.",
+            help="Whether the torque acted when it was recorded, or is the computer's command, which acts after "
+            "the loop's delay and is held for a period.",
         ),
         click.option(
             "--rotors",
