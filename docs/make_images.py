@@ -10,7 +10,13 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from gallery import beam_convergence, fig_5_4_common_area, fig_5_10_eigenvalues, slender_links
+from gallery import (
+    beam_convergence,
+    fig_5_4_common_area,
+    fig_5_10_eigenvalues,
+    identified_five_bar,
+    slender_links,
+)
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.show.figures.caption import caption_of_result, write_caption
@@ -38,6 +44,7 @@ def main() -> None:
     page(fig_5_10_eigenvalues.draw, "fig-5-10-eigenvalues", 7.4, 4.6)
     page(slender_links.draw, "slender-links", 4.6, 7.6)
     page(beam_convergence.draw, "beam-convergence", 4.6, 6.2)
+    page(identified_five_bar.draw, "identified-five-bar", 4.6, 7.2)
 
 
 def page(draw: Callable[..., None], name: str, width: float, height: float) -> None:
