@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import dotted, fail, quote
+from zwidth.device.schema.device_file import may_be_zero
 
 Floats = NDArray[np.float64]
 
@@ -32,15 +33,19 @@ class DeviceNumbers:
 
     @classmethod
     def of(cls, device: Device, paths: Sequence[str]) -> DeviceNumbers:
-        """The numbers at these paths.
+        """The numbers at these paths; one that the file leaves out and that may be 0 begins there.
 
         Raises DeviceError  for a path that leads nowhere, or to what is no number, and for one named twice
         """
         full = list[str]()
         values = list[float]()
         for path in paths:
-            value = address.get(device.document, path)
-            name = dotted(address.resolve(device.document, path), device.document)
+            steps = address.resolve(device.document, path)
+            name = dotted(steps, device.document)
+            if address.exists(device.document, path) or not may_be_zero(steps):
+                value = address.get(device.document, path)
+            else:  # a delay, a friction, a damping that the file leaves out is none
+                value = 0.0
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise fail(device.label, path, f"must be a number to be identified, got {quote(value)}")
             if name in full:

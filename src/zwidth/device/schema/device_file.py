@@ -126,6 +126,16 @@ def key_unit(path: tuple[str | int, ...]) -> str:
     return ""
 
 
+def may_be_zero(path: tuple[str | int, ...]) -> bool:
+    """Whether the key at a path is a number from 0 on, as delays, friction and damping are.
+
+    >>> may_be_zero(("loop", "delay_samples")), may_be_zero(("loop", "sampling_period_s"))
+    (True, False)
+    """
+    numbers = [one for one in subschemas(path) if one.get("type") == "number"]
+    return any(one.get("ge", one.get("minimum")) == 0 for one in numbers)
+
+
 def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
     if isinstance(part, int):
         if isinstance(subschema.get("items"), dict):
