@@ -168,7 +168,8 @@ def test_what_the_response_holds_already_is_refused(write, spectrum):
     assert "loop.delay_samples: must be a whole number of samples with a [response], got 0.5" in line
     path.write_text(text + "delay_samples = 2\n")
     assert load(path).controller.delay == 2.0
-    path.write_text(text + "[operator]\narm_mass_kg = 0.8\n")
-    assert any("operator: cannot be attached to a measured [response]" in line for line in faults(path))
+    path.write_text(text + '[operator]\narm_mass_kg = 0.8\ngrasp = "rigid"\n')
+    (line,) = faults(path)
+    assert "operator: cannot be attached to this [response]: it has no path" in line
     path.write_text(text + "[loop.actuator]\ntime_constant_s = 0.001\n")
     assert any("loop.actuator: is part of a measured [response] already" in line for line in faults(path))

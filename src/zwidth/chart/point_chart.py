@@ -34,7 +34,7 @@ def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) 
     if point.response is not None:
         from zwidth.chart.measured.chart import measured_chart
 
-        return measured_chart(point.response, point.controller)
+        return measured_chart(point.held_response, point.controller)
     if point.charted_by_response:
         from zwidth.chart.hysteretic import hysteretic_chart
 

@@ -176,8 +176,6 @@ def _response(document: dict[str, Any]) -> KeyMessages:
     if isinstance(document["response"], dict) and ("file" in response) == ("files" in response):
         fault = "names both file and files" if "file" in response else "names no file"
         yield ("response",), f"{fault}; give file for one measurement, or files for repetitions of it"
-    if "operator" in document:
-        yield ("operator",), "cannot be attached to a measured [response], which has no handle; leave it out"
     if "actuator" in loop:
         yield ("loop", "actuator"), "is part of a measured [response] already; leave it out"
     period = loop.get("sampling_period_s")

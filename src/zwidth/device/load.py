@@ -30,6 +30,7 @@ from zwidth.model.flexible_link import BeamError
 from zwidth.model.load import Load
 from zwidth.model.mechanism import Floats, Mechanism
 from zwidth.model.operator import Operator
+from zwidth.model.response import handle_obstacle
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
@@ -185,6 +186,9 @@ def build_device(
     section, controller = checked.mechanism, build.controller(checked.loop)
     mechanism = _mechanism(section, document, label, surplus) if section else None
     reference, held = section.reference if section else None, checked.operator or checked.arm
+    response = build.response(checked.response, label, controller.sampling_period) if checked.response else None
+    if response is not None and checked.operator and (obstacle := handle_obstacle(response)):
+        raise fail(label, "operator", f"cannot be attached to this [response]: it {obstacle}, or leave him out")
     return Device(
         name=checked.name,
         description=checked.description,
@@ -193,7 +197,7 @@ def build_device(
         label=label,
         mechanism=mechanism,
         given_plant=build.plant(checked.plant, checked.friction, checked.loop.encoder) if checked.plant else None,
-        response=build.response(checked.response, label, controller.sampling_period) if checked.response else None,
+        response=response,
         controller=controller,
         damping=build.damping(section.damping if section else None),
         reference_position=None if mechanism is None else mechanism.reference_position,

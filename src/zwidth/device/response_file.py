@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from zwidth.device.faults import DeviceError, Fault, fail, plural, quote
 from zwidth.device.schema.response import ResponseSection
 from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
-from zwidth.model.response import Response, ResponseError
+from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, ResponseError
 from zwidth.model.sweep_response import sweep_response
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,15 @@ Cause = tuple[
 
 SPECTRUM: Final = ("frequency_Hz", "real_m_per_N", "imag_m_per_N")
 RECORD: Final = ("time_s", "force_command_N", "position_m")
+HANDLE_RECORD: Final = ("time_s", "handle_force_N", "position_m")
 OPTIONAL: Final = ("coherence", "sweep")
+# The paths of the handle by the fields of `MeasuredHandle`.
+HANDLE_PATHS: Final = {
+    "force_to_encoder": "handle_force_to_encoder",
+    "command_to_handle": "command_to_handle",
+    "force_to_handle": "handle_force_to_handle",
+}
+RESTING: Final = 1e-6  # of the largest force in an experiment, below which the other force counts as none
 LINE: Final = ""
 MOST_LINES: Final = 3  # reported for one cause
 UNEVEN: Final = 0.05  # of the sampling period, by which time stamps may jitter
@@ -42,30 +50,119 @@ def read_response(section: ResponseSection, label: str, period: float) -> Respon
     """
     names = section.files or (section.file or "",)
     folder = Path(label).parent
-    outside = [name for name in names if not _lies_in(folder, folder / name)]
+    given = [("response.files" if section.files else "response.file", name) for name in names]
+    given += [("response.handle_file", section.handle_file)] if section.handle_file else []
+    outside = [(key, name) for key, name in given if not _lies_in(folder, folder / name)]
     if outside:
-        key = "response.files" if section.files else "response.file"
         wrong = "must lie in the folder of the device file, or below it, got {}; copy it there"
-        raise DeviceError(Fault(label, key, wrong.format(quote(name))) for name in outside)
+        raise DeviceError(Fault(label, key, wrong.format(quote(name))) for key, name in outside)
     responses = [one for name in names for one in _responses(folder / name, section, period)]
     first = responses[0]
     for name, other in zip(
         [names[0], *names[1:]] if len(names) == len(responses) else [], responses, strict=False
     ):
-        if len(other.frequency) != len(first.frequency) or np.any(
-            np.abs(other.frequency - first.frequency) > 1e-6 * first.frequency
-        ):
-            raise fail(str(folder / name), "", f"has other frequencies than {names[0]}; sweeps must share them")
-    return first if len(responses) == 1 else _mean(responses)
+        _check_frequencies(folder / name, other.frequency, first.frequency, names[0])
+    response = first if len(responses) == 1 else _mean(responses)
+    paths = {} if response.handle is None else _paths_of(response.handle)
+    if section.handle_file is not None:
+        frequency, more = _handle_experiment(folder / section.handle_file, section, period)
+        _check_frequencies(folder / section.handle_file, frequency, response.frequency, names[0])
+        if twice := sorted(set(paths) & set(more)):
+            raise fail(
+                str(folder / section.handle_file),
+                f"{HANDLE_PATHS[twice[0]]}_real_m_per_N",
+                f"is in {names[0]}, too; keep one of them",
+            )
+        paths |= more
+    at_sensor, actuator = section.handle_at == "sensor", section.actuator_at == "sensor"
+    if at_sensor or actuator or paths:
+        handle = MeasuredHandle(**paths, at_sensor=at_sensor, actuator_at_sensor=actuator)
+        response = replace(response, handle=handle)
+    return replace(response, delay=section.hardware_delay_samples)
+
+
+def _check_frequencies(path: Path, frequency: Floats, first: Floats, name: str) -> None:
+    """Raise DeviceError for other frequencies than those of the first file, of this name."""
+    if len(frequency) != len(first) or np.any(np.abs(frequency - first) > 1e-6 * first):
+        raise fail(str(path), "", f"has other frequencies than {name}; sweeps must share them")
+
+
+def _paths_of(handle: MeasuredHandle) -> dict[str, MeasuredPath]:
+    """The measured paths of a handle by field."""
+    paths = {name: getattr(handle, name) for name in HANDLE_PATHS}
+    return {name: path for name, path in paths.items() if path is not None}
 
 
 def _mean(responses: Sequence[Response]) -> Response:
     """Repeated sweeps as one response; a frequency is as coherent as in the worst of them."""
-    sweeps = np.array([response.value for response in responses])
-    known = [response.coherence for response in responses if response.coherence is not None]
-    coherence = np.min(known, axis=0) if known else None
-    note = f"mean of {len(responses)} sweeps" + (f", each {responses[0].note}" if responses[0].note else "")
-    return replace(responses[0], value=sweeps.mean(axis=0), coherence=coherence, sweeps=sweeps, note=note)
+    first = responses[0]
+    whole = _mean_path([MeasuredPath(response.value, response.coherence) for response in responses])
+    note = f"mean of {len(responses)} sweeps" + (f", each {first.note}" if first.note else "")
+    handle = None
+    if first.handle is not None:
+        every = [_paths_of(response.handle) for response in responses if response.handle is not None]
+        shared = [name for name in HANDLE_PATHS if all(name in paths for paths in every)]
+        if len(every) == len(responses):
+            handle = MeasuredHandle(**{name: _mean_path([paths[name] for paths in every]) for name in shared})
+    return replace(
+        first, value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps, note=note, handle=handle
+    )
+
+
+def _mean_path(paths: Sequence[MeasuredPath]) -> MeasuredPath:
+    """Repetitions of one path, and their mean."""
+    sweeps = np.array([path.value for path in paths])
+    known = [path.coherence for path in paths if path.coherence is not None]
+    return MeasuredPath(sweeps.mean(axis=0), np.min(known, axis=0) if known else None, sweeps)
+
+
+def _handle_experiment(
+    path: Path, section: ResponseSection, period: float
+) -> tuple[Floats, dict[str, MeasuredPath]]:
+    """Frequencies and paths, by field, of the experiment in which the handle is pushed."""
+    table = _table(path, of_handle=True)
+    if "time_s" in table:
+        _check_time(path, table, period)
+        _check_rest(path, table, "force_command_N", "handle_force_N")
+        columns = {"force_to_encoder": "position_m", "force_to_handle": "handle_position_m"}
+        found = {
+            name: _record_response(path, table["handle_force_N"], table[column], section, period)
+            for name, column in columns.items()
+            if column in table
+        }
+        frequency = found["force_to_encoder"].frequency
+        return frequency, {name: MeasuredPath(one.value, one.coherence) for name, one in found.items()}
+    _check_spectrum(path, table, period)
+    if "sweep" not in table:
+        return table["frequency_Hz"], _handle_paths(table)
+    parts = [{key: column[table["sweep"] == n] for key, column in table.items()} for n in _sweep_numbers(table)]
+    for n, part in zip(_sweep_numbers(table), parts, strict=True):
+        _check_sweep(path, n, part["frequency_Hz"], parts[0]["frequency_Hz"])
+    every = [_handle_paths(part) for part in parts]
+    return parts[0]["frequency_Hz"], {name: _mean_path([paths[name] for paths in every]) for name in every[0]}
+
+
+def _handle_paths(table: Table) -> dict[str, MeasuredPath]:
+    """The paths of the handle that a table holds, by field."""
+    paths = {}
+    for field, name in HANDLE_PATHS.items():
+        real, imaginary = (table.get(f"{name}_{part}_m_per_N") for part in ("real", "imag"))
+        if real is not None and imaginary is not None:
+            paths[field] = MeasuredPath(real + 1j * imaginary, table.get("coherence"))
+    return paths
+
+
+def _sweep_numbers(table: Table) -> list[float]:
+    """Numbers of the repetitions in a table, in its order."""
+    return list(dict.fromkeys(table["sweep"].tolist()))
+
+
+def _check_sweep(path: Path, n: float, frequency: Floats, first: Floats) -> None:
+    """Raise DeviceError for other frequencies than those of the first sweep."""
+    if len(frequency) != len(first) or np.any(frequency != first):
+        raise fail(
+            str(path), "sweep", f"sweep {n:g} has other frequencies than the first; sweeps must share them"
+        )
 
 
 def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[Response]:
@@ -80,18 +177,32 @@ def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[
     numbers = table["sweep"]
     parts = [
         _spectrum(path, {key: column[numbers == n] for key, column in table.items()}, section, period)
-        for n in dict.fromkeys(numbers.tolist())
+        for n in _sweep_numbers(table)
     ]
-    for n, part in zip(dict.fromkeys(numbers.tolist()), parts, strict=True):
-        if len(part.frequency) != len(parts[0].frequency) or np.any(part.frequency != parts[0].frequency):
-            raise fail(
-                str(path), "sweep", f"sweep {n:g} has other frequencies than the first; sweeps must share them"
-            )
+    for n, part in zip(_sweep_numbers(table), parts, strict=True):
+        _check_sweep(path, n, part.frequency, parts[0].frequency)
     yield from parts
 
 
 def _spectrum(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
     """A response read unchanged, its frequencies checked."""
+    _check_spectrum(path, table, period)
+    value = table["real_m_per_N"] + 1j * table["imag_m_per_N"]
+    if not np.any(value):
+        raise fail(str(path), "", "is 0 m/N at every frequency; is the position in metres?")
+    paths = _handle_paths(table)
+    return Response(
+        table["frequency_Hz"],
+        value,
+        section.integrators,
+        table.get("coherence"),
+        section.averages or 1.0,
+        handle=MeasuredHandle(**paths) if paths else None,
+    )
+
+
+def _check_spectrum(path: Path, table: Table, period: float) -> None:
+    """Raise DeviceError for frequencies that do not rise up to half the rate, and for a coherence out of range."""
     f, lines = table["frequency_Hz"], table[LINE].astype(int)
     half = 0.5 / period
     low, twice, falling = f <= 0.0, np.diff(f) == 0.0, np.diff(f) < 0.0
@@ -123,14 +234,48 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
             f"has {plural(len(f), 'frequency', 'frequencies')}; at least 6 are needed, "
             "a few hundred for an accurate chart",
         )
-    value = table["real_m_per_N"] + 1j * table["imag_m_per_N"]
-    if not np.any(value):
-        raise fail(str(path), "", "is 0 m/N at every frequency; is the position in metres?")
-    return Response(f, value, section.integrators, coherence, section.averages or 1.0)
 
 
 def _response_of_record(path: Path, table: Table, section: ResponseSection, period: float) -> Response:
-    """A raw sweep as a response, its time stamps checked against the loop's sampling period."""
+    """A raw sweep as a response, with that of the handle where it was recorded."""
+    _check_time(path, table, period)
+    _check_rest(path, table, "handle_force_N", "force_command_N")
+    force = table["force_command_N"]
+    response = _record_response(path, force, table["position_m"], section, period)
+    if "handle_position_m" not in table:
+        return response
+    held = _record_response(path, force, table["handle_position_m"], section, period)
+    return replace(
+        response, handle=MeasuredHandle(command_to_handle=MeasuredPath(held.value, held.coherence))
+    )
+
+
+def _record_response(
+    path: Path, force: Floats, position: Floats, section: ResponseSection, period: float
+) -> Response:
+    """A path of a raw sweep. Raises DeviceError."""
+    try:
+        return sweep_response(force, position, period, section.integrators, section.segment_samples)
+    except ResponseError as error:
+        raise fail(str(path), "", str(error)) from None
+
+
+def _check_rest(path: Path, table: Table, resting: str, excited: str) -> None:
+    """Raise DeviceError where the other force is not constant: its answer would count as that of the first."""
+    if resting not in table:
+        return
+    swing, other = float(np.ptp(table[resting])), float(np.ptp(table[excited]))
+    if swing > RESTING * other:
+        raise fail(
+            str(path),
+            resting,
+            f"varies by {swing:.4g} N while {excited} is the excitation; keep it constant, and record the other "
+            "experiment in a file of its own (response.file: the command, response.handle_file: the handle)",
+        )
+
+
+def _check_time(path: Path, table: Table, period: float) -> None:
+    """Raise DeviceError for time stamps that are not those of the loop's samples."""
     time, lines = table["time_s"], table[LINE].astype(int)
     steps = np.diff(time)
     if len(steps) == 0:
@@ -160,23 +305,20 @@ def _response_of_record(path: Path, table: Table, section: ResponseSection, peri
             f"rises by {mean:.8g} s from line to line, but sampling_period_s is {period:.8g}; record every "
             "sample of the loop, or correct sampling_period_s",
         )
-    try:
-        return sweep_response(
-            table["force_command_N"], table["position_m"], period, section.integrators, section.segment_samples
-        )
-    except ResponseError as error:
-        raise fail(str(path), "", str(error)) from None
 
 
-def _table(path: Path) -> Table:
-    """The columns wanted, as numbers, and each row's line."""
+def _table(path: Path, *, of_handle: bool = False) -> Table:
+    """The columns wanted, as numbers, and each row's line.
+
+    of_handle  whether of the experiment in which the handle is pushed
+    """
     rows = csv.reader(_text(path).splitlines(), strict=True)
     values: list[list[float]] = []
     lines: list[int] = []
     uneven: list[tuple[int, str]] = []
     try:
         header = [name.strip() for name in next(non_blank_rows(rows), [])]
-        columns = _columns(path, header)
+        columns = _columns(path, header, of_handle)
         places = [header.index(name) for name in columns]
         wrong: dict[str, list[tuple[int, str]]] = {name: [] for name in columns}
         for row in non_blank_rows(rows):
@@ -200,12 +342,23 @@ def _table(path: Path) -> Table:
     return {LINE: np.array(lines, dtype=float), **dict(zip(columns, table, strict=True))}
 
 
-def _columns(path: Path, header: list[str]) -> list[str]:
+def _columns(path: Path, header: list[str], of_handle: bool) -> list[str]:
     """The columns to read: those of a response or those of a raw sweep."""
     if not header:
         raise fail(str(path), "", f"is empty; its first line must name columns, such as {', '.join(SPECTRUM)}")
-    wanted = RECORD if "time_s" in header else SPECTRUM
-    optional = [name for name in OPTIONAL if name in header and wanted is SPECTRUM]
+    if "time_s" in header:
+        wanted, other = (HANDLE_RECORD, RECORD) if of_handle else (RECORD, HANDLE_RECORD)
+        more: tuple[str, ...] = ("handle_position_m", other[1])
+    else:
+        paths = [name for name in HANDLE_PATHS.values() if not of_handle or name.startswith("handle")]
+        pairs = [[f"{name}_{part}_m_per_N" for part in ("real", "imag")] for name in paths]
+        given = [pair for pair in pairs if set(pair) & set(header)]
+        if of_handle and not given:
+            needed = ", ".join(["frequency_Hz", *pairs[0]])
+            raise fail(str(path), "line 1", f"has no path from the handle's force; needed are {needed}")
+        columns = [column for pair in given for column in pair]
+        wanted, more = (("frequency_Hz",) if of_handle else SPECTRUM) + tuple(columns), OPTIONAL
+    optional = [name for name in more if name in header]
     if fault := header_fault(header, wanted, optional):
         raise fail(str(path), "line 1", fault)
     return [*wanted, *optional]

@@ -42,9 +42,11 @@ if TYPE_CHECKING:
     from zwidth.contact.mechanism.surfaces import Surface
     from zwidth.contact.mechanism.walls import SurfaceRendering
     from zwidth.guarantees.loop_guarantees import Guarantees
+    from zwidth.loop.measured.measured_port import MeasuredPort
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.measures.felt_wall import FeltWall
+    from zwidth.model.response import Response
     from zwidth.progress import Progress
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
@@ -164,6 +166,30 @@ class OperatingPoint(PosedDevice):
         # orthonormal directions in which the handle moves at all
         rows[:, : handle.shape[1]] = left.T[kept] @ across
         return rows
+
+    @cached_property
+    def measured_port(self) -> MeasuredPort:
+        """A measured device at its encoder and its handle. Raises ResponseError where the handle was not
+        measured."""
+        from zwidth.loop.measured.measured_port import measured_port
+
+        return measured_port(self.measured, self.controller.sampling_period)
+
+    @property
+    def measured(self) -> Response:
+        """The measured response, without the operator. Raises OperatingPointError for a device with a model."""
+        if self.response is None:
+            raise OperatingPointError("the device has a model and no measured response")
+        return self.response
+
+    @cached_property
+    def held_response(self) -> Response:
+        """The measured response with the operator at the handle. Raises ResponseError as `measured_port`."""
+        if self.operator is None:
+            return self.measured
+        from zwidth.loop.measured.held_response import hold_port
+
+        return hold_port(self.measured, self.measured_port, self.operator)
 
     @cached_property
     def other_branch(self) -> OperatingPoint | None:

@@ -133,7 +133,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
     stiffness, damping  of the wall [N/m], [N s/m]
     Raises  HandleError  (measures.handle_impedance) where there is no handle
             ValueError   for a wall that is not finite
-            what `OperatingPoint.plant` and `chart.chart.largest_stiffness` raise
+            what `OperatingPoint.plant` and `chart.chart.largest_stiffness` raise; of a measured device ResponseError
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
@@ -149,6 +149,10 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
     require("point", point, OperatingPoint)
     check_number("stiffness", stiffness, "N/m")
     check_number("damping", damping, "N s/m")
+    if point.response is not None:
+        from zwidth.measures.felt_measured import felt_wall_of_response
+
+        return felt_wall_of_response(point, stiffness, damping)
     plant, K, B = point.ungripped_plant, stiffness, damping
     handle_of(plant)
     verdict = judge(point.loop, [K], [B]).names[0]

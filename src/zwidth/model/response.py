@@ -20,6 +20,51 @@ class ResponseError(ValueError):
 
 
 @dataclass(frozen=True)
+class MeasuredPath:
+    """One path of a measured device, at the frequencies of its `Response`.
+
+    value      (n,) complex [m/N]; the mean where there are several sweeps
+    coherence  (n,) magnitude squared, 0 to 1; None: not known
+    sweeps     (k, n) complex, the repetitions; None: one measurement
+    """
+
+    value: Complexes
+    coherence: Floats | None = None
+    sweeps: Complexes | None = None
+
+
+@dataclass(frozen=True)
+class MeasuredHandle:
+    """What is known of a measured device at the handle, so that somebody can hold it there.
+
+    force_to_encoder    from the hand's force, continuous in time, to the encoder's reading; None: not measured
+    command_to_handle   from the force command sample to the handle's position at the samples, hold and hardware
+                        delay included; None: not measured
+    force_to_handle     from the hand's force to the handle's position; None: not measured
+    at_sensor           whether the hand holds what the encoder reads
+    actuator_at_sensor  whether the command acts on what the encoder reads
+    """
+
+    force_to_encoder: MeasuredPath | None = None
+    command_to_handle: MeasuredPath | None = None
+    force_to_handle: MeasuredPath | None = None
+    at_sensor: bool = False
+    actuator_at_sensor: bool = False
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Paths that are neither measured nor follow from others, in words; () where the handle can be held."""
+        absent = []
+        if self.force_to_encoder is None and not (self.at_sensor and self.actuator_at_sensor):
+            absent.append("from the handle's force to the encoder")
+        if self.command_to_handle is None and not (self.at_sensor or self.actuator_at_sensor):
+            absent.append("from the command to the handle")
+        if self.force_to_handle is None and not self.at_sensor:
+            absent.append("from the handle's force to the handle")
+        return tuple(absent)
+
+
+@dataclass(frozen=True)
 class Response:
     """P(exp(2 pi i f T)) at measured frequencies: force command sample -> encoder sample, hold and hardware delay
     included.
@@ -31,6 +76,8 @@ class Response:
     averages     independent averages behind the coherence
     sweeps       (k, n) complex, the repetitions of which `value` is the mean; None: one measurement
     note         how the response was made, a sentence for people; "" where it was read unchanged
+    handle       what is known at the handle; None: nothing
+    delay        known delay of the hardware that the response holds [samples]; None: not known
     """
 
     frequency: Floats
@@ -40,11 +87,25 @@ class Response:
     averages: float = 1.0
     sweeps: Complexes | None = None
     note: str = ""
+    handle: MeasuredHandle | None = None
+    delay: float | None = None
 
     def __post_init__(self) -> None:
         f, P = np.shape(self.frequency), np.shape(self.value)
         if f != P:
             raise ValueError(f"value has the shape {P} and frequency {f}; they must be alike")
+
+
+def handle_obstacle(response: Response) -> str:
+    """Why nobody can hold the handle of a measured device, and what to do; "" where somebody can."""
+    missing = (response.handle or MeasuredHandle()).missing
+    if not missing:
+        return ""
+    paths = ", ".join(missing[:-1]) + " and " * (len(missing) > 1) + missing[-1]
+    return (
+        f"has no path {paths}; measure {'it' if len(missing) == 1 else 'them'}, or state handle_at = \"sensor\" "
+        'where the hand holds what the encoder reads, and actuator_at = "sensor" where the command acts there'
+    )
 
 
 def relative_error(coherence: Floats, averages: float) -> Floats:

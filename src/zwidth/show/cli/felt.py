@@ -25,6 +25,7 @@ class FeltCommand(Command):
         "zwidth felt my-device.toml --stiffness 2000 --damping 5 --output felt.svg",
     )
     options = wall_options()
+    takes_responses = True
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the impedances, .json)."
     keys = (
         "static_stiffness_N_per_m",

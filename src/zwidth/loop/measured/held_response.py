@@ -1,0 +1,166 @@
+"""A measured device in an operator's hand, as another measured device.
+
+He pushes the handle with -D(jw) x_h, D the dynamic stiffness of arm and grasp. Before sampling the device answers
+a command with G_ea - X/W, and after it with
+
+    P' = P - sum_k X_k,      X = G_eh D/(1 + D G_hh) G_ha W
+
+X_0 is made of the data; what looks like it at the frequencies beyond half the sampling rate, of the device's fitted
+modes. It falls like 1/w^3 with a rigid grasp, like 1/w^4 and more with an elastic one, and is small where the
+device is heavier than what the hand adds at high frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from zwidth.loop.measured.measured_port import MeasuredPort, measured_port
+from zwidth.model.operator import Operator, OperatorError
+from zwidth.model.response import Response
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+NODES: Final = 16  # angles at which the aliases beyond the nearest are summed; they vary little
+FAR: Final = 1500  # aliases to either side
+MOST_ERROR: Final = 0.2  # relative standard deviation of a held response's value, from which it is left out
+FEWEST: Final = 50  # frequencies that must be left
+ALIKE: Final = 0.9  # of half the sampling rate: at it, a frequency and its mirror image are one
+
+
+def operator_stiffness(operator: Operator, omega: Floats) -> Complexes:
+    """D (...) = -f/x_h of arm and grasp at angular frequencies [rad/s], of either sign [N/m].
+
+        arm  k_a + jw b_a - w^2 m_a,   grasp  k_g + jw b_g,   both in series unless the grasp is rigid
+    """
+    s = 1j * np.asarray(omega, dtype=float)
+    arm = operator.arm_stiffness + s * operator.arm_damping + s**2 * operator.arm_mass
+    if operator.grasp_stiffness is None:
+        return np.asarray(arm)
+    grasp = operator.grasp_stiffness + s * (operator.grasp_damping or 0.0)
+    return np.asarray(arm * grasp / (arm + grasp))
+
+
+def held_response(response: Response, operator: Operator, period: float) -> Response:
+    """The response of a device with an operator at its handle.
+
+    His own numbers count as known. Repeated sweeps are held one by one; from coherence the error of every path is
+    carried on, with that of the fitted modes in what they add.
+
+    period  sampling period T [s]
+    Raises  ResponseError  where the handle was not measured, see `measured_port`
+    """
+    _require_mass(operator)
+    return hold_port(response, measured_port(response, period), operator)
+
+
+def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Response:
+    """The same of a response whose port is known already. Raises OperatorError for an arm without mass behind an
+    elastic grasp."""
+    _require_mass(operator)
+    D = operator_stiffness(operator, port.theta / port.period)
+    beyond = _aliases(port, operator)
+    change = _change(port.baseband, D)
+    held = response.value - change - beyond
+    sweeps = None
+    if port.sweeps:
+        sweeps = np.array([value - _change(base, D) - beyond for base, value in port.sweeps])
+    error = _relative_error(port, D, change, held, beyond)
+    # what a hand leaves of a far larger motion is the difference of two measured ones
+    kept = error < MOST_ERROR if np.count_nonzero(error < MOST_ERROR) >= FEWEST else np.ones(len(error), dtype=bool)
+    coherence = 1.0 / (1.0 + 2.0 * response.averages * error**2) if port.errors_known else None
+    return replace(
+        response,
+        frequency=response.frequency[kept],
+        value=held[kept],
+        # an arm's spring or damper takes poles at z = 1 away, below the data or within: read off anew
+        integrators=response.integrators if not (operator.arm_stiffness or operator.arm_damping) else None,
+        coherence=None if coherence is None else coherence[kept],
+        sweeps=None if sweeps is None else sweeps[:, kept],
+        note=_note(response, port, np.abs(beyond / held), kept),
+        handle=None,
+        delay=None,
+    )
+
+
+def _require_mass(operator: Operator) -> None:
+    """Raise OperatorError for an arm without mass behind an elastic grasp."""
+    if not operator.rigid_grasp and not operator.arm_mass > 0.0:
+        raise OperatorError(f"an arm held by an elastic grasp needs a mass, got {operator.arm_mass:g} kg")
+
+
+def _note(response: Response, port: MeasuredPort, share: Floats, kept: Flags) -> str:
+    """How the held response was made, in words. share: of the aliases in it (n,)."""
+    below = kept & (port.theta < ALIKE * np.pi)
+    worst = int(np.argmax(np.where(below, share, 0.0)))
+    parts = [response.note] if response.note else []
+    parts.append(
+        f"held by the operator, {len(port.model.modes) + port.model.free} fitted modes continuing the device beyond "
+        f"half the sampling rate: they make up at most {100.0 * share[worst]:.2g} % of the response, at "
+        f"{response.frequency[worst]:.4g} Hz, and miss the upper half of what was measured by "
+        f"{100.0 * port.misfit:.2g} %"
+    )
+    if not kept.all():
+        lost = response.frequency[~kept]
+        parts.append(
+            f"{len(lost)} frequencies from {lost[0]:.4g} to {lost[-1]:.4g} Hz left out, where errors of the paths "
+            f"make up more than {100.0 * MOST_ERROR:.0f} % of what the hand leaves of the motion"
+        )
+    return "; ".join(parts)
+
+
+def _change(base: Mapping[str, Complexes], D: Complexes) -> Complexes:
+    """X of the responses at the frequency itself."""
+    return np.asarray(base["sh"] * D / (1.0 + D * base["hh"]) * base["ha"])
+
+
+def _aliases(port: MeasuredPort, operator: Operator) -> Complexes:
+    """Sum (n,) of X over the frequencies theta + 2 pi k, k other than 0, of the fitted modes."""
+
+    def change(theta: Floats) -> Complexes:
+        flat = theta.ravel()
+        D = operator_stiffness(operator, flat / port.period)
+        path = {name: port.continued(name, flat) for name in ("sh", "ha", "hh")}
+        path["ha"] = path["ha"] * port.model.hold(flat)
+        return _change(path, D).reshape(theta.shape)
+
+    k = np.arange(2, FAR + 1)
+    nodes = 0.5 * np.pi * (1.0 + chebyshev.chebpts1(NODES))
+    turns = 2.0 * np.pi * np.concatenate([k, -k])
+    far = change(nodes[:, None] + turns).sum(axis=1)
+    series = np.linalg.solve(chebyshev.chebvander(chebyshev.chebpts1(NODES), NODES - 1), far)
+    smooth = chebyshev.chebvander(2.0 * port.theta / np.pi - 1.0, NODES - 1) @ series
+    return np.asarray(change(port.theta + 2.0 * np.pi) + change(port.theta - 2.0 * np.pi) + smooth)
+
+
+def _relative_error(
+    port: MeasuredPort, D: Complexes, change: Complexes, held: Complexes, beyond: Complexes
+) -> Floats:
+    """Relative standard deviation (n,) of a held response; 0 where no error of the paths is known.
+
+        dX/X = dG_eh/G_eh + d(W G_ha)/(W G_ha) - D G_hh/(1 + D G_hh) dG_hh/G_hh
+
+    where paths that stem from one measurement err together.
+    """
+    base, hold = port.baseband, port.model.hold(port.theta)
+    parts = {"sh": 1.0 + 0.0j, "ha": 1.0 + 0.0j, "hh": -D * base["hh"] / (1.0 + D * base["hh"])}
+    slopes: dict[str, Complexes] = {"sa": np.ones(len(held), dtype=complex)}
+    for name, factor in parts.items():
+        source = port.origin[name]
+        own = base[name]
+        if name[1] != source[1]:
+            own = own * hold if source[1] == "a" else own / hold
+        slopes[source] = slopes.get(source, np.zeros(len(held), dtype=complex)) - change * factor / own
+    square = np.zeros(len(held))
+    if port.errors_known:
+        square += (port.misfit * np.abs(beyond)) ** 2
+    for source, slope in slopes.items():
+        square += (np.abs(slope) * port.deviations[source]) ** 2
+    return np.asarray(np.sqrt(square) / np.maximum(np.abs(held), 1e-300))

@@ -1,0 +1,270 @@
+"""The poles of a measured device, so that its responses go on beyond half the sampling rate.
+
+Modes are added one by one where the data miss one most, each time all poles and the delay fitted together by
+variable projection: they by least squares, the residues of every path linearly (Golub and Pereyra 1973, known at
+second hand). Every path falls like 1/w^2 in the end, as masses do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.measured.modal_terms import (
+    continuous_terms,
+    hold_response,
+    sampled_free_mass,
+    sampled_terms,
+)
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# The paths of a device by output and input: what is read at the sensor s or the handle h, of a command or actuator
+# a, or of a force at the handle h.
+PATHS: Final = ("sa", "sh", "ha", "hh")
+
+MOST_MODES: Final = 8
+DELAYS: Final = (0.2, 0.8, 1.5, 3.0)  # samples, from which the search begins
+KEPT: Final = 2  # of the searches, once they have a few modes
+EXACT: Final = 1e-6  # relative misfit at which no mode is missing
+GAIN: Final = 0.95  # of the misfit before, above which a mode more explains nothing
+RATIOS: Final = (0.001, 0.005, 0.02, 0.08, 0.3, 1.0)  # damping ratios of modes tried
+TRIED: Final = 40  # frequencies of modes tried, beside the peaks of what is left
+PEAKS: Final = 8
+HIGHEST: Final = 1.9 * np.pi  # angle of the fastest mode: at 2 pi the hold hides it
+LARGEST_DELAY: Final = 200.0  # samples
+POINTS: Final = 300  # by which poles are found
+STEPS: Final = 25
+STEP: Final = 1e-6  # relative, of derivatives
+
+
+@dataclass(frozen=True)
+class PathData:
+    """What was measured: angles (k,), values by path (k,), and the standard deviation of each (k,) or a size.
+
+    integrators  poles at z = 1
+    delay        known delay [samples]; None: to be fitted
+    """
+
+    theta: Floats
+    values: Mapping[str, Complexes]
+    deviations: Mapping[str, Floats]
+    integrators: int
+    delay: float | None
+
+    def thinned(self, most: int) -> PathData:
+        """Every so many of the points, at most `most`."""
+        every = slice(None, None, max(1, -(-len(self.theta) // most)))
+        return replace(
+            self,
+            theta=self.theta[every],
+            values={name: value[every] for name, value in self.values.items()},
+            deviations={name: value[every] for name, value in self.deviations.items()},
+        )
+
+
+@dataclass(frozen=True)
+class PoleModel:
+    """Modes common to all paths, with residues of each.
+
+    modes        (n, 2) angle w and damping ratio; w = 0: of a mass on a dashpot, its rate of decay in place of the
+                 ratio
+    delay        of commands [samples]
+    free         whether there is a free mass without damping, 1/s^2, beside them
+    residues     by path, of the atoms of `atoms`
+    misfit       root of the mean square of the weighted deviations
+    delay_deviation  standard deviation of the delay [samples], 0 of a known one
+    """
+
+    modes: Floats
+    delay: float
+    free: bool
+    residues: Mapping[str, Floats]
+    misfit: float
+    delay_deviation: float
+
+    def sampled(self, name: str, theta: Floats, delay: float | None = None) -> Complexes:
+        """Response (k,) of a path from commands at angles in (0, pi]; `delay` other than its own [samples]."""
+        late = self.delay if delay is None else delay
+        return np.asarray(_atoms(self.modes, self.free, theta, late) @ self.residues[name])
+
+    def continuous(self, name: str, theta: Floats) -> Complexes:
+        """Response (k,) of any path at angles, of commands before hold and delay."""
+        return np.asarray(_atoms(self.modes, self.free, theta, None) @ self.residues[name])
+
+    def hold(self, theta: Floats) -> Complexes:
+        """W of hold and delay at angles, of any size."""
+        return hold_response(theta, self.delay)
+
+
+def fit_poles(data: PathData) -> PoleModel:
+    """The modes, as few as explain the data, the delay, and the residues of each path."""
+    few = data.thinned(POINTS)
+    _, delay, modes = _search(few)
+    if len(few.theta) < len(data.theta):
+        modes, delay = _refine(data, modes, delay)
+    residues, rest = {}, []
+    for name, value in data.values.items():
+        atoms = _stacked(_path_atoms(data, name, modes, delay), data.deviations[name])
+        scale = np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
+        own = _stacked(value, data.deviations[name])
+        residues[name] = np.linalg.lstsq(atoms / scale, own, rcond=1e-11)[0] / scale
+        rest.append(own - atoms @ residues[name])
+    misfit = float(np.sqrt(np.mean(np.concatenate(rest) ** 2)))
+    spread = 0.0 if data.delay is not None else _delay_deviation(data, modes, delay, misfit)
+    return PoleModel(modes, delay, data.integrators == 2, residues, misfit, spread)
+
+
+def _search(data: PathData) -> tuple[float, float, Floats]:
+    """Misfit, delay and modes of the best of searches from several delays."""
+    first = np.array([[0.0, 10.0 * data.theta[0]]]) if data.integrators == 1 else np.zeros((0, 2))
+    states = [(np.inf, delay, first) for delay in (DELAYS if data.delay is None else (data.delay,))]
+    if data.integrators:
+        states = _until_exact(data, [(modes, delay) for _, delay, modes in states])
+    kept = sorted(states, key=lambda one: one[0])
+    best, misses = kept[0], 0
+    while best[0] > EXACT and len(kept[0][2]) < MOST_MODES and misses < 2:
+        kept = _until_exact(data, [(_with_a_mode(data, modes, delay), delay) for _, delay, modes in kept])
+        kept = sorted(kept, key=lambda one: one[0])[: KEPT if len(kept[0][2]) > 1 else None]
+        misses = 0 if kept[0][0] < GAIN * best[0] else misses + 1
+        best = kept[0] if misses == 0 else best
+    return best
+
+
+def _until_exact(data: PathData, starts: Sequence[tuple[Floats, float]]) -> list[tuple[float, float, Floats]]:
+    """Searches from these modes and delays, up to the first after which nothing is left."""
+    found: list[tuple[float, float, Floats]] = []
+    for modes, delay in starts:
+        found.append(_refined(data, modes, delay))
+        if found[-1][0] < EXACT:
+            break
+    return found
+
+
+def _refined(data: PathData, modes: Floats, delay: float) -> tuple[float, float, Floats]:
+    modes, delay = _refine(data, modes, delay)
+    return float(np.sqrt(np.mean(_left(data, modes, delay) ** 2))), delay, modes
+
+
+def _atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) -> Complexes:
+    """Responses (k, 2 n - 1) of unit residue, and one more of the free mass.
+
+    First the free mass, 1/s^2, then each mode, 1/((s - s1)(s - s2)), then these times s, less that of the first:
+    all of them together fall like 1/s^2.
+
+    delay  of commands, sampled behind a hold; None: continuous
+    """
+    sampled = delay is not None
+    parts = []
+    if free:
+        mass = sampled_free_mass(theta, delay) if sampled else -1.0 / theta**2 + 0j
+        parts.append(mass[:, None])
+    if len(modes):
+        w, ratio = modes.T
+        rate = np.where(w == 0.0, ratio / 2.0, w * ratio)
+        root = np.sqrt((rate**2 - w**2).astype(complex))
+        nearest = 1e-7 * np.maximum(w, rate)  # two equal poles are taken as little apart
+        root = np.where(np.abs(root) < nearest, nearest, root)
+        s1, s2 = np.where(w == 0.0, 0.0, -rate + root), -rate - root
+        both = np.concatenate([s1, s2])
+        terms = sampled_terms(both, theta, delay) if sampled else continuous_terms(both, theta)
+        first, second = terms[:, : len(w)], terms[:, len(w) :]
+        faster = (s1 * first - s2 * second) / (s1 - s2)
+        parts += [(first - second) / (s1 - s2), faster[:, 1:] - faster[:, :1]]
+    return np.concatenate(parts, axis=1) if parts else np.zeros((len(theta), 0), dtype=complex)
+
+
+def _path_atoms(data: PathData, name: str, modes: Floats, delay: float) -> Complexes:
+    return _atoms(modes, data.integrators == 2, data.theta, delay if name[1] == "a" else None)
+
+
+def _stacked(values: Complexes, deviation: Floats) -> Floats:
+    """Weighted real and imaginary parts (2k, ...)."""
+    weighted = values / deviation.reshape(-1, *[1] * (values.ndim - 1))
+    return np.concatenate([weighted.real, weighted.imag])
+
+
+def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats, Floats]]:
+    """Of every path the orthonormal basis of its atoms, and what they leave of its values."""
+    parts = []
+    for name, value in data.values.items():
+        atoms = _stacked(_path_atoms(data, name, modes, delay), data.deviations[name])
+        atoms = atoms / np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
+        basis = np.linalg.qr(atoms)[0] if atoms.shape[1] else atoms
+        own = _stacked(value, data.deviations[name])
+        parts.append((basis, own - basis @ (basis.T @ own)))
+    return parts
+
+
+def _left(data: PathData, modes: Floats, delay: float) -> Floats:
+    return np.concatenate([rest for _, rest in _projected(data, modes, delay)])
+
+
+def _refine(data: PathData, modes: Floats, delay: float) -> tuple[Floats, float]:
+    """Modes and delay that leave the least of the data."""
+    from scipy.optimize import least_squares
+
+    fixed = data.delay is not None
+    moving = modes[:, 0] > 0.0
+
+    def unpack(x: Floats) -> tuple[Floats, float]:
+        new = np.exp(x[: 2 * len(modes)].reshape(-1, 2))
+        new[~moving, 0] = 0.0
+        return new, delay if fixed else float(x[-1])
+
+    x0 = np.log(np.where(modes == 0.0, 1.0, modes)).ravel()
+    low = np.tile([np.log(data.theta[0] / 30.0), np.log(1e-6)], len(modes))
+    high = np.tile([np.log(HIGHEST), np.log(50.0)], len(modes))
+    if not fixed:
+        x0, low, high = np.append(x0, delay), np.append(low, 0.0), np.append(high, LARGEST_DELAY)
+    if not len(x0):
+        return modes, delay
+    x0 = np.clip(x0, low + 1e-9, high - 1e-9)
+    found = least_squares(
+        lambda x: _left(data, *unpack(x)), x0, bounds=(low, high), max_nfev=STEPS, x_scale=0.1, ftol=1e-5
+    )
+    return unpack(found.x)
+
+
+def _delay_deviation(data: PathData, modes: Floats, delay: float, misfit: float) -> float:
+    """Standard deviation of the fitted delay [samples], that of all other numbers counted in."""
+    base, columns = _left(data, modes, delay), []
+    for i in range(modes.size):
+        if modes.flat[i] > 0.0:
+            changed = modes.copy()
+            changed.flat[i] *= 1.0 + STEP
+            columns.append((_left(data, changed, delay) - base) / STEP)
+    late = (_left(data, modes, delay + STEP) - base) / STEP
+    if columns:
+        others = np.array(columns).T
+        others /= np.maximum(np.linalg.norm(others, axis=0), 1e-300)
+        left, size, _ = np.linalg.svd(others, full_matrices=False)
+        basis = left[:, size > 1e-9 * size[0]]
+        late = late - basis @ (basis.T @ late)
+    return float(misfit / max(float(np.linalg.norm(late)), 1e-300))
+
+
+def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
+    """The modes and the one more that takes most of what is left."""
+    parts = _projected(data, modes, delay)
+    k = len(data.theta)
+    left = sum(rest[:k] ** 2 + rest[k:] ** 2 for _, rest in parts)
+    inner = np.flatnonzero((left[1:-1] >= left[:-2]) & (left[1:-1] >= left[2:])) + 1
+    peaks = data.theta[inner[np.argsort(-left[inner])[:PEAKS]]]
+    w = np.concatenate([np.geomspace(data.theta[0], HIGHEST, TRIED), peaks])
+    tried = np.array([(a, r) for a in w for r in RATIOS])
+    gain = np.zeros(len(tried))
+    for (basis, rest), name in zip(parts, data.values, strict=True):
+        own = _atoms(tried, False, data.theta, delay if name[1] == "a" else None)[:, : len(tried)]
+        atoms = _stacked(own, data.deviations[name])
+        whole = np.einsum("ij,ij->j", atoms, atoms)
+        atoms -= basis @ (basis.T @ atoms)
+        size = np.einsum("ij,ij->j", atoms, atoms)
+        gain += np.where(size > 1e-16 * whole, (rest @ atoms) ** 2 / np.maximum(size, 1e-300), 0.0)
+    return np.vstack([modes, tried[np.argmax(gain)]])
