@@ -114,7 +114,7 @@ def test_a_delay_that_cannot_be_told_is_to_be_stated():
     rng = np.random.default_rng(3)
     f = np.linspace(1.0, 8.0, 60)
     response = measured_device(Plant.one_mass(0.1, 0.2), T, 0.5, COLLOCATED, f, 0.05, rng)
-    response = replace(response, integrators=1)
+    response = replace(response, integrators=2)
     with pytest.raises(ResponseError, match="does not tell the hardware's delay"):
         held_response(response, HAND, T)
     held_response(replace(response, delay=0.5), HAND, T)

@@ -11,6 +11,8 @@ import numpy as np
 
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.measured.chart import MeasuredChart
+from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.guarantees.coupling import Couplings, couplings, no_couplings
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats, without_idle_motions
@@ -49,9 +51,9 @@ class Guarantees(Result):
     couplings  virtual couplings through which walls are stable with every passive operator; None: not computed
     """
 
-    loop: Loop
+    loop: Loop | MeasuredLoop
     guarantees: tuple[Guarantee, ...]
-    chart: StabilityChart
+    chart: StabilityChart | MeasuredChart
     couplings: Couplings | None = None
 
     def __getitem__(self, name: str) -> Guarantee:
@@ -178,6 +180,13 @@ def guarantees_of(
     require("point", point, OperatingPoint)
     if wall is not None:
         _check_wall(wall)
+    if point.response is not None:
+        from zwidth.guarantees.measured import measured_guarantees
+
+        found = measured_guarantees(point)
+        if not coupling and wall is None:
+            return found
+        return replace(found, couplings=no_couplings("no coupling is known of a measured response; give a [plant]"))
     loop = point.without_operator.loop
     guarantees = find_guarantees(loop, progress=progress)
     if not coupling and wall is None:

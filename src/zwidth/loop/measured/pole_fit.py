@@ -193,8 +193,10 @@ def _stacked(values: Complexes, deviation: Floats) -> Floats:
 def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats, Floats]]:
     """Of every path the orthonormal basis of its atoms, and what they leave of its values."""
     parts = []
+    inputs = {name[1]: name for name in data.values}
+    of_input = {own: _path_atoms(data, name, modes, delay) for own, name in inputs.items()}
     for name, value in data.values.items():
-        atoms = _stacked(_path_atoms(data, name, modes, delay), data.deviations[name])
+        atoms = _stacked(of_input[name[1]], data.deviations[name])
         atoms = atoms / np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
         basis = np.linalg.qr(atoms)[0] if atoms.shape[1] else atoms
         own = _stacked(value, data.deviations[name])

@@ -29,6 +29,7 @@ class GuaranteesCommand(Command):
     """
 
     name = "guarantees"
+    takes_responses = True
     summary = "Find the walls that are stable with every passive operator."
     examples = (
         "zwidth guarantees my-device.toml --output guarantees.svg",

@@ -1,0 +1,183 @@
+"""Guarantees of a measured device: the disks of all passive operators from its measured port.
+
+At each measured frequency the sampled response with any passive operator fills the disk of `disks`,
+
+    centre  P - sum_k q_k,    radius  sum_k |q_k|,    q = G_eh W G_ha jw/(2 Re(jw G_hh))
+
+q_0 is made of the data, the q_k of the frequencies that look alike of the fitted modes. The wall is passive where
+it keeps clear of the disk at every measured frequency (see `gauge`); between them nothing is computed. Re(jw G_hh),
+the power that the handle takes in, is small against jw G_hh itself: where the measurement's error hides it, nothing
+is promised.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.measured.chart import MeasuredChart, measured_chart
+from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.guarantees.loop_guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
+from zwidth.guarantees.region import Region, empty_region
+from zwidth.loop.factor_response import factor_response
+from zwidth.loop.filters import force_filter
+from zwidth.loop.measured.measured_port import MeasuredPort
+from zwidth.loop.operating_point import OperatingPoint
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+FAR: Final = 1000  # aliases to either side
+SURE: Final = 1.96  # standard deviations of the dissipation that are taken off
+DIRECTIONS: Final = 1440  # of rays in the plane of walls
+SHORT: Final = 1e-9  # a stiffness below this share of the largest counts as 0
+ONLY_MODEL: Final = (
+    "this takes the chart of every spring, which needs a model; attach springs to the response as an [operator]"
+)
+NO_PASSIVE: Final = "no wall with K > 0 and B >= 0 is stable with every passive operator"
+
+
+@dataclass(frozen=True)
+class MeasuredDisks:
+    """Disks |P - centre| <= radius at angles (k,), force filter and software's delay included.
+
+    hidden  (k,) whether the error hides the power that the handle takes in
+    """
+
+    angles: Floats
+    centre: Complexes
+    radius: Floats
+    power: Floats
+    hidden: NDArray[np.bool_]
+
+
+def measured_disks(port: MeasuredPort, passed: Complexes) -> MeasuredDisks:
+    """The disks of a measured port at its angles (n,). passed: what the computer adds to P there (n,)."""
+    theta = port.theta
+    jw = 1j * theta / port.period
+    base = port.baseband
+    error = port.deviations[port.origin["hh"]] * np.abs(base["hh"] / _own(port, "hh"))
+    taken = np.real(jw * base["hh"])
+    least = taken - SURE * np.abs(jw) * error
+    hidden = ~(least > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        q = np.where(hidden, np.inf, base["sh"] * base["ha"] * jw / (2.0 * least))
+        others, reach = _beyond(port)
+        p, c = base["sa"], port.sampled["sa"] - base["sa"] - others
+        size = np.abs(passed)
+        centre, radius = passed * (p - q + c), size * (np.abs(q) + reach)
+        # |p - q + c|^2 - (|q| + r)^2 without the cancellation of |q|^2
+        power = np.abs(p) ** 2 - 2.0 * np.real(p * q.conj()) + 2.0 * np.real((p - q) * c.conj())
+        power = size**2 * (power - 2.0 * np.abs(q) * reach + np.abs(c) ** 2 - reach**2)
+    return MeasuredDisks(theta, centre, radius, power, hidden)
+
+
+def _own(port: MeasuredPort, name: str) -> Complexes:
+    """What was measured for a path: itself, or what it stems from."""
+    source = port.origin[name]
+    return port.sampled[source] if source in port.sampled else port.baseband[source]
+
+
+def _beyond(port: MeasuredPort) -> tuple[Complexes, Floats]:
+    """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; inf where they take in no
+    power."""
+    total, size = np.zeros(len(port.theta), dtype=complex), np.zeros(len(port.theta))
+    for k in range(1, FAR + 1):
+        for turn in (2.0 * np.pi * k, -2.0 * np.pi * k):
+            theta = port.theta + turn
+            jw = 1j * theta / port.period
+            taken = np.real(jw * port.continued("hh", theta))
+            pushed = port.continued("sh", theta) * port.continued("ha", theta) * port.model.hold(theta) * jw
+            q = np.where(taken > 0.0, pushed / (2.0 * np.where(taken > 0.0, taken, 1.0)), np.inf)
+            total, size = total + q, size + np.abs(q)
+            if k == FAR:
+                size = size + np.abs(q) * FAR  # terms fall like 1/k^2
+    return total, size
+
+
+def _largest_mu(disks: MeasuredDisks, K: Floats, B: Floats, speed: Complexes) -> Floats:
+    """mu (k,) of walls K, B (k,): 1/mu is the factor at which each fails first."""
+    mu = np.zeros(len(K))
+    for i in range(len(disks.angles)):
+        H = K + B * speed[i]
+        if not np.isfinite(disks.radius[i]):
+            mu[H != 0.0] = np.inf
+            continue
+        a, b = np.real(H * disks.centre[i]), np.abs(H) ** 2 * disks.power[i]
+        D = np.abs(H) ** 2 * disks.radius[i] ** 2 - np.imag(H * disks.centre[i]) ** 2
+        root = np.sqrt(np.maximum(D, 0.0))
+        own = np.where(a > 0.0, -b / np.maximum(a + root, 1e-300), root - a)
+        mu = np.maximum(mu, np.where((D >= 0.0) & (own > 0.0), own, 0.0))
+    return mu
+
+
+def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
+    """The walls that keep clear of every passive operator at all measured frequencies."""
+    inner = port.theta < np.pi * (1.0 - 1e-9)
+    for source in set(port.origin.values()):
+        inner &= np.isfinite(port.deviations[source])
+    force = force_filter(loop.controller)
+    z, d = np.exp(1j * port.theta), np.expm1(1j * port.theta)
+    passed = factor_response(force.numerator, force.denominator, d) * z ** -round(loop.controller.delay)
+    disks = measured_disks(port, np.asarray(passed))
+    frequency = port.theta / (2.0 * np.pi * port.period)
+    lost = inner & disks.hidden
+    if np.any(lost):
+        at = np.flatnonzero(lost)
+        return empty_region(
+            f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, {frequency[at[0]]:.4g} to "
+            f"{frequency[at[-1]]:.4g} Hz, its error is larger than the power that the handle takes in; measure "
+            "longer or with more force there, or state hardware_delay_samples"
+        )
+    if not np.all(np.isfinite(disks.radius[inner])):
+        return empty_region(
+            "this is not known: the fitted modes, which continue the device beyond half the sampling rate, do not "
+            "all take in power there"
+        )
+    kept = MeasuredDisks(*(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power", "hidden")))
+    speed, T = loop.w(kept.angles), port.period
+
+    def ends(directions: Floats) -> tuple[Floats, Floats]:
+        K, B = np.cos(directions) / T, np.sin(directions)
+        reach = 1.0 / np.maximum(_largest_mu(kept, K, B, speed), 1e-300)
+        return K * reach, B * reach
+
+    directions = np.linspace(-np.pi, np.pi, DIRECTIONS + 1)
+    K, B = ends(directions)
+    ring = np.column_stack([K, B])
+    usable = (directions >= 0.0) & (directions < 0.5 * np.pi) & (SHORT * np.max(np.abs(K)) < K)
+    if not usable.any():
+        return Region((ring,), float("nan"), float("nan"), NO_PASSIVE)
+    best = int(np.argmax(np.where(usable, K, -np.inf)))
+    low, high = max(directions[best - 1], 0.0), min(directions[best + 1], 0.5 * np.pi)
+    closer = np.linspace(low, high, 401)
+    Kc, Bc = ends(closer)
+    top = int(np.argmax(Kc))
+    warning = f"at {len(kept.angles)} measured frequencies; between them the condition is not computed"
+    return Region((ring,), float(Kc[top]), float(Bc[top]), None, warning)
+
+
+def measured_guarantees(point: OperatingPoint) -> Guarantees:
+    """Every guarantee of a measured device without its operator, with the reason where one is not known."""
+    bare = point.without_operator
+    chart: MeasuredChart = measured_chart(bare.measured, bare.controller)
+    region = measured_passive_region(bare.measured_port, chart.loop)
+    peak = chart.stiffness_max
+    stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
+    return Guarantees(
+        chart.loop,
+        (
+            Guarantee("passive", "stable whatever passive linear operator holds the handle", region, COLGATE),
+            Guarantee(
+                "spring-stable",
+                "stable whatever spring holds the handle, from none to one that holds it fixed",
+                empty_region(ONLY_MODEL),
+                "",
+            ),
+            Guarantee("stable", "stable with the device as measured", stable, EXACT),
+        ),
+        chart,
+    )
