@@ -67,6 +67,10 @@ def sensitivities(
     require("device", device, Device)
     operating_point = point or device.at()
     device = device_of_point(device, operating_point)
+    if operating_point.response is not None:
+        from zwidth.study.sensitivity_measured import measured_sensitivities
+
+        return measured_sensitivities(device, operating_point, progress)
     loop = operating_point.loop
     peak = largest_stiffness(loop)
     left_out = dict(_left_out(device.document))

@@ -14,7 +14,7 @@ measured: there it is continued by its fitted modes (`pole_fit`). At the frequen
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.measured.modal_terms import hold_response
-from zwidth.loop.measured.pole_fit import PATHS, PathData, PoleModel, fit_poles
+from zwidth.loop.measured.pole_fit import PathData, PoleModel, fit_poles
 from zwidth.model.response import (
     MeasuredHandle,
     MeasuredPath,
@@ -79,7 +79,7 @@ class MeasuredPort:
         """Root mean square of the relative deviation of fitted from measured responses, in the upper half."""
         upper = self.theta > 0.5 * np.pi
         squares = []
-        for name in PATHS:
+        for name in self.baseband:
             fit = self.continued(name, self.theta[upper])
             if name[1] == "a":
                 fit = fit * self.model.hold(self.theta[upper])
@@ -155,6 +155,44 @@ def measured_port(response: Response, period: float) -> MeasuredPort:
         own, base, _ = _four_paths({n: _sweep(p, k) for n, p in paths.items()}, handle, model, theta)
         sweeps.append((base, own["sa"]))
     return MeasuredPort(theta, period, sampled, baseband, deviations, origin, tuple(sweeps), model)
+
+
+def command_port(response: Response, period: float) -> MeasuredPort:
+    """The path from command to encoder alone, of a response with a handle or without."""
+    bare = replace(response, handle=None)
+    model = fit_poles(path_data(bare, period))
+    theta = np.minimum(2.0 * np.pi * response.frequency * period, np.pi)
+    base = {"sa": response.value - _aliases(model, "sa", theta)}
+    deviation = relative_deviation(_paths(bare)["sa"], response.averages) * np.abs(response.value)
+    return MeasuredPort(
+        theta, period, {"sa": response.value}, base, {"sa": deviation}, {"sa": "sa"}, (), model
+    )
+
+
+def changed_port(port: MeasuredPort, added_delay: float = 0.0, period: float | None = None) -> MeasuredPort:
+    """The same device commanded later, or by a computer of another rate; its own delay stays the same in seconds.
+
+    At the frequency itself commands are held and delayed anew, W' / W of what was measured; what the frequencies
+    that look alike add is of the fitted modes. Angles above pi are left to the caller.
+
+    added_delay  [samples of the new period]
+    period       new sampling period [s]; None: the same
+    """
+    ratio = 1.0 if period is None else period / port.period
+    model = port.model.scaled(ratio, added_delay)
+    theta = port.theta * ratio
+    change = model.hold(theta) / port.model.hold(port.theta)
+    base = {name: value * change if name[1] == "a" else value for name, value in port.baseband.items()}
+    sampled = {name: base[name] + _aliases(model, port.origin[name], theta) for name in port.sampled}
+    return replace(
+        port,
+        theta=theta,
+        period=port.period * ratio,
+        sampled=sampled,
+        baseband=base,
+        sweeps=(),
+        model=model,
+    )
 
 
 def _paths(response: Response) -> dict[str, MeasuredPath]:

@@ -98,6 +98,19 @@ class PoleModel:
         """Response (k,) of any path at angles, of commands before hold and delay."""
         return np.asarray(_atoms(self.modes, self.free, theta, None) @ self.residues[name])
 
+    def scaled(self, ratio: float, added_delay: float) -> PoleModel:
+        """The same device in sampling periods that are `ratio` times as long, its commands later by a delay [of
+        the new periods]."""
+        modes = self.modes.copy()
+        modes[:, 0] *= ratio
+        modes[modes[:, 0] == 0.0, 1] *= ratio
+        # atoms of 1/s^2 first, then those of 1/s
+        squared = int(self.free) + len(modes)
+        residues = {
+            name: np.append(own[:squared] * ratio**2, own[squared:] * ratio) for name, own in self.residues.items()
+        }
+        return replace(self, modes=modes, residues=residues, delay=self.delay / ratio + added_delay)
+
     def hold(self, theta: Floats) -> Complexes:
         """W of hold and delay at angles, of any size."""
         return hold_response(theta, self.delay)

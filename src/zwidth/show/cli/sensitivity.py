@@ -31,6 +31,7 @@ class SensitivityCommand(Command):
     """Find which numbers of DEVICE to change first: the change of the largest stiffness with each of them."""
 
     name = "sensitivity"
+    takes_responses = True
     summary = "Find which numbers of DEVICE to change first."
     examples = (
         "zwidth sensitivity my-device.toml --top 5",
