@@ -131,6 +131,7 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
     (0.666666667, 0.666666667)
     """
     require("point", point, OperatingPoint)
+    point = point.modelled
     if damping is not None:
         check_number("damping", damping, "N s/m")
     loop = point.loop

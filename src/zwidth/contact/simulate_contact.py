@@ -126,6 +126,7 @@ def simulate_contact(
       501 samples, 0.5 s
     """
     require("point", point, OperatingPoint)
+    point = point.modelled
     _check_numbers(wall_position, start_position, start_velocity, duration, seed)
     parameters = parameters or {}
     if point.load is not None:

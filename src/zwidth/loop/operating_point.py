@@ -28,6 +28,7 @@ from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError, reduce_mechanism, reduce_plant
+from zwidth.model.response import Response, ResponseError, handle_obstacle
 
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.measures.felt_wall import FeltWall
-    from zwidth.model.response import Response
     from zwidth.progress import Progress
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment
@@ -181,6 +181,26 @@ class OperatingPoint(PosedDevice):
         if self.response is None:
             raise OperatingPointError("the device has a model and no measured response")
         return self.response
+
+    @cached_property
+    def modelled(self) -> OperatingPoint:
+        """A measured device with a plant fitted to its response in its place, `fit` saying how well; any other
+        device itself.
+
+        Raises  ResponseError  where no plant explains the response, or the operator's handle was not measured
+        """
+        if self.response is None:
+            return self
+        from zwidth.loop.measured.plant_fit import fit_plant
+
+        if self.operator is not None and (obstacle := handle_obstacle(self.response)):
+            raise ResponseError(obstacle)
+        T = self.controller.sampling_period
+        fit = fit_plant(self.response, T)
+        delay = self.controller.delay + fit.delay / T
+        return replace(
+            self, response=None, given_plant=fit.plant, controller=replace(self.controller, delay=delay), fit=fit
+        )
 
     @cached_property
     def held_response(self) -> Response:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, Literal, Self, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solv
 from zwidth.model.ratio_table import drives_at
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters
 from zwidth.model.response import Response
+
+if TYPE_CHECKING:
+    from zwidth.loop.measured.plant_fit import PlantFit
 
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]
@@ -69,6 +72,7 @@ class PosedDevice:
     name                the device's name in results and figures
     requested_position  position as requested, before it was projected; None: the device's reference
     load                hand's force and gravity about whose balance the device is linearised; None: none
+    fit                 how well given_plant stands for a measured response; None: it is no such plant
     missing             keys that the device file leaves out as not known, by what needs them: "dynamics",
                         "sampling"
     results             what several measures of these points share, once it is computed
@@ -93,6 +97,7 @@ class PosedDevice:
     requested_position: Position | Floats | None = None
     missing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     load: Load | None = None
+    fit: PlantFit | None = None
     results: dict[Any, Any] = field(init=False, default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:

@@ -92,11 +92,11 @@ class PoleModel:
     def sampled(self, name: str, theta: Floats, delay: float | None = None) -> Complexes:
         """Response (k,) of a path from commands at angles in (0, pi]; `delay` other than its own [samples]."""
         late = self.delay if delay is None else delay
-        return np.asarray(_atoms(self.modes, self.free, theta, late) @ self.residues[name])
+        return np.asarray(mode_atoms(self.modes, self.free, theta, late) @ self.residues[name])
 
     def continuous(self, name: str, theta: Floats) -> Complexes:
         """Response (k,) of any path at angles, of commands before hold and delay."""
-        return np.asarray(_atoms(self.modes, self.free, theta, None) @ self.residues[name])
+        return np.asarray(mode_atoms(self.modes, self.free, theta, None) @ self.residues[name])
 
     def scaled(self, ratio: float, added_delay: float) -> PoleModel:
         """The same device in sampling periods that are `ratio` times as long, its commands later by a delay [of
@@ -124,9 +124,9 @@ def fit_poles(data: PathData) -> PoleModel:
         modes, delay = _refine(data, modes, delay)
     residues, rest = {}, []
     for name, value in data.values.items():
-        atoms = _stacked(_path_atoms(data, name, modes, delay), data.deviations[name])
+        atoms = stacked(_path_atoms(data, name, modes, delay), data.deviations[name])
         scale = np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
-        own = _stacked(value, data.deviations[name])
+        own = stacked(value, data.deviations[name])
         residues[name] = np.linalg.lstsq(atoms / scale, own, rcond=1e-11)[0] / scale
         rest.append(own - atoms @ residues[name])
     misfit = float(np.sqrt(np.mean(np.concatenate(rest) ** 2)))
@@ -165,7 +165,7 @@ def _refined(data: PathData, modes: Floats, delay: float) -> tuple[float, float,
     return float(np.sqrt(np.mean(_left(data, modes, delay) ** 2))), delay, modes
 
 
-def _atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) -> Complexes:
+def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) -> Complexes:
     """Responses (k, 2 n - 1) of unit residue, and one more of the free mass.
 
     First the free mass, 1/s^2, then each mode, 1/((s - s1)(s - s2)), then these times s, less that of the first:
@@ -194,10 +194,10 @@ def _atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) -> Com
 
 
 def _path_atoms(data: PathData, name: str, modes: Floats, delay: float) -> Complexes:
-    return _atoms(modes, data.integrators == 2, data.theta, delay if name[1] == "a" else None)
+    return mode_atoms(modes, data.integrators == 2, data.theta, delay if name[1] == "a" else None)
 
 
-def _stacked(values: Complexes, deviation: Floats) -> Floats:
+def stacked(values: Complexes, deviation: Floats) -> Floats:
     """Weighted real and imaginary parts (2k, ...)."""
     weighted = values / deviation.reshape(-1, *[1] * (values.ndim - 1))
     return np.concatenate([weighted.real, weighted.imag])
@@ -209,10 +209,10 @@ def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats
     inputs = {name[1]: name for name in data.values}
     of_input = {own: _path_atoms(data, name, modes, delay) for own, name in inputs.items()}
     for name, value in data.values.items():
-        atoms = _stacked(of_input[name[1]], data.deviations[name])
+        atoms = stacked(of_input[name[1]], data.deviations[name])
         atoms = atoms / np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
         basis = np.linalg.qr(atoms)[0] if atoms.shape[1] else atoms
-        own = _stacked(value, data.deviations[name])
+        own = stacked(value, data.deviations[name])
         parts.append((basis, own - basis @ (basis.T @ own)))
     return parts
 
@@ -276,8 +276,8 @@ def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
     tried = np.array([(a, r) for a in w for r in RATIOS])
     gain = np.zeros(len(tried))
     for (basis, rest), name in zip(parts, data.values, strict=True):
-        own = _atoms(tried, False, data.theta, delay if name[1] == "a" else None)[:, : len(tried)]
-        atoms = _stacked(own, data.deviations[name])
+        own = mode_atoms(tried, False, data.theta, delay if name[1] == "a" else None)[:, : len(tried)]
+        atoms = stacked(own, data.deviations[name])
         whole = np.einsum("ij,ij->j", atoms, atoms)
         atoms -= basis @ (basis.T @ atoms)
         size = np.einsum("ij,ij->j", atoms, atoms)

@@ -1,0 +1,265 @@
+"""A plant fitted to a measured device: masses, springs and dampers in modal coordinates, and a delay.
+
+It starts from the poles of `pole_fit`, and all its numbers are fitted together, so that one actuator, one sensor and
+one handle explain all paths, with damping that takes in power only. What needs motion in time needs such a plant,
+and its answers hold as far as the plant does: the fit says how far that is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.measured.measured_port import path_data
+from zwidth.loop.measured.modal_terms import continuous_terms, sampled_free_mass, sampled_terms
+from zwidth.loop.measured.pole_fit import PATHS, PathData, PoleModel, fit_poles, mode_atoms, stacked
+from zwidth.model.plant import Plant
+from zwidth.model.response import Response, ResponseError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+POINTS: Final = 500  # frequencies to which a plant is fitted
+STEPS: Final = 40  # of the search, times its unknowns
+WORST: Final = 0.1  # relative misfit, beyond that of noise, from which no plant is given
+
+
+@dataclass(frozen=True)
+class ModalModel:
+    """squared (n,) and damping (n, n) of the modes, per sample; actuator, sensor and handle (n,); delay [samples].
+
+    free  whether the first mode is 1/s^2, which no damper couples to others
+    """
+
+    squared: Floats
+    damping: Floats
+    actuator: Floats
+    sensor: Floats
+    handle: Floats
+    delay: float
+    free: bool
+
+    def paths(self, names: Iterable[str], theta: Floats) -> dict[str, Complexes]:
+        """Responses (k,) of some of PATHS at angles theta = w T: of commands as sampled, of the handle as it is."""
+        terms: dict[str, Complexes] = {}
+        values = {}
+        for name in names:
+            sampled = name[1] == "a"
+            if name[1] not in terms:
+                poles = self._eigen[0]
+                own = sampled_terms(poles, theta, self.delay) if sampled else continuous_terms(poles, theta)
+                if self.free:
+                    mass = sampled_free_mass(theta, self.delay) if sampled else -1.0 / theta**2 + 0j
+                    own = np.concatenate([mass[:, None], own], axis=1)
+                terms[name[1]] = own
+            values[name] = np.asarray(terms[name[1]] @ self._residues(name))
+        return values
+
+    @cached_property
+    def _eigen(self) -> tuple[Complexes, Complexes, Complexes]:
+        """Poles (2n,) of the modes that do not stand apart, their shapes (n, 2n) and how forces move them (2n, n)."""
+        first = int(self.free)
+        n = len(self.squared) - first
+        A = np.zeros((2 * n, 2 * n))
+        A[:n, n:] = np.eye(n)
+        A[n:, :n], A[n:, n:] = -np.diag(self.squared[first:]), -self.damping[first:, first:]
+        poles, shapes = np.linalg.eig(A)
+        into = np.linalg.inv(shapes)[:, n:]
+        return poles.astype(complex), shapes[:n].astype(complex), into.astype(complex)
+
+    def _residues(self, name: str) -> Complexes:
+        """Residues of a path, that of 1/s^2 first where it stands apart."""
+        read = self.sensor if name[0] == "s" else self.handle
+        push = self.actuator if name[1] == "a" else self.handle
+        first = int(self.free)
+        _, shapes, into = self._eigen
+        own = (read[first:] @ shapes) * (into @ push[first:])
+        return np.append(read[0] * push[0], own) if self.free else own
+
+
+@dataclass(frozen=True)
+class PlantFit:
+    """A plant that stands for a measured device.
+
+    plant      in modal coordinates, its handle where the paths of the handle are known
+    delay      of the hardware [s]
+    misfit     root mean square of the relative deviation of the fitted from the measured response
+    largest    the largest such deviation, at `largest_at` [Hz]
+    noise      root mean square of the measurement's own relative error; 0 where it is not known
+    """
+
+    plant: Plant
+    delay: float
+    misfit: float
+    largest: float
+    largest_at: float
+    noise: float
+
+    def document(self) -> dict[str, Any]:
+        """The fit by key and unit."""
+        return {
+            "modes": self.plant.size,
+            "hardware_delay_s": self.delay,
+            "misfit": self.misfit,
+            "largest_misfit": self.largest,
+            "largest_misfit_at_Hz": self.largest_at,
+            "measurement_error": self.noise,
+        }
+
+    @property
+    def sentence(self) -> str:
+        """The fit in words."""
+        return (
+            f"by a plant of {self.plant.size} modes fitted to the response, which it misses by "
+            f"{100.0 * self.misfit:.2g} % (root mean square; {100.0 * self.largest:.2g} % at {self.largest_at:.4g} Hz)"
+        )
+
+
+def fit_plant(response: Response, period: float) -> PlantFit:
+    """The plant of a measured device.
+
+    period  sampling period T [s]
+    Raises  ResponseError  where no plant explains the response
+    """
+    handle = response.handle
+    known = handle is not None and not handle.missing
+    used = response if known else replace(response, handle=None)
+    data = path_data(used, period)
+    poles = fit_poles(data)
+    at_sensor = known and handle is not None and handle.at_sensor
+    tied = known and handle is not None and handle.actuator_at_sensor
+    model = _refined(data.thinned(POINTS), _start(data, poles, at_sensor, tied), at_sensor, tied)
+    value = model.paths(["sa"], data.theta)["sa"]
+    deviation = np.abs(value / data.values["sa"] - 1.0)
+    below = data.theta < 0.95 * np.pi  # at half the rate a free mass answers with next to nothing
+    noise = float(np.sqrt(np.mean(2.0 * (data.deviations["sa"] / np.abs(data.values["sa"]))[below] ** 2)))
+    noise = noise if response.coherence is not None or response.sweeps is not None else 0.0
+    misfit, worst = float(np.sqrt(np.mean(deviation[below] ** 2))), int(np.argmax(np.where(below, deviation, 0.0)))
+    frequency = data.theta[worst] / (2.0 * np.pi * period)
+    if not misfit**2 - noise**2 < WORST**2:
+        raise ResponseError(
+            f"is not explained by masses, springs, dampers and a delay: the best plant misses it by "
+            f"{100.0 * misfit:.3g} %, most at {frequency:.4g} Hz; measure more closely there, or describe the device "
+            "as a [plant]"
+        )
+    n = len(model.squared)
+    plant = Plant(
+        mass=np.eye(n),
+        damping=model.damping / period,
+        stiffness=np.diag(model.squared) / period**2,
+        actuator=model.actuator / period,
+        sensor=model.sensor / period,
+        handle=model.handle / period if known else None,
+        names=tuple(f"mode {i}" for i in range(n)),
+    )
+    return PlantFit(plant, model.delay * period, misfit, float(deviation[worst]), float(frequency), noise)
+
+
+def _start(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) -> ModalModel:
+    """The model of these poles, with residues of the paths by least squares and dampers that couple no modes."""
+    poles, delay, residues = found.modes, found.delay, {}
+    for name, value in data.values.items():
+        own_atoms = mode_atoms(poles, found.free, data.theta, delay if name[1] == "a" else None)
+        atoms = stacked(own_atoms[:, : len(poles) + found.free], data.deviations[name])
+        scale = np.maximum(np.linalg.norm(atoms, axis=0), 1e-300)
+        own = stacked(value, data.deviations[name])
+        residues[name] = np.linalg.lstsq(atoms / scale, own, rcond=1e-11)[0] / scale
+    free = data.integrators == 2
+    n = len(poles) + free
+    squared, damping = np.zeros(n), np.zeros((n, n))
+    for i, (w, ratio) in enumerate(poles, start=int(free)):
+        squared[i] = w**2
+        damping[i, i] = 2.0 * w * ratio if w > 0.0 else ratio
+    return ModalModel(squared, damping, *_shapes(residues, at_sensor, tied), delay, free)
+
+
+def _shapes(
+    residues: Mapping[str, Floats], at_sensor: bool, tied: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Actuator, sensor and handle (n,) of modes that explain the residues of all paths about as well."""
+    sa, sh, ha, hh = (residues.get(name) for name in PATHS)
+    assert sa is not None
+
+    def root(own: Floats) -> Floats:
+        size = np.abs(own)
+        return np.asarray(np.sqrt(np.maximum(size, 1e-12 * np.max(size) + 1e-300)))
+
+    if tied:
+        s = a = root(sa)
+        h = s if at_sensor or sh is None else sh / s
+    elif at_sensor and sh is not None:
+        s = h = root(sh)
+        a = sa / s
+    elif hh is not None and sh is not None:
+        h = root(hh)
+        s = sh / h
+        a = (sa if ha is None else ha) / h
+    else:
+        a = root(sa)
+        s, h = sa / a, np.zeros(len(sa))
+    return a, s, h
+
+
+def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> ModalModel:
+    """All numbers of the model by least squares."""
+    from scipy.optimize import least_squares
+
+    n, first = len(start.squared), int(start.free)
+    m = n - first
+    rows, columns = np.tril_indices(m)
+    tied = start.squared[first:] == 0.0
+    has_handle = "sh" in data.values and not at_sensor
+
+    def unpack(x: Floats) -> ModalModel:
+        squared = np.zeros(n)
+        squared[first:] = np.where(tied, 0.0, np.exp(np.clip(2.0 * x[:m], -200.0, 20.0)))
+        factor = np.zeros((m, m))
+        factor[rows, columns] = x[m : m + len(rows)]
+        damping = np.zeros((n, n))
+        damping[first:, first:] = factor @ factor.T
+        at = m + len(rows)
+        s = x[at : at + n]
+        at += n
+        a = s
+        if not tied_ends:
+            a, at = x[at : at + n], at + n
+        h = s
+        if not at_sensor:
+            h = start.handle
+            if has_handle:
+                h, at = x[at : at + n], at + n
+        delay = start.delay if data.delay is not None else max(float(x[at]), 0.0)
+        return ModalModel(squared, damping, a, s, h, delay, start.free)
+
+    def residual(x: Floats) -> Floats:
+        return np.nan_to_num(_model_residual(data, unpack(x)), nan=1e6, posinf=1e6, neginf=-1e6)
+
+    diagonal = np.diag(np.sqrt(np.maximum(np.diag(start.damping)[first:], 1e-12)))
+    x0 = [0.5 * np.log(np.where(tied, 1.0, start.squared[first:])), diagonal[rows, columns], start.sensor]
+    if not tied_ends:
+        x0.append(start.actuator)
+    if has_handle:
+        x0.append(start.handle)
+    if data.delay is None:
+        x0.append(np.array([start.delay]))
+    x = np.concatenate(x0)
+    scale = np.maximum(np.abs(x), 1e-3 * np.max(np.abs(x)))
+    if len(x) > 2 * len(data.theta) * len(data.values):
+        return start
+    found = least_squares(
+        residual, x, x_scale=scale, method="lm", max_nfev=STEPS * len(x), ftol=1e-8, xtol=1e-10, gtol=1e-15
+    )
+    return unpack(found.x)
+
+
+def _model_residual(data: PathData, model: ModalModel) -> Floats:
+    """Weighted deviations of all paths, in a row."""
+    responses = model.paths(data.values, data.theta)
+    return np.concatenate(
+        [stacked(responses[name] - value, data.deviations[name]) for name, value in data.values.items()]
+    )
