@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from zwidth.contact.mechanism.walls import SurfaceRendering
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
-    from zwidth.guarantees.loop_guarantees import Guarantees
+    from zwidth.guarantees.guarantees import Guarantees
     from zwidth.identify.identification import Identification
     from zwidth.loop.loop import Loop
     from zwidth.loop.multi_loop import MultiLoop
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
-    from zwidth.measures.felt_wall import FeltWall
+    from zwidth.measures.felt import FeltWall
     from zwidth.model.load import Load
     from zwidth.model.plant import Plant
     from zwidth.model.posture import Posture

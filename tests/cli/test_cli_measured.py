@@ -231,11 +231,6 @@ def test_the_band_of_two_equal_sweeps_holds_the_largest_stiffness(tmp_path):
 @pytest.mark.parametrize(
     ("command", "key"),
     [
-        (("felt", "--stiffness", 1, "--damping", 1), "static_stiffness_N_per_m"),
-        (("sensitivity",), "sensitivities"),
-        (("guarantees",), "guarantees"),
-        (("bounds",), "bounds"),
-        (("robust",), "stiffness_max_N_per_m"),
         (("show",), "link_side_mass_kg"),
         (("report",), "file"),
     ],
@@ -252,3 +247,43 @@ def test_a_sweep_whose_time_falls_is_told_so(tmp_path):
     (tmp_path / "back.csv").write_text("\n".join(["time_s,force_command_N,position_m", *lines]) + "\n")
     (tmp_path / "device.toml").write_text(DEVICE.format('file = "back.csv"'))
     assert "the time falls" in refusal_lines("chart", tmp_path / "device.toml")[0]
+
+
+def test_a_response_has_no_numbers_to_vary_for_a_robust_chart(device):
+    ran = run_command("robust", device, "--json")
+    assert (ran.code, ran.document["stiffness_max_N_per_m"]) == (1, None)
+    assert "attach one operator after the other" in ran.document["reason"]
+
+
+@pytest.mark.parametrize("command", [("felt", "--stiffness", 1, "--damping", 1), ("guarantees",)])
+def test_what_needs_the_handle_says_which_paths_are_missing(device, command):
+    (line,) = refusal_lines(command[0], device, *command[1:])
+    assert "has no path from the handle's force to the encoder, from the command to the handle" in line
+    assert 'state handle_at = "sensor"' in line
+
+
+def test_a_contact_is_simulated_by_a_fitted_plant_that_says_its_error(device):
+    wall = ("--stiffness", 800, "--damping", 2.5)
+    simulated = document_of("simulate", device, *wall)
+    assert simulated["stable"] is True
+    fit = simulated["fit"]
+    assert fit["misfit"] < 1e-6
+    assert fit["stiffness_max_N_per_m"] == pytest.approx(fit["stiffness_max_of_response_N_per_m"], rel=1e-4)
+    out = run_command("simulate", device, *wall).out
+    assert "by a plant of" in out
+    assert "modes fitted to the response" in out
+
+
+def test_bounds_are_those_of_the_fitted_plant(device):
+    document = document_of("bounds", device)
+    assert document["exact_largest_N_per_m"] == pytest.approx(document["fit"]["stiffness_max_N_per_m"], rel=1e-9)
+    assert len(document["bounds"]) > 10
+
+
+def test_an_operator_holds_a_response_whose_places_are_stated(tmp_path, device):
+    text = device.read_text().replace("[response]", '[response]\nhandle_at = "sensor"\nactuator_at = "sensor"')
+    (tmp_path / "held.toml").write_text(text)
+    free = document_of("chart", tmp_path / "held.toml")
+    held = document_of("chart", tmp_path / "held.toml", "--operator", "course-hand")
+    assert held["stiffness_max_N_per_m"] != pytest.approx(free["stiffness_max_N_per_m"], rel=1e-3)
+    assert "held by the operator" in held["measurement"]

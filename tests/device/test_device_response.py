@@ -173,3 +173,70 @@ def test_what_the_response_holds_already_is_refused(write, spectrum):
     assert "operator: cannot be attached to this [response]: it has no path" in line
     path.write_text(text + "[loop.actuator]\ntime_constant_s = 0.001\n")
     assert any("loop.actuator: is part of a measured [response] already" in line for line in faults(path))
+
+
+# --- the paths of the handle ----------------------------------------------------------------------------
+
+PAIR = "handle_force_to_encoder_real_m_per_N,handle_force_to_encoder_imag_m_per_N"
+
+
+def test_the_paths_of_the_handle_stand_in_the_same_file_or_beside_it(write, spectrum, tmp_path):
+    head, *lines = spectrum
+    same = load(
+        write([f"{head},{PAIR}", *(f"{line},1e-3,-2e-3" for line in lines)], 'file = "sweep.csv"')
+    ).response
+    assert set(same.handle.force_to_encoder.value) == {1e-3 - 2e-3j}
+    assert same.handle.missing == ("from the command to the handle", "from the handle's force to the handle")
+    first = [line.split(",")[0] for line in lines]
+    write([f"frequency_Hz,{PAIR}", *(f"{f},1e-3,-2e-3" for f in first)], name="hand.csv")
+    keys = 'file = "sweep.csv"\nhandle_file = "hand.csv"\nhandle_at = "sensor"\nhardware_delay_samples = 0.4'
+    beside = load(write(spectrum, keys)).response
+    assert set(beside.handle.force_to_encoder.value) == {1e-3 - 2e-3j}
+    assert (beside.handle.missing, beside.delay) == ((), 0.4)
+
+
+def test_half_a_path_and_a_path_given_twice_are_refused(write, spectrum):
+    head, *lines = spectrum
+    path = write([f"{head},{PAIR.split(',')[0]}", *(f"{line},1e-3" for line in lines)])
+    (line,) = faults(path)
+    assert "handle_force_to_encoder_imag_m_per_N is missing" in line
+    first = [line.split(",")[0] for line in lines]
+    write([f"frequency_Hz,{PAIR}", *(f"{f},1e-3,-2e-3" for f in first)], name="hand.csv")
+    keys = 'file = "sweep.csv"\nhandle_file = "hand.csv"'
+    (line,) = faults(write([f"{head},{PAIR}", *(f"{line},1e-3,-2e-3" for line in lines)], keys))
+    assert "is in sweep.csv, too; keep one of them" in line
+    write(["frequency_Hz,other", "1,2"], name="hand.csv")
+    (line,) = faults(write(spectrum, keys))
+    assert "has no path from the handle's force" in line
+    write([f"frequency_Hz,{PAIR}", *(f"{float(f) + 0.5},1e-3,-2e-3" for f in first[:-1])], name="hand.csv")
+    (line,) = faults(write(spectrum, keys))
+    assert "has other frequencies than sweep.csv" in line
+
+
+def test_two_raw_experiments_make_the_paths(write):
+    loop = Loop(systems.published().plant, Controller(T))
+    force = np.random.default_rng(5).normal(size=4000)
+    reading = encoder_readings(loop, force)
+    time = T * np.arange(4000)
+    record = [
+        RECORD + ",handle_position_m,handle_force_N",
+        *rows(time, force, reading, 2.0 * reading, 0.0 * force),
+    ]
+    hand = ["time_s,handle_force_N,position_m,force_command_N", *rows(time, force, reading, 0.0 * force)]
+    write(hand, name="hand.csv")
+    keys = 'file = "sweep.csv"\nhandle_file = "hand.csv"\nintegrators = 2'
+    response = load(write(record, keys)).response
+    assert response.handle.command_to_handle.value == pytest.approx(2.0 * response.value)
+    assert response.handle.force_to_encoder.value == pytest.approx(response.value)
+    assert response.handle.force_to_handle is None
+    write(
+        ["time_s,handle_force_N,position_m,force_command_N", *rows(time, force, reading, force)], name="hand.csv"
+    )
+    (line,) = faults(write(record, keys))
+    assert "force_command_N: varies by" in line
+    assert "keep it constant" in line
+
+
+def test_a_handle_file_must_lie_beside_the_device_file(write, spectrum):
+    (line,) = faults(write(spectrum, 'file = "sweep.csv"\nhandle_file = "../hand.csv"'))
+    assert "response.handle_file: must lie in the folder of the device file" in line

@@ -22,7 +22,9 @@ GROUNDED = replace(PLANT, damping=PLANT.damping + np.diag([1.0, 0.5]))
 
 
 @pytest.mark.parametrize(
-    ("plant", "kind"), [(Plant.one_mass(0.05, 1.0), COLLOCATED), (GROUNDED, RECIPROCAL)], ids=["mass", "two masses"]
+    ("plant", "kind"),
+    [(Plant.one_mass(0.05, 1.0), COLLOCATED), (GROUNDED, RECIPROCAL)],
+    ids=["mass", "two masses"],
 )
 def test_passive_walls_are_those_of_the_plant(plant, kind):
     response = measured_device(plant, T, 0.4, kind, frequencies(T, 500, 3e-4))

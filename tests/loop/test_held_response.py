@@ -106,7 +106,9 @@ def test_without_paths_of_the_handle_it_is_said_which_are_missing():
     with pytest.raises(ResponseError, match="no path from the handle's force to the encoder, from the command to"):
         held_response(bare, HAND, T)
     half = replace(bare, handle=MeasuredHandle(actuator_at_sensor=True))
-    with pytest.raises(ResponseError, match="to the encoder and from the handle's force to the handle; measure them"):
+    with pytest.raises(
+        ResponseError, match="to the encoder and from the handle's force to the handle; measure them"
+    ):
         held_response(half, HAND, T)
 
 

@@ -64,9 +64,7 @@ def test_sensitivities_are_those_of_the_plant(pair):
     assert own[delay].derivative == pytest.approx(exact[delay].derivative, rel=2e-3)
     assert "0 has no logarithm" in own[delay].reason
     # the device's own delay stays in seconds, the plant's in samples
-    assert own[period].logarithmic == pytest.approx(
-        exact[period].logarithmic - exact[delay].logarithmic, rel=2e-3
-    )
+    assert own[period].logarithmic == pytest.approx(exact[period].logarithmic - exact[delay].logarithmic, rel=2e-3)
     assert "whole number" in own["loop.velocity.filter.order"].reason
     assert "a [plant] or [mechanism] has them" in measured.left_out["[response]"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -76,7 +76,7 @@ def read_response(section: ResponseSection, label: str, period: float) -> Respon
         paths |= more
     at_sensor, actuator = section.handle_at == "sensor", section.actuator_at == "sensor"
     if at_sensor or actuator or paths:
-        handle = MeasuredHandle(**paths, at_sensor=at_sensor, actuator_at_sensor=actuator)
+        handle = _handle(paths, at_sensor=at_sensor, actuator_at_sensor=actuator)
         response = replace(response, handle=handle)
     return replace(response, delay=section.hardware_delay_samples)
 
@@ -85,6 +85,14 @@ def _check_frequencies(path: Path, frequency: Floats, first: Floats, name: str) 
     """Raise DeviceError for other frequencies than those of the first file, of this name."""
     if len(frequency) != len(first) or np.any(np.abs(frequency - first) > 1e-6 * first):
         raise fail(str(path), "", f"has other frequencies than {name}; sweeps must share them")
+
+
+def _handle(
+    paths: Mapping[str, MeasuredPath], *, at_sensor: bool = False, actuator_at_sensor: bool = False
+) -> MeasuredHandle:
+    """The handle of measured paths by field."""
+    into, out, own = (paths.get(name) for name in HANDLE_PATHS)
+    return MeasuredHandle(into, out, own, at_sensor, actuator_at_sensor)
 
 
 def _paths_of(handle: MeasuredHandle) -> dict[str, MeasuredPath]:
@@ -103,7 +111,7 @@ def _mean(responses: Sequence[Response]) -> Response:
         every = [_paths_of(response.handle) for response in responses if response.handle is not None]
         shared = [name for name in HANDLE_PATHS if all(name in paths for paths in every)]
         if len(every) == len(responses):
-            handle = MeasuredHandle(**{name: _mean_path([paths[name] for paths in every]) for name in shared})
+            handle = _handle({name: _mean_path([paths[name] for paths in every]) for name in shared})
     return replace(
         first, value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps, note=note, handle=handle
     )
@@ -160,9 +168,7 @@ def _sweep_numbers(table: Table) -> list[float]:
 def _check_sweep(path: Path, n: float, frequency: Floats, first: Floats) -> None:
     """Raise DeviceError for other frequencies than those of the first sweep."""
     if len(frequency) != len(first) or np.any(frequency != first):
-        raise fail(
-            str(path), "sweep", f"sweep {n:g} has other frequencies than the first; sweeps must share them"
-        )
+        raise fail(str(path), "sweep", f"sweep {n:g} has other frequencies than the first; sweeps must share them")
 
 
 def _responses(path: Path, section: ResponseSection, period: float) -> Iterator[Response]:
@@ -197,7 +203,7 @@ def _spectrum(path: Path, table: Table, section: ResponseSection, period: float)
         section.integrators,
         table.get("coherence"),
         section.averages or 1.0,
-        handle=MeasuredHandle(**paths) if paths else None,
+        handle=_handle(paths) if paths else None,
     )
 
 
@@ -245,9 +251,7 @@ def _response_of_record(path: Path, table: Table, section: ResponseSection, peri
     if "handle_position_m" not in table:
         return response
     held = _record_response(path, force, table["handle_position_m"], section, period)
-    return replace(
-        response, handle=MeasuredHandle(command_to_handle=MeasuredPath(held.value, held.coherence))
-    )
+    return replace(response, handle=MeasuredHandle(command_to_handle=MeasuredPath(held.value, held.coherence)))
 
 
 def _record_response(
@@ -346,6 +350,7 @@ def _columns(path: Path, header: list[str], of_handle: bool) -> list[str]:
     """The columns to read: those of a response or those of a raw sweep."""
     if not header:
         raise fail(str(path), "", f"is empty; its first line must name columns, such as {', '.join(SPECTRUM)}")
+    wanted: tuple[str, ...]
     if "time_s" in header:
         wanted, other = (HANDLE_RECORD, RECORD) if of_handle else (RECORD, HANDLE_RECORD)
         more: tuple[str, ...] = ("handle_position_m", other[1])

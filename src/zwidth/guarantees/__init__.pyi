@@ -1,5 +1,5 @@
 from .coupling import couplings as couplings
-from .loop_guarantees import Guarantees as Guarantees
+from .guarantees import Guarantees as Guarantees
 from .loop_guarantees import find_guarantees as find_guarantees
 from .passive import passive_region as passive_region
 from .region import Region as Region

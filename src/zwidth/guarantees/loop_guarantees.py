@@ -3,94 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, Self
 
 import numpy as np
 
-from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.measured.chart import MeasuredChart
-from zwidth.chart.measured.loop import MeasuredLoop
-from zwidth.guarantees.coupling import Couplings, couplings, no_couplings
+from zwidth.guarantees.coupling import couplings, no_couplings
+from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
 from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats, without_idle_motions
-from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffest_corner, stiffness_text
+from zwidth.guarantees.region import Region, empty_region, stiffest_corner
 from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
 from zwidth.loop.fixed_feedback import acts, describe_feedback
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require, wrong_type
 from zwidth.progress import Progress
-from zwidth.result import Result
 
-COLGATE = (
-    "Colgate and Schenkel 1997, read in Weir and Colgate's chapter of 2008; here for any device by alias disks"
-)
 SPRINGS = "spring stability after Colgate and Schenkel 1997, known at second hand (thesis 1.1.3)"
-EXACT = "exact chart (D-decomposition)"
 NO_HANDLE = "the plant has no handle at which an operator could hold it; give plant.handle"
-NO_STABLE = "no stable wall has K > 0 and B >= 0"
-
-
-@dataclass(frozen=True)
-class Guarantee:
-    """One guarantee: its short name, what it promises, its walls, and where the condition comes from."""
-
-    name: str
-    meaning: str
-    region: Region
-    source: str
-
-
-@dataclass(frozen=True)
-class Guarantees(Result):
-    """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all.
-
-    couplings  virtual couplings through which walls are stable with every passive operator; None: not computed
-    """
-
-    loop: Loop | MeasuredLoop
-    guarantees: tuple[Guarantee, ...]
-    chart: StabilityChart | MeasuredChart
-    couplings: Couplings | None = None
-
-    def __getitem__(self, name: str) -> Guarantee:
-        """The guarantee of that name. Raises KeyError."""
-        for guarantee in self.guarantees:
-            if guarantee.name == name:
-                return guarantee
-        raise KeyError(name)
-
-    def about(self, point: OperatingPoint) -> Self:
-        """Remember the operating point, for the regions, too, which can be drawn alone; returns the result."""
-        for one in self.guarantees:
-            one.region.about(point)
-        return super().about(point)
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no wall with K > 0 and B >= 0 has any of the guarantees."""
-        return all(guarantee.region.reason is not None for guarantee in self.guarantees)
-
-    def document(self) -> dict[str, Any]:
-        """The guarantees by key and unit, and the couplings if they were computed."""
-        entries = [
-            {"name": one.name, "meaning": one.meaning} | one.region.document() | {"source": one.source}
-            for one in self.guarantees
-        ]
-        coupling = {} if self.couplings is None else {"coupling": self.couplings.document()}
-        return {"guarantees": entries} | coupling
-
-    def table(self) -> dict[str, list[Any]]:
-        """The outlines as columns, region after region."""
-        return outline_columns({guarantee.name: guarantee.region for guarantee in self.guarantees}, "guarantee")
-
-    def __repr__(self) -> str:
-        stiffest = ", ".join(f"{one.name} {stiffness_text(one.region)}" for one in self.guarantees)
-        coupled = [] if self.couplings is None else repr(self.couplings).splitlines()
-        return "\n  ".join([f"Guarantees: {stiffest}", *coupled])
 
 
 def find_guarantees(
@@ -186,7 +119,9 @@ def guarantees_of(
         found = measured_guarantees(point)
         if not coupling and wall is None:
             return found
-        return replace(found, couplings=no_couplings("no coupling is known of a measured response; give a [plant]"))
+        return replace(
+            found, couplings=no_couplings("no coupling is known of a measured response; give a [plant]")
+        )
     loop = point.without_operator.loop
     guarantees = find_guarantees(loop, progress=progress)
     if not coupling and wall is None:

@@ -5,9 +5,9 @@ At each measured frequency the sampled response with any passive operator fills 
     centre  P - sum_k q_k,    radius  sum_k |q_k|,    q = G_eh W G_ha jw/(2 Re(jw G_hh))
 
 q_0 is made of the data, the q_k of the frequencies that look alike of the fitted modes. The wall is passive where
-it keeps clear of the disk at every measured frequency (see `gauge`); between them nothing is computed. Re(jw G_hh),
-the power that the handle takes in, is small against jw G_hh itself: where the measurement's error hides it, nothing
-is promised.
+it keeps clear of the disk at every measured frequency (see `gauge`); between them nothing is computed. The power
+that the handle takes in, Re(jw G_hh), is small against jw G_hh itself: where the measurement's error hides it,
+nothing is promised.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.loop import MeasuredLoop
-from zwidth.guarantees.loop_guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
+from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
 from zwidth.guarantees.region import Region, empty_region
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
@@ -127,17 +127,20 @@ def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
     lost = inner & disks.hidden
     if np.any(lost):
         at = np.flatnonzero(lost)
+        stretch = f"{frequency[at[0]]:.4g} to {frequency[at[-1]]:.4g} Hz"
         return empty_region(
-            f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, {frequency[at[0]]:.4g} to "
-            f"{frequency[at[-1]]:.4g} Hz, its error is larger than the power that the handle takes in; measure "
-            "longer or with more force there, or state hardware_delay_samples"
+            f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, {stretch}, "
+            "its error is larger than the power that the handle takes in; measure longer or with more force there, "
+            "or state hardware_delay_samples"
         )
     if not np.all(np.isfinite(disks.radius[inner])):
         return empty_region(
             "this is not known: the fitted modes, which continue the device beyond half the sampling rate, do not "
             "all take in power there"
         )
-    kept = MeasuredDisks(*(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power", "hidden")))
+    kept = MeasuredDisks(
+        *(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power", "hidden"))
+    )
     speed, T = loop.w(kept.angles), port.period
 
     def ends(directions: Floats) -> tuple[Floats, Floats]:

@@ -42,11 +42,11 @@ if TYPE_CHECKING:
     from zwidth.contact.mechanism.motion import MechanismMotion
     from zwidth.contact.mechanism.surfaces import Surface
     from zwidth.contact.mechanism.walls import SurfaceRendering
-    from zwidth.guarantees.loop_guarantees import Guarantees
+    from zwidth.guarantees.guarantees import Guarantees
     from zwidth.loop.measured.measured_port import MeasuredPort
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
-    from zwidth.measures.felt_wall import FeltWall
+    from zwidth.measures.felt import FeltWall
     from zwidth.progress import Progress
     from zwidth.study.experiment_plan import Plan
     from zwidth.study.measured_boundary import Experiment

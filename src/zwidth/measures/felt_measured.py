@@ -21,7 +21,7 @@ from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.measured.measured_port import MeasuredPort
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.felt_wall import FeltWall
+from zwidth.measures.felt import FeltWall
 from zwidth.measures.handle_impedance import commanded_impedance
 
 Floats = NDArray[np.float64]
@@ -78,9 +78,13 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
         free_motion_mass=np.nan if spring else at_rest(0.0 * force)[1],
         stiffness_max=peak if np.isfinite(peak) else None,
         static_stiffness_at_stiffness_max=felt_at_rest(peak) if np.isfinite(peak) else None,
-        static_stiffness_limit=np.inf if rigid else felt_at_rest(UNYIELDING * float(np.max(np.abs(1.0 / paths["P"])))),
+        static_stiffness_limit=np.inf
+        if rigid
+        else felt_at_rest(UNYIELDING * float(np.max(np.abs(1.0 / paths["P"])))),
         frequency=frequency,
-        felt_impedance=1.0 / (jw * _handle_motion(paths, force * (stiffness + damping * speed))) if stable else None,
+        felt_impedance=1.0 / (jw * _handle_motion(paths, force * (stiffness + damping * speed)))
+        if stable
+        else None,
         commanded_impedance=commanded_impedance(stiffness, damping, frequency),
         free_motion_impedance=free,
     )

@@ -103,7 +103,7 @@ def handle_obstacle(response: Response) -> str:
         return ""
     paths = ", ".join(missing[:-1]) + " and " * (len(missing) > 1) + missing[-1]
     return (
-        f"has no path {paths}; measure {'it' if len(missing) == 1 else 'them'}, or state handle_at = \"sensor\" "
+        f'has no path {paths}; measure {"it" if len(missing) == 1 else "them"}, or state handle_at = "sensor" '
         'where the hand holds what the encoder reads, and actuator_at = "sensor" where the command acts there'
     )
 

@@ -9,11 +9,9 @@ The stiffest wall is not searched again for each number: to first order it moves
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from math import isfinite, isnan, nan
+from math import isnan, nan
 from typing import Any, Final
 
 import numpy as np
@@ -24,13 +22,14 @@ from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import device_of_point
-from zwidth.device.schema import device_file as schema
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 from zwidth.study.changed_devices import Change, ChangedDevices
 from zwidth.study.derivative import Derivative, central_derivative, one_sided_derivative
 from zwidth.study.optimum import OptimumError, optimum, second_peak_stiffness
+from zwidth.study.sensitivity_measured import measured_sensitivities
+from zwidth.study.sensitivity_numbers import number_obstacle, number_unit
 from zwidth.study.sensitivity_result import Group, Sensitivities, Sensitivity
 
 # Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
@@ -68,8 +67,6 @@ def sensitivities(
     operating_point = point or device.at()
     device = device_of_point(device, operating_point)
     if operating_point.response is not None:
-        from zwidth.study.sensitivity_measured import measured_sensitivities
-
         return measured_sensitivities(device, operating_point, progress)
     loop = operating_point.loop
     peak = largest_stiffness(loop)
@@ -125,7 +122,7 @@ class _StiffnessDerivatives:
 
     def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
         """The sensitivity to one number; of a number that cannot be varied, with the reason."""
-        unit, reason = _unit(steps), _obstacle(steps, value)
+        unit, reason = number_unit(steps), number_obstacle(steps, value)
         slope, side = Derivative(nan, nan), ""
         if not reason:
             slope, side, reason = self._slope(path)
@@ -187,7 +184,7 @@ class _StiffnessDerivatives:
 def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]]) -> Iterator[tuple[str, Change]]:
     """Each number that can be varied, by its path; and the matrices and vectors of a plant, scaled as wholes."""
     for path, steps, value in varied:
-        if not _obstacle(steps, value):
+        if not number_obstacle(steps, value):
             yield path, Change(tuple(_places(document, steps, 1.0)), value, abs(value) or _scale(document, steps))
     known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
     for name, paths in _groups(document).items():
@@ -201,14 +198,6 @@ def _places(document: dict[str, Any], steps: KeyPath, multiple: float) -> Iterat
     yield steps, multiple
     if _is_matrix(document, steps) and steps[-1] != steps[-2]:
         yield (*steps[:-2], steps[-1], steps[-2]), multiple
-
-
-def _obstacle(steps: KeyPath, value: float) -> str:
-    """Why a number has no derivative whatever the device; "" if it may have one."""
-    if not isfinite(value):
-        return "it is infinite, and one per cent of it is no change"
-    whole = any(subschema.get("type") == "integer" for subschema in schema.subschemas(steps))
-    return "it is a whole number, which has no derivative" if whole else ""
 
 
 def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
@@ -244,24 +233,16 @@ def _is_matrix(document: dict[str, Any], steps: KeyPath) -> bool:
     return len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int)
 
 
-@cache
-def _unit(steps: KeyPath) -> str:
-    """The unit that the schema states for the number, or for the list that it stands in."""
-    while steps:
-        if match := re.search(r" \[([^\]]*)\]$", schema.key_description(steps)):
-            return match[1]
-        if isinstance(steps[-1], str):
-            return ""
-        steps = steps[:-1]
-    return ""
-
-
 def _scale(document: dict[str, Any], steps: KeyPath) -> float:
     """Step scale of a number that is 0: the largest number of its list, else of its unit in the file, else 1."""
     if steps[-1] == "delay_samples":
         return 1.0
     beside = [abs(v) for path, v in address.numbers(document) if _key(path) == _key(steps) and path[0] == steps[0]]
-    alike = [abs(v) for path, v in address.numbers(document) if _unit(path) == _unit(steps) and np.isfinite(v)]
+    alike = [
+        abs(v)
+        for path, v in address.numbers(document)
+        if number_unit(path) == number_unit(steps) and np.isfinite(v)
+    ]
     return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
 
 

@@ -1,8 +1,9 @@
 """Sensitivities of a measured device: to delay, sampling period, filters and the operator's numbers.
 
-What a number of the computer alone changes needs nothing beyond the response. A later command, and another sampling
-period, are held anew (`loop.measured.measured_port.changed_port`): there the device's fitted modes stand for what
-half the sampling rate hides. Masses, springs and dampers of the device itself are in the response as a whole.
+What a number of the computer alone changes needs nothing beyond the response. A later command, and another
+sampling period, are held anew (`loop.measured.measured_port.changed_port`): there the device's fitted modes stand
+for what half the sampling rate hides. Masses, springs and dampers of the device itself are in the response as a
+whole.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.operator import Operator
 from zwidth.model.response import Response
 from zwidth.progress import Progress
+from zwidth.study.sensitivity_numbers import number_obstacle, number_unit
 from zwidth.study.sensitivity_result import Sensitivities, Sensitivity
 
 STEP: Final = 4e-3  # relative, of the differences; of a delay of 0 in samples
@@ -72,7 +74,7 @@ def measured_sensitivities(
 
 
 def _numbers(device: Device) -> Iterator[tuple[tuple[Any, ...], float]]:
-    """Steps and value of the numbers of the computer and the operator; the delay also where the file gives none."""
+    """Steps and value of the numbers of the computer and the operator; the delay also where none is given."""
     given = False
     for steps, value in address.numbers(device.document):
         if steps[0] in ("loop", "operator") and steps[1] not in ("encoder", "saturation"):
@@ -92,10 +94,8 @@ def _sensitivity(
     largest: float,
 ) -> Sensitivity:
     """The sensitivity to one number; with the reason where there is none."""
-    from zwidth.study.sensitivity import _obstacle, _unit
-
-    path, unit = dotted(steps, device.document), _unit(steps)
-    if steps not in DELAYS and (reason := _obstacle(steps, value)):
+    path, unit = dotted(steps, device.document), number_unit(steps)
+    if steps not in DELAYS and (reason := number_obstacle(steps, value)):
         return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
     T = port.period
     scale = abs(value) if value and steps not in DELAYS else (T if steps == DELAYS[1] else 1.0)
@@ -103,7 +103,10 @@ def _sensitivity(
     def stiffness(change: float) -> float:
         controller, changed, holder = device.controller, port, operator
         if steps == PERIOD:
-            controller, changed = replace(controller, sampling_period=T + change), changed_port(port, 0.0, T + change)
+            controller, changed = (
+                replace(controller, sampling_period=T + change),
+                changed_port(port, 0.0, T + change),
+            )
         elif steps in DELAYS:
             changed = changed_port(port, change / (T if steps == DELAYS[1] else 1.0))
         else:
@@ -111,7 +114,7 @@ def _sensitivity(
         return _largest(response, changed, controller, holder)
 
     step = STEP * scale
-    lowest = steps in DELAYS and port.model.delay < STEP or value == 0.0 and steps not in DELAYS
+    lowest = (steps in DELAYS and port.model.delay < STEP) or (value == 0.0 and steps not in DELAYS)
     here, above = largest, stiffness(step)
     if lowest:
         wide, narrow = (above - here) / (step * largest), (stiffness(0.5 * step) - here) / (0.5 * step * largest)
@@ -121,7 +124,9 @@ def _sensitivity(
         slope, bend = (above - below) / (2.0 * step * largest), abs(above - 2.0 * here + below) / (step * largest)
         error = STEP * bend
     if not bend * scale < ABRUPT * (1.0 + abs(slope) * scale):
-        return Sensitivity(path, value, unit, nan, nan, nan, "", "it changes too abruptly here to have a derivative")
+        return Sensitivity(
+            path, value, unit, nan, nan, nan, "", "it changes too abruptly here to have a derivative"
+        )
     side = "above" if lowest else "both"
     if value == 0.0:
         return Sensitivity(path, value, unit, nan, slope * largest, error * largest, side, ZERO)

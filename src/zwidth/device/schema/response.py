@@ -12,8 +12,9 @@ class ResponseSection(Section):
 
     file: Text | None = documented_key(
         "CSV beside this file: frequency_Hz, real_m_per_N, imag_m_per_N and perhaps coherence and sweep; or a raw "
-        "sweep, time_s, force_command_N, position_m and perhaps handle_position_m; the paths of the handle as "
-        "handle_force_to_encoder_real_m_per_N and _imag_m_per_N, command_to_handle_..., handle_force_to_handle_...",
+        "sweep, time_s, force_command_N, position_m and perhaps handle_position_m; the paths of the handle "
+        "as handle_force_to_encoder_real_m_per_N and _imag_m_per_N, command_to_handle_..., "
+        "handle_force_to_handle_...",
         default=None,
     )
     files: tuple[Text, ...] | None = documented_key(
@@ -32,13 +33,14 @@ class ResponseSection(Section):
         default=None,
     )
     handle_file: Text | None = documented_key(
-        "CSV of a second experiment, in which the handle is pushed and the command rests: the columns of the paths "
-        "from the handle's force at the same frequencies; or a raw sweep, time_s, handle_force_N, position_m and "
-        "perhaps handle_position_m",
+        "CSV of a second experiment, in which the handle is pushed and the command rests: the columns of the "
+        "paths from the handle's force at the same frequencies; or a raw sweep, time_s, handle_force_N, "
+        "position_m and perhaps handle_position_m",
         default=None,
     )
     handle_at: Literal["sensor"] | None = documented_key(
-        '"sensor": the hand holds what the encoder reads, so that handle_force_to_handle and command_to_handle follow',
+        '"sensor": the hand holds what the encoder reads, so that handle_force_to_handle and command_to_handle '
+        "follow",
         default=None,
     )
     actuator_at: Literal["sensor"] | None = documented_key(
@@ -47,5 +49,8 @@ class ResponseSection(Section):
         default=None,
     )
     hardware_delay_samples: Number | None = documented_key(
-        "delay of the hardware, which the response holds; omitted: fitted where it is needed", "1", ge=0, default=None
+        "delay of the hardware, which the response holds; omitted: fitted where it is needed",
+        "1",
+        ge=0,
+        default=None,
     )

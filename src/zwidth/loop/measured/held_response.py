@@ -5,9 +5,9 @@ a command with G_ea - X/W, and after it with
 
     P' = P - sum_k X_k,      X = G_eh D/(1 + D G_hh) G_ha W
 
-X_0 is made of the data; what looks like it at the frequencies beyond half the sampling rate, of the device's fitted
-modes. It falls like 1/w^3 with a rigid grasp, like 1/w^4 and more with an elastic one, and is small where the
-device is heavier than what the hand adds at high frequency.
+X_0 is made of the data; what looks like it at the frequencies beyond half the sampling rate, of the fitted modes
+of the device. It falls like 1/w^3 with a rigid grasp, like 1/w^4 and more with an elastic one, and is small where
+the device is heavier than what the hand adds at high frequency.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ALIKE: Final = 0.9  # of half the sampling rate: at it, a frequency and its mirr
 def operator_stiffness(operator: Operator, omega: Floats) -> Complexes:
     """D (...) = -f/x_h of arm and grasp at angular frequencies [rad/s], of either sign [N/m].
 
-        arm  k_a + jw b_a - w^2 m_a,   grasp  k_g + jw b_g,   both in series unless the grasp is rigid
+    arm  k_a + jw b_a - w^2 m_a,   grasp  k_g + jw b_g,   both in series unless the grasp is rigid
     """
     s = 1j * np.asarray(omega, dtype=float)
     arm = operator.arm_stiffness + s * operator.arm_damping + s**2 * operator.arm_mass
@@ -74,7 +74,9 @@ def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Res
         sweeps = np.array([value - _change(base, D) - beyond for base, value in port.sweeps])
     error = _relative_error(port, D, change, held, beyond)
     # what a hand leaves of a far larger motion is the difference of two measured ones
-    kept = error < MOST_ERROR if np.count_nonzero(error < MOST_ERROR) >= FEWEST else np.ones(len(error), dtype=bool)
+    kept = (
+        error < MOST_ERROR if np.count_nonzero(error < MOST_ERROR) >= FEWEST else np.ones(len(error), dtype=bool)
+    )
     coherence = 1.0 / (1.0 + 2.0 * response.averages * error**2) if port.errors_known else None
     return replace(
         response,
@@ -102,8 +104,8 @@ def _note(response: Response, port: MeasuredPort, share: Floats, kept: Flags) ->
     worst = int(np.argmax(np.where(below, share, 0.0)))
     parts = [response.note] if response.note else []
     parts.append(
-        f"held by the operator, {len(port.model.modes) + port.model.free} fitted modes continuing the device beyond "
-        f"half the sampling rate: they make up at most {100.0 * share[worst]:.2g} % of the response, at "
+        f"held by the operator, {len(port.model.modes) + port.model.free} fitted modes continuing the device "
+        f"beyond half the sampling rate: they make up at most {100.0 * share[worst]:.2g} % of the response, at "
         f"{response.frequency[worst]:.4g} Hz, and miss the upper half of what was measured by "
         f"{100.0 * port.misfit:.2g} %"
     )
@@ -150,14 +152,15 @@ def _relative_error(
     where paths that stem from one measurement err together.
     """
     base, hold = port.baseband, port.model.hold(port.theta)
-    parts = {"sh": 1.0 + 0.0j, "ha": 1.0 + 0.0j, "hh": -D * base["hh"] / (1.0 + D * base["hh"])}
-    slopes: dict[str, Complexes] = {"sa": np.ones(len(held), dtype=complex)}
+    one = np.ones(len(held), dtype=complex)
+    parts: dict[str, Complexes] = {"sh": one, "ha": one, "hh": -D * base["hh"] / (1.0 + D * base["hh"])}
+    slopes: dict[str, Complexes] = {"sa": one}
     for name, factor in parts.items():
         source = port.origin[name]
         own = base[name]
         if name[1] != source[1]:
             own = own * hold if source[1] == "a" else own / hold
-        slopes[source] = slopes.get(source, np.zeros(len(held), dtype=complex)) - change * factor / own
+        slopes[source] = slopes.get(source, 0.0 * one) - change * factor / own
     square = np.zeros(len(held))
     if port.errors_known:
         square += (port.misfit * np.abs(beyond)) ** 2

@@ -44,8 +44,8 @@ LATEST: Final = 0.1  # radians at half the sampling rate, by which the fitted de
 
 @dataclass(frozen=True)
 class MeasuredPort:
-    """Responses at the angles theta = w T of all measured frequencies (n,), by path: first letter the output, s the
-    sensor or h the handle; second the input, a the command or h the hand's force.
+    """Responses at the angles theta = w T of all measured frequencies (n,), by path: first letter the output, s
+    the sensor or h the handle; second the input, a the command or h the hand's force.
 
     sampled     "sa", "ha": of commands, as sampled
     baseband    "sa", "ha": W_0 G; "sh", "hh": G
@@ -122,7 +122,7 @@ def _sizes(value: Complexes) -> Floats:
     """Magnitudes (n,), of small values among large ones a share of these: a zero weighs no more than others."""
     size = np.abs(value)
     around = np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1]))
-    return np.maximum(size, SMALL * around)
+    return np.asarray(np.maximum(size, SMALL * around))
 
 
 def measured_port(response: Response, period: float) -> MeasuredPort:
@@ -164,9 +164,7 @@ def command_port(response: Response, period: float) -> MeasuredPort:
     theta = np.minimum(2.0 * np.pi * response.frequency * period, np.pi)
     base = {"sa": response.value - _aliases(model, "sa", theta)}
     deviation = relative_deviation(_paths(bare)["sa"], response.averages) * np.abs(response.value)
-    return MeasuredPort(
-        theta, period, {"sa": response.value}, base, {"sa": deviation}, {"sa": "sa"}, (), model
-    )
+    return MeasuredPort(theta, period, {"sa": response.value}, base, {"sa": deviation}, {"sa": "sa"}, (), model)
 
 
 def changed_port(port: MeasuredPort, added_delay: float = 0.0, period: float | None = None) -> MeasuredPort:

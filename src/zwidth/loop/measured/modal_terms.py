@@ -24,7 +24,7 @@ def continuous_terms(poles: Complexes, theta: Floats) -> Complexes:
 def sampled_terms(poles: Complexes, theta: Floats, delay: float) -> Complexes:
     """1/(jw - s) behind hold and delay, as sampled, (k, n).
 
-        z^-l [E(1 - f) + e^(s (1 - f)) E(f)/z]/(z - e^s),      E(t) = (e^(s t) - 1)/s,   delay = l + f
+    z^-l [E(1 - f) + e^(s (1 - f)) E(f)/z]/(z - e^s),      E(t) = (e^(s t) - 1)/s,   delay = l + f
     """
     whole = floor(delay)
     f = delay - whole

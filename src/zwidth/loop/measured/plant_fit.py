@@ -1,8 +1,8 @@
 """A plant fitted to a measured device: masses, springs and dampers in modal coordinates, and a delay.
 
-It starts from the poles of `pole_fit`, and all its numbers are fitted together, so that one actuator, one sensor and
-one handle explain all paths, with damping that takes in power only. What needs motion in time needs such a plant,
-and its answers hold as far as the plant does: the fit says how far that is.
+It starts from the poles of `pole_fit`, and all its numbers are fitted together, so that one actuator, one sensor
+and one handle explain all paths, with damping that takes in power only. What needs motion in time needs such a
+plant, and its answers hold as far as the plant does: the fit says how far that is.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class ModalModel:
     free: bool
 
     def paths(self, names: Iterable[str], theta: Floats) -> dict[str, Complexes]:
-        """Responses (k,) of some of PATHS at angles theta = w T: of commands as sampled, of the handle as it is."""
+        """Responses (k,) of some of PATHS at angles theta = w T: of commands as sampled, of the hand as it is."""
         terms: dict[str, Complexes] = {}
         values = {}
         for name in names:
@@ -62,7 +62,7 @@ class ModalModel:
 
     @cached_property
     def _eigen(self) -> tuple[Complexes, Complexes, Complexes]:
-        """Poles (2n,) of the modes that do not stand apart, their shapes (n, 2n) and how forces move them (2n, n)."""
+        """Poles (2n,) of the modes that do not stand apart, their shapes (n, 2n) and what moves them (2n, n)."""
         first = int(self.free)
         n = len(self.squared) - first
         A = np.zeros((2 * n, 2 * n))
@@ -111,14 +111,6 @@ class PlantFit:
             "measurement_error": self.noise,
         }
 
-    @property
-    def sentence(self) -> str:
-        """The fit in words."""
-        return (
-            f"by a plant of {self.plant.size} modes fitted to the response, which it misses by "
-            f"{100.0 * self.misfit:.2g} % (root mean square; {100.0 * self.largest:.2g} % at {self.largest_at:.4g} Hz)"
-        )
-
 
 def fit_plant(response: Response, period: float) -> PlantFit:
     """The plant of a measured device.
@@ -144,8 +136,8 @@ def fit_plant(response: Response, period: float) -> PlantFit:
     if not misfit**2 - noise**2 < WORST**2:
         raise ResponseError(
             f"is not explained by masses, springs, dampers and a delay: the best plant misses it by "
-            f"{100.0 * misfit:.3g} %, most at {frequency:.4g} Hz; measure more closely there, or describe the device "
-            "as a [plant]"
+            f"{100.0 * misfit:.3g} %, most at {frequency:.4g} Hz; measure more closely there, or describe the "
+            "device as a [plant]"
         )
     n = len(model.squared)
     plant = Plant(
@@ -178,9 +170,7 @@ def _start(data: PathData, found: PoleModel, at_sensor: bool, tied: bool) -> Mod
     return ModalModel(squared, damping, *_shapes(residues, at_sensor, tied), delay, free)
 
 
-def _shapes(
-    residues: Mapping[str, Floats], at_sensor: bool, tied: bool
-) -> tuple[Floats, Floats, Floats]:
+def _shapes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tuple[Floats, Floats, Floats]:
     """Actuator, sensor and handle (n,) of modes that explain the residues of all paths about as well."""
     sa, sh, ha, hh = (residues.get(name) for name in PATHS)
     assert sa is not None

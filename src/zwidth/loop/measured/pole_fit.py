@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -173,10 +172,9 @@ def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) ->
 
     delay  of commands, sampled behind a hold; None: continuous
     """
-    sampled = delay is not None
     parts = []
     if free:
-        mass = sampled_free_mass(theta, delay) if sampled else -1.0 / theta**2 + 0j
+        mass = -1.0 / theta**2 + 0j if delay is None else sampled_free_mass(theta, delay)
         parts.append(mass[:, None])
     if len(modes):
         w, ratio = modes.T
@@ -186,7 +184,7 @@ def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) ->
         root = np.where(np.abs(root) < nearest, nearest, root)
         s1, s2 = np.where(w == 0.0, 0.0, -rate + root), -rate - root
         both = np.concatenate([s1, s2])
-        terms = sampled_terms(both, theta, delay) if sampled else continuous_terms(both, theta)
+        terms = continuous_terms(both, theta) if delay is None else sampled_terms(both, theta, delay)
         first, second = terms[:, : len(w)], terms[:, len(w) :]
         faster = (s1 * first - s2 * second) / (s1 - s2)
         parts += [(first - second) / (s1 - s2), faster[:, 1:] - faster[:, :1]]
@@ -269,7 +267,7 @@ def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
     """The modes and the one more that takes most of what is left."""
     parts = _projected(data, modes, delay)
     k = len(data.theta)
-    left = sum(rest[:k] ** 2 + rest[k:] ** 2 for _, rest in parts)
+    left = np.sum([rest[:k] ** 2 + rest[k:] ** 2 for _, rest in parts], axis=0)
     inner = np.flatnonzero((left[1:-1] >= left[:-2]) & (left[1:-1] >= left[2:])) + 1
     peaks = data.theta[inner[np.argsort(-left[inner])[:PEAKS]]]
     w = np.concatenate([np.geomspace(data.theta[0], HIGHEST, TRIED), peaks])

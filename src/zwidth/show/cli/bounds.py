@@ -36,6 +36,8 @@ class BoundsCommand(Command):
     """Compare published conditions on DEVICE with the exact answer, and say which assumptions it does not meet."""
 
     name = "bounds"
+    takes_responses = True
+    answers_by_fit = True
     summary = "Compare published conditions on DEVICE with the exact answer."
     examples = (
         "zwidth bounds my-device.toml",

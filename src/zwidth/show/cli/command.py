@@ -24,6 +24,7 @@ from zwidth.show.cli.options import Question, about_a_device, as_json, example, 
 from zwidth.show.cli.progress import show_progress
 from zwidth.show.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
+from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,8 +34,9 @@ if TYPE_CHECKING:
     from zwidth.progress import Progress
 
 NO_MODEL: Final = (
-    "a measured response has no masses, stiffnesses, modes or postures to show; `zwidth chart` and `zwidth check` "
-    "answer for it, a [plant] or [mechanism] answers the rest"
+    "a measured response has no masses, stiffnesses, modes or postures to show; chart, check, sensitivity, "
+    "simulate and bounds answer for it, with the paths of its handle felt and guarantees, too; a [plant] or "
+    "[mechanism] answers the rest"
 )
 
 
@@ -92,6 +94,8 @@ class Command:
     linear            does the answer leave out the nonlinear parts?
     may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
     takes_responses   does it answer for a measured response, too?
+    answers_by_fit    does it do so by a plant fitted to the response?
+    no_response       why it does not, where it does not
     takes_loads       does it answer for a device under load?
     has_device        is it about a device that is read? Not where it writes a new one
     """
@@ -107,6 +111,8 @@ class Command:
     linear: ClassVar[bool] = True
     may_be_undecided: ClassVar[bool] = False
     takes_responses: ClassVar[bool] = False
+    answers_by_fit: ClassVar[bool] = False
+    no_response: ClassVar[str] = NO_MODEL
     takes_loads: ClassVar[bool] = True
     has_device: ClassVar[bool] = True
 
@@ -244,7 +250,7 @@ class Command:
     def _answer(self, case: CommandLine) -> Answer:
         if self.has_device and not self.takes_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses options that need a model for a [response]
-            none = self.unanswered(case, NoAnswer(NO_MODEL))
+            none = self.unanswered(case, NoAnswer(self.no_response))
             return replace(none, document=case.question.linear_circumstances(case.device) | none.document)
         try:
             with translate_errors(case.question):
@@ -253,6 +259,10 @@ class Command:
             return self.unanswered(case, none)
         reason = self.reason(case, result)
         document = self.circumstances(case) | self.document(case, result)
+        if self.answers_by_fit and case.device.response is not None:
+            from zwidth.chart.measured.fit_check import fit_document
+
+            document["fit"] = fit_document(case.point)
         document |= {"decided": True} if self.may_be_undecided and "decided" not in document else {}
         if case.path is not None:
             document["file"] = str(case.path)
@@ -266,6 +276,8 @@ class Command:
         def pages() -> Iterator[Any]:
             if first := self.heading(case):
                 yield first
+            if isinstance(fit := document.get("fit"), dict) and self.answers_by_fit:
+                yield _fit_sentence(fit)
             yield from self.pages(case, result, document)
             yield from (f"written: {document[key]}" for key in ("file", *others) if key in document)
 
@@ -308,3 +320,15 @@ class Command:
         for decorate in reversed(decorators):
             command = decorate(command)
         return click.command(self.name, short_help=self.summary, epilog=self.epilog())(command)
+
+
+def _fit_sentence(fit: Mapping[str, Any]) -> str:
+    """How well a fitted plant stands for a measured response."""
+    by_fit, by_data = (
+        amount(fit[key], "N/m") for key in ("stiffness_max_N_per_m", "stiffness_max_of_response_N_per_m")
+    )
+    worst = f"{percent(fit['largest_misfit'])} at {amount(fit['largest_misfit_at_Hz'], 'Hz')}"
+    return typed(
+        f"by a plant of {fit['modes']} modes fitted to the response: it misses that by {percent(fit['misfit'])} "
+        f"(root mean square; {worst}), and its largest stiffness is {by_fit}, by the response itself {by_data}"
+    )

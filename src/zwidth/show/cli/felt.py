@@ -12,7 +12,7 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
-    from zwidth.measures.felt_wall import FeltWall
+    from zwidth.measures.felt import FeltWall
 
 
 class FeltCommand(Command):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.guarantees.coupling import Coupling
-    from zwidth.guarantees.loop_guarantees import Guarantees
+    from zwidth.guarantees.guarantees import Guarantees
     from zwidth.guarantees.region import Region
 
 NOTHING: Final = "no wall has K > 0 and B >= 0 and any of the guarantees"

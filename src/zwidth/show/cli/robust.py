@@ -33,6 +33,11 @@ class RobustCommand(Command):
     ranges."""
 
     name = "robust"
+    no_response = (
+        "a measured response has no numbers of its own to vary; attach one operator after the other with "
+        "--operator, repeat the sweep to see the device vary (`zwidth chart` gives the band), or describe the "
+        "device as a [plant]"
+    )
     summary = "Find the walls that are stable for every operator and number in a range."
     examples = (
         "zwidth robust my-device.toml --range operator.arm_mass_kg=0.3,2 --range loop.delay_samples=0,1",

@@ -57,6 +57,8 @@ class SimulateCommand(Command):
     """Simulate a contact of DEVICE with a wall: the motion dies away, grows, repeats itself or leaves the wall."""
 
     name = "simulate"
+    takes_responses = True
+    answers_by_fit = True
     summary = "Simulate a contact of DEVICE with a wall."
     examples = (
         "zwidth simulate my-device.toml --stiffness 4000 --damping 10 --output motion.svg",

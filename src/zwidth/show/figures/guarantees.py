@@ -11,7 +11,7 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 
 from zwidth.guarantees.coupling import Couplings
-from zwidth.guarantees.loop_guarantees import Guarantee, Guarantees
+from zwidth.guarantees.guarantees import Guarantee, Guarantees
 from zwidth.guarantees.region import Region
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, draw_empty, label, legend_above
