@@ -129,9 +129,10 @@ def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
         at = np.flatnonzero(lost)
         stretch = f"{frequency[at[0]]:.4g} to {frequency[at[-1]]:.4g} Hz"
         return empty_region(
-            f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, {stretch}, "
-            "its error is larger than the power that the handle takes in; measure longer or with more force there, "
-            "or state hardware_delay_samples"
+            f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, "
+            f"{stretch}, "
+            "its error is larger than the power that the handle takes in; measure longer or with more force "
+            "there, or state hardware_delay_samples"
         )
     if not np.all(np.isfinite(disks.radius[inner])):
         return empty_region(

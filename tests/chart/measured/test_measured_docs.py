@@ -11,13 +11,17 @@ import pytest
 
 from tests.cli.command_runner import document_of
 from zwidth.chart.measured.chart import MeasuredChart
+from zwidth.device.load import load
 
 PAGE = (Path(__file__).parents[3] / "docs" / "measured.md").read_text(encoding="utf-8")
 
 
 def block(language):
-    (code,) = re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
-    return code
+    return blocks(language)[0]
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
 
 
 def test_the_python_example_says_what_its_comments_say():
@@ -44,3 +48,15 @@ def test_the_device_file_is_charted_and_its_keys_are_explained(tmp_path):
     explained = set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE))
     assert explained <= set(document)
     assert explained == set(document) - set(document_of("chart", "published-two-mass"))
+
+
+def test_the_keys_of_the_handle_are_those_of_the_file(tmp_path):
+    f = np.linspace(0.5, 500.0, 400)
+    z = np.exp(2j * np.pi * f * 0.001)
+    P = 5e-6 * (z + 1) / (z - 1) ** 2
+    rows = [f"{a},{b.real!r},{b.imag!r}" for a, b in zip(f.tolist(), P.tolist(), strict=True)]
+    (tmp_path / "sweep.csv").write_text("\n".join(["frequency_Hz,real_m_per_N,imag_m_per_N", *rows]) + "\n")
+    text = 'name = "held"\n' + blocks("toml")[1] + "[loop]\nsampling_period_s = 0.001\n"
+    (tmp_path / "device.toml").write_text(text)
+    response = load(tmp_path / "device.toml").response
+    assert (response.handle.missing, response.delay) == ((), 0.4)
