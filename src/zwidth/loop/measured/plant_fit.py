@@ -24,8 +24,8 @@ from zwidth.model.response import Response, ResponseError
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-POINTS: Final = 500  # frequencies to which a plant is fitted
-STEPS: Final = 40  # of the search, times its unknowns
+POINTS: Final = 250  # frequencies to which a plant is fitted
+STEPS: Final = 25  # of the search, times its unknowns
 WORST: Final = 0.1  # relative misfit, beyond that of noise, from which no plant is given
 
 
