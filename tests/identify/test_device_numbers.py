@@ -28,7 +28,7 @@ def test_positive_numbers_vary_by_their_logarithm_and_others_as_they_are(device)
 def test_a_delay_that_the_file_leaves_out_begins_at_none(device):
     numbers = DeviceNumbers.of(device, PATHS)
     assert numbers.start[2] == 0.0
-    changed = numbers.device_with(numbers.vector(numbers.start) + [np.log(2.0), 0.0, 0.5])
+    changed = numbers.device_with(numbers.vector(numbers.start) + np.array([np.log(2.0), 0.0, 0.5]))
     assert changed.controller.delay == 0.5
     assert changed.document["plant"]["mass_kg"][0][0] == pytest.approx(2.0 * 0.2616)
 

@@ -20,8 +20,8 @@ from .eigenvalue_paths import loop_paths as loop_paths
 from .eigenvalue_paths import wall_paths as wall_paths
 from .evaluate import evaluate as evaluate
 from .evaluate import measure_at as measure_at
-from .felt_chart import felt_chart as felt_chart
 from .felt import FeltWall as FeltWall
+from .felt_chart import felt_chart as felt_chart
 from .felt_wall import felt_wall as felt_wall
 from .forces import acceleration_along as acceleration_along
 from .forces import force_along as force_along
