@@ -1,0 +1,425 @@
+"""Friction and mass of one joint by output error: the motion predicted in windows, each from its own start.
+
+Within a window the motion follows from the recorded force alone; position and velocity at the window's first sample
+are parameters too (multiple shooting). What an encoder's steps add to slow motion is correlated over many samples,
+so the intervals do not come from the residuals' size: blocks of consecutive samples are left out one by one, as a
+jackknife does, in the linearised fit, and the spread of what that changes is the spread of the estimate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.friction_motion import follow_windows
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEVEL: Final = 0.95
+NUMBERS: Final = ("mass", "damping forward", "damping backward", "level forward", "level backward", "stiffness")
+DELAY: Final = 6  # index of the force's delay behind the six numbers of the motion
+STEP: Final = 1e-6  # of a derivative, of parameters in units of their effect
+MOST_STEPS: Final = 40  # of the optimiser
+ARRIVED: Final = 1e-8  # relative fall of the sum of squares that ends it
+RIDGES: Final = (0.0, 1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4)  # of Levenberg and Marquardt, tried in this order
+LONGEST_DELAY: Final = (-1.0, 6.0)  # of the force, samples
+BLOCKS: Final = 40  # of consecutive samples, of all windows together, at least
+SHARES: Final = (1.0, 0.3, 0.0)  # of a step that a window's start may take
+LEAST_MASS: Final = 1e-3  # times b T: a mass that stops within a thousandth of a sample
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Stretches of records, with some samples before and after each so that a delayed force is known.
+
+    position, force  (n,) readings [m or rad], force or torque [N or N m]; the force is 0 where nothing drives
+    first, length    (W,) row of each window's first sample, and their number
+    period           (W,) sampling period [s]
+    time             (W,) time of the first sample [s]
+    run              (W,) number of the stretch without a gap, over all records, that a window belongs to
+    driven           whether a force was recorded
+    """
+
+    position: Floats
+    force: Floats
+    first: Ints
+    length: Ints
+    period: Floats
+    time: Floats
+    run: Ints
+    driven: bool
+
+    def chosen(self, which: NDArray[np.bool_]) -> Windows:
+        """Some of the windows."""
+        names = ("first", "length", "period", "time", "run")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
+
+    def cut(self, parts: int) -> Windows:
+        """Each window cut into so many, one behind the other."""
+        edges = [np.linspace(0, n, min(parts, max(n // 8, 1)) + 1).astype(np.int64) for n in self.length]
+        many = np.array([len(e) - 1 for e in edges])
+        offsets = np.concatenate([e[:-1] for e in edges])
+        return replace(
+            self,
+            first=np.repeat(self.first, many) + offsets,
+            length=np.concatenate([np.diff(e) for e in edges]),
+            period=np.repeat(self.period, many),
+            time=np.repeat(self.time, many) + np.repeat(self.period, many) * offsets,
+            run=np.repeat(self.run, many),
+        )
+
+    @cached_property
+    def rows(self) -> Ints:
+        """Rows of all samples in windows, window by window."""
+        return np.concatenate([np.arange(a, a + n) for a, n in zip(self.first, self.length, strict=True)])
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What the motion hangs on.
+
+    values   (7,) m, b forward and backward, F forward and backward, k, and the force's delay [s]
+    free     those that are fitted
+    tied     index of each number that follows another instead: backward ones where the joint never slid backward
+    """
+
+    values: Floats
+    free: tuple[int, ...]
+    tied: tuple[tuple[int, int], ...] = ()
+
+    def with_free(self, some: Floats) -> Numbers:
+        """With other values of the free numbers."""
+        values = self.values.copy()
+        values[list(self.free)] = some
+        for number, other in self.tied:
+            values[number] = values[other]
+        return replace(self, values=values)
+
+    @property
+    def free_values(self) -> Floats:
+        """The values that are fitted."""
+        return self.values[list(self.free)]
+
+
+def predict(windows: Windows, values: Floats, starts: Floats) -> Floats:
+    """Positions at `windows.rows` [m or rad], from the starts (W, 2) of position and velocity."""
+    out = np.zeros(len(windows.position))
+    follow_windows(
+        windows.force,
+        windows.first,
+        windows.length,
+        windows.period,
+        np.ascontiguousarray(values[:DELAY]),
+        float(values[DELAY]),
+        starts,
+        out,
+    )
+    return out[windows.rows]
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Sums over blocks of consecutive samples, of the linearised prediction.
+
+    gram      (G, p + 2, p + 2) of the derivatives by the free numbers and by the window's start
+    gradient  (G, p + 2) of the derivatives times what remains
+    squares   (G,) of what remains
+    window    (G,) the window that a block lies in
+    """
+
+    gram: Floats
+    gradient: Floats
+    squares: Floats
+    window: Ints
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Numbers of a joint that predict its motion best.
+
+    numbers     fitted
+    starts      (W, 2) of the windows
+    covariance  (p, p) of the free numbers' errors by the jackknife; inf on the diagonal where the data tell nothing
+    quantiles   (p,) of Student's distribution by how many blocks carry each number
+    residuals   (n,) at `windows.rows`
+    converged   whether the optimiser arrived
+    """
+
+    windows: Windows
+    numbers: Numbers
+    starts: Floats
+    covariance: Floats
+    residuals: Floats
+    blocks: Blocks
+    changes: Floats
+    weights: Floats
+    converged: bool
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of what remains."""
+        return float(np.sum(self.residuals**2))
+
+    def combination(self, weights: Floats) -> tuple[float, float, float]:
+        """Value, standard error and quantile of a sum over the numbers, weights (7,).
+
+        The quantile is Student's with the degrees of freedom by Satterthwaite's rule, from the variances and
+        covariances that the blocks' changes would have if the residuals were independent (Bell and McCaffrey 2002,
+        known at second hand).
+        """
+        from scipy.stats import t
+
+        c = np.asarray(weights, dtype=float).copy()
+        value = float(c @ self.numbers.values)
+        for number, other in self.numbers.tied:
+            c[other] += c[number]
+        c = c[list(self.numbers.free)]
+        known = c != 0.0
+        if np.any(~np.isfinite(np.diag(self.covariance)[known])):
+            return value, np.inf, np.inf
+        G = len(self.changes)
+        sizes = self.changes @ c
+        error = float(np.sqrt((G - 1) / G * np.sum(sizes**2)))
+        spread = np.einsum("i,gihj,j->gh", c, self.weights, c)
+        freedom = float(np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300))
+        return value, error, float(t.ppf(0.5 + 0.5 * LEVEL, max(freedom, 1.0)))
+
+
+class _Search:
+    """Levenberg and Marquardt over the free numbers and the windows' starts."""
+
+    def __init__(self, windows: Windows, numbers: Numbers, starts: Floats, blocks: int) -> None:
+        self.windows, self.numbers, self.starts = windows, numbers, starts
+        self.cut = windows.cut(max(-(-blocks // len(windows.first)), 1)) if blocks else windows
+        self.of_window = np.searchsorted(windows.first, self.cut.first, side="right") - 1
+        self.reading = windows.position[windows.rows]
+        self.where = np.repeat(np.arange(len(windows.first)), windows.length)
+        self.edges = np.concatenate([[0], np.cumsum(self.cut.length)])
+        self.scales = scales(windows)
+
+    def residuals(self, numbers: Numbers, starts: Floats) -> Floats:
+        return self.reading - predict(self.windows, numbers.values, starts)
+
+    def linearised(self) -> tuple[Blocks, Floats]:
+        """Sums over the blocks at the present numbers, and what remains."""
+        p = len(self.numbers.free)
+        base = predict(self.windows, self.numbers.values, self.starts)
+        columns = np.empty((len(base), p + 2))
+        x = self.numbers.free_values
+        for i, number in enumerate(self.numbers.free):
+            moved = x.copy()
+            step = STEP * self.scales[number]
+            moved[i] += step
+            columns[:, i] = (predict(self.windows, self.numbers.with_free(moved).values, self.starts) - base) / step
+        for j in range(2):
+            starts = self.starts.copy()
+            step = STEP * self.scales[7 + j]
+            starts[:, j] += step
+            columns[:, p + j] = (predict(self.windows, self.numbers.values, starts) - base) / step
+        left = self.reading - base
+        pairs = [(columns[a:b], left[a:b]) for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
+        return (
+            Blocks(
+                np.array([A.T @ A for A, _ in pairs]),
+                np.array([A.T @ r for A, r in pairs]),
+                np.array([float(r @ r) for _, r in pairs]),
+                self.of_window,
+            ),
+            left,
+        )
+
+    def run(self, most: int = MOST_STEPS) -> tuple[Blocks, Floats, bool]:
+        """Search until the sum of squares falls no more."""
+        ridge = 1
+        for _ in range(most):
+            blocks, left = self.linearised()
+            least = float(left @ left)
+            arrow = Arrow.of(blocks, len(self.starts))
+            for ridge in range(max(ridge - 1, 0), len(RIDGES)):
+                numbers, starts, squares = self._best_step(*arrow.solved(RIDGES[ridge], self.floor))
+                if squares < least:
+                    break
+            else:
+                return blocks, left, True
+            self.numbers, self.starts = numbers, starts
+            if least - squares <= ARRIVED * least:
+                blocks, left = self.linearised()
+                return blocks, left, True
+        return *self.linearised(), False
+
+    def _best_step(self, step: Floats, along: Floats) -> tuple[Numbers, Floats, float]:
+        """The numbers a step further; each window's start as far along its step as predicts it best."""
+        numbers = self._moved(step)
+        guesses = [self.starts + share * along for share in SHARES]
+        squares = np.array([self.squares(numbers, guess) for guess in guesses])
+        best = np.argmin(squares, axis=0)
+        starts = np.array(guesses)[best, np.arange(len(best))]
+        return numbers, starts, float(np.sum(squares[best, np.arange(len(best))]))
+
+    def squares(self, numbers: Numbers, starts: Floats) -> Floats:
+        """Sum of squares of what remains in each window; inf where the prediction runs away."""
+        edges = np.cumsum(self.windows.length) - self.windows.length
+        with np.errstate(over="ignore", invalid="ignore"):
+            sums = np.add.reduceat(self.residuals(numbers, starts) ** 2, edges)
+        return np.where(np.isfinite(sums), sums, np.inf)
+
+    @property
+    def floor(self) -> Floats:
+        """Least squares (2,) of the derivatives by a window's start: starts of windows in which nothing moves change
+        nothing, and must not run away."""
+        samples = float(np.mean(self.windows.length))
+        span = samples * float(np.mean(self.windows.period))
+        return 1e-3 * samples * np.array([1.0, span**2])
+
+    def _moved(self, step: Floats) -> Numbers:
+        x = self.numbers.free_values + step
+        T = float(np.mean(self.windows.period))
+        for i, number in enumerate(self.numbers.free):
+            if number == 0:
+                damping = max(abs(self.numbers.values[1]), abs(self.numbers.values[2]))
+                floor = max(LEAST_MASS * damping * T, 1e-6 * self.scales[0])
+                x[i] = max(x[i], floor, 0.1 * self.numbers.values[0])
+            elif number == DELAY:
+                x[i] = np.clip(x[i], LONGEST_DELAY[0] * T, LONGEST_DELAY[1] * T)
+        return self.numbers.with_free(x)
+
+
+def scales(windows: Windows) -> Floats:
+    """Sizes (9,) of the seven numbers and of a start by what the record has of force, motion and time."""
+    y, T = windows.position, float(np.mean(windows.period))
+    x = max(float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300)
+    length = float(np.mean(windows.length)) * T
+    v = x / (0.25 * length)
+    a = v / (0.25 * length)
+    f = float(np.std(windows.force)) if windows.driven else a
+    f = f if f > 0.0 else a
+    return np.array([f / a, f / v, f / v, f, f, f / x, T, x, v])
+
+
+def assembled(blocks: Blocks, count: int) -> tuple[Floats, Floats]:
+    """Normal matrix and gradient of the free numbers and the starts of all windows."""
+    p = blocks.gram.shape[-1] - 2
+    size = p + 2 * count
+    whole, gradient = np.zeros((size, size)), np.zeros(size)
+    for gram, slope, w in zip(blocks.gram, blocks.gradient, blocks.window, strict=True):
+        at = np.append(np.arange(p), [p + 2 * w, p + 2 * w + 1])
+        whole[np.ix_(at, at)] += gram
+        gradient[at] += slope
+    return whole, gradient
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """Normal equations of the free numbers and of the starts, which meet only within their windows.
+
+    own      (p, p) of the numbers;     slope   (p,)
+    mixed    (W, p, 2) of both
+    starts   (W, 2, 2) of the starts;   slopes  (W, 2)
+    """
+
+    own: Floats
+    slope: Floats
+    mixed: Floats
+    starts: Floats
+    slopes: Floats
+
+    @classmethod
+    def of(cls, blocks: Blocks, count: int) -> Arrow:
+        """Of so many windows."""
+        p = blocks.gram.shape[-1] - 2
+        mixed, starts, slopes = np.zeros((count, p, 2)), np.zeros((count, 2, 2)), np.zeros((count, 2))
+        np.add.at(mixed, blocks.window, blocks.gram[:, :p, p:])
+        np.add.at(starts, blocks.window, blocks.gram[:, p:, p:])
+        np.add.at(slopes, blocks.window, blocks.gradient[:, p:])
+        own, slope = np.sum(blocks.gram[:, :p, :p], axis=0), np.sum(blocks.gradient[:, :p], axis=0)
+        return cls(own, slope, mixed, starts, slopes)
+
+    def solved(self, ridge: float, floor: Floats) -> tuple[Floats, Floats]:
+        """Steps (p,) of the numbers and (W, 2) of the starts: (N + ridge diag N)^-1 g.
+
+        floor  (2,) least diagonal of the starts, of which the ridge is a share
+        """
+        own = np.sqrt(np.maximum(np.diag(self.own), 1e-300))
+        size = np.sqrt(np.maximum(np.diagonal(self.starts, axis1=1, axis2=2), floor))
+        more = 1.0 + ridge + 1e-12
+        N = self.own / np.outer(own, own) + (more - 1.0) * np.eye(len(own))
+        starts = self.starts / (size[:, :, None] * size[:, None, :]) + (more - 1.0) * np.eye(2)
+        mixed = self.mixed / (own[:, None] * size[:, None, :])
+        back = np.linalg.solve(starts, np.swapaxes(mixed, 1, 2))  # (W, 2, p)
+        rest = np.linalg.solve(starts, (self.slopes / size)[:, :, None])[:, :, 0]
+        inner = N - np.einsum("wpi,wiq->pq", mixed, back)
+        slope = self.slope / own - np.einsum("wpi,wi->p", mixed, rest)
+        x = np.linalg.lstsq(inner, slope, rcond=1e-12)[0]
+        return x / own, (rest - back @ x) / size
+
+
+def approach(windows: Windows, numbers: Numbers, starts: Floats, most: int) -> tuple[Numbers, Floats, Floats]:
+    """A few steps of the search, for a better guess: numbers, starts (W, 2), and sums of squares (W,)."""
+    search = _Search(windows, numbers, starts, 0)
+    search.run(most)
+    return search.numbers, search.starts, search.squares(search.numbers, search.starts)
+
+
+def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int = BLOCKS) -> JointFit:
+    """The free numbers that predict the motion in the windows best, from a guess close to them."""
+    search = _Search(windows, numbers, starts, blocks)
+    sums, left, converged = search.run()
+    covariance, changes, weights = jackknife(sums, len(search.starts), len(search.numbers.free))
+    return JointFit(windows, search.numbers, search.starts, covariance, left, sums, changes, weights, converged)
+
+
+def jackknife(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats]:
+    """Spread of the free numbers, from leaving out each block of a linearised fit.
+
+    With N = sum of A_g^T A_g over the blocks and P the part of N^-1 that a block sees, leaving block g out changes
+    the parameters by  -N^-1 u_g,  u_g = (1 - S_g P)^-1 A_g^T r_g,  S_g = A_g^T A_g.
+    Returns  covariance (p, p), changes (G, p), and (G, p, G, p) covariances of the changes for independent
+             residuals of size 1
+    """
+    whole, _ = assembled(blocks, count)
+    size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    inverse, lost = _inverse(whole / np.outer(size, size))
+    G, q = blocks.gradient.shape
+    columns = np.concatenate([np.tile(np.arange(free), (G, 1)), free + 2 * blocks.window[:, None] + [0, 1]], axis=1)
+    scale = size[columns]
+    S = blocks.gram / (scale[:, :, None] * scale[:, None, :])
+    P = inverse[columns[:, :, None], columns[:, None, :]]
+    left = np.eye(q) - S @ P
+    with np.errstate(all="ignore"):
+        try:
+            grown = np.linalg.inv(left)
+        except np.linalg.LinAlgError:
+            grown = np.array([np.linalg.pinv(one) for one in left])
+    u = np.einsum("gij,gj->gi", grown, blocks.gradient / scale)
+    wide = np.zeros((G, len(whole)))
+    np.put_along_axis(wide, columns, u, axis=1)
+    changes = (wide @ inverse)[:, :free] / size[:free]
+    covariance = (G - 1) / G * changes.T @ changes
+    for i in np.flatnonzero(lost[:free]):
+        covariance[i, i] = np.inf
+    # covariances under residuals of size 1: each block's own, less what the fit takes from all
+    rows = np.zeros((G, free, len(whole)))
+    own = np.zeros((G, free, free))
+    for g in range(G):
+        to = inverse[:free][:, columns[g]] @ grown[g]
+        rows[g][:, columns[g]] = to @ S[g]
+        own[g] = to @ S[g] @ to.T
+    shared = np.einsum("gia,ab,hjb->gihj", rows, inverse, rows, optimize=True)
+    weights = -shared
+    weights[np.arange(G), :, np.arange(G), :] += own
+    weights /= size[:free][None, :, None, None] * size[:free][None, None, None, :]
+    return covariance, changes, weights
+
+
+def _inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Inverse of a normal matrix, and which parameters it leaves undetermined."""
+    values, vectors = np.linalg.eigh(scaled)
+    felt = values > 1e-11
+    inverse = (vectors[:, felt] / values[felt]) @ vectors[:, felt].T
+    lost = np.any(np.abs(vectors[:, ~felt]) > 1e-3, axis=1)
+    return inverse, lost
