@@ -2,8 +2,8 @@
 
 Within a window the motion follows from the recorded force alone; position and velocity at the window's first sample
 are parameters too (multiple shooting). What an encoder's steps add to slow motion is correlated over many samples,
-so the intervals do not come from the residuals' size: blocks of consecutive samples are left out one by one, as a
-jackknife does, in the linearised fit, and the spread of what that changes is the spread of the estimate.
+so the intervals do not come from the residuals' size but from blocks of consecutive samples: what each of them adds
+to the numbers, and how that differs from block to block.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ RIDGES: Final = (0.0, 1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4)  # of Levenberg and Marqu
 LONGEST_DELAY: Final = (-1.0, 6.0)  # of the force, samples
 BLOCKS: Final = 40  # of consecutive samples, of all windows together, at least
 SHARES: Final = (1.0, 0.3, 0.0)  # of a step that a window's start may take
+LEAST_SHARE: Final = 1e-3  # of a variance that must be seen in the blocks' changes
 LEAST_MASS: Final = 1e-3  # times b T: a mass that stops within a thousandth of a sample
 
 
@@ -144,9 +145,13 @@ class JointFit:
 
     numbers     fitted
     starts      (W, 2) of the windows
-    covariance  (p, p) of the free numbers' errors by the jackknife; inf on the diagonal where the data tell nothing
-    quantiles   (p,) of Student's distribution by how many blocks carry each number
+    covariance  (p, p) of the free numbers' errors by the blocks' spread; inf on the diagonal where the data tell
+                nothing
+    working     (p, p) the same if the residuals were independent, of size 1
     residuals   (n,) at `windows.rows`
+    changes     (G, p) of the numbers by each block's residuals, enlarged for what the fit takes from them
+    weights     (G, p, G, p) covariances of these changes if the residuals were independent, of size 1
+    block_time  (G,) when each block begins [s]
     converged   whether the optimiser arrived
     """
 
@@ -154,10 +159,11 @@ class JointFit:
     numbers: Numbers
     starts: Floats
     covariance: Floats
+    working: Floats
     residuals: Floats
-    blocks: Blocks
     changes: Floats
     weights: Floats
+    block_time: Floats
     converged: bool
 
     @property
@@ -182,12 +188,20 @@ class JointFit:
         known = c != 0.0
         if np.any(~np.isfinite(np.diag(self.covariance)[known])):
             return value, np.inf, np.inf
-        G = len(self.changes)
         sizes = self.changes @ c
-        error = float(np.sqrt((G - 1) / G * np.sum(sizes**2)))
         spread = np.einsum("i,gihj,j->gh", c, self.weights, c)
-        freedom = float(np.trace(spread) ** 2 / max(np.sum(spread**2), 1e-300))
+        expected, exact = float(np.trace(spread)), float(c @ self.working @ c)
+        if not expected > LEAST_SHARE * exact:
+            return value, np.inf, np.inf
+        error = float(np.sqrt(np.sum(sizes**2) * exact / expected))
+        freedom = expected**2 / float(np.sum(spread**2))
         return value, error, float(t.ppf(0.5 + 0.5 * LEVEL, max(freedom, 1.0)))
+
+    def interval(self, weights: Floats) -> tuple[float, float, float]:
+        """Value and ends of the interval of a sum over the numbers, weights (7,)."""
+        value, error, quantile = self.combination(weights)
+        half = error * quantile if np.isfinite(error) else np.inf
+        return value, value - half, value + half
 
 
 class _Search:
@@ -301,16 +315,14 @@ def scales(windows: Windows) -> Floats:
     return np.array([f / a, f / v, f / v, f, f, f / x, T, x, v])
 
 
-def assembled(blocks: Blocks, count: int) -> tuple[Floats, Floats]:
-    """Normal matrix and gradient of the free numbers and the starts of all windows."""
+def assembled(blocks: Blocks, count: int) -> Floats:
+    """Normal matrix of the free numbers and the starts of all windows."""
     p = blocks.gram.shape[-1] - 2
-    size = p + 2 * count
-    whole, gradient = np.zeros((size, size)), np.zeros(size)
-    for gram, slope, w in zip(blocks.gram, blocks.gradient, blocks.window, strict=True):
+    whole = np.zeros((p + 2 * count, p + 2 * count))
+    for gram, w in zip(blocks.gram, blocks.window, strict=True):
         at = np.append(np.arange(p), [p + 2 * w, p + 2 * w + 1])
         whole[np.ix_(at, at)] += gram
-        gradient[at] += slope
-    return whole, gradient
+    return whole
 
 
 @dataclass(frozen=True)
@@ -354,7 +366,7 @@ class Arrow:
         rest = np.linalg.solve(starts, (self.slopes / size)[:, :, None])[:, :, 0]
         inner = N - np.einsum("wpi,wiq->pq", mixed, back)
         slope = self.slope / own - np.einsum("wpi,wi->p", mixed, rest)
-        x = np.linalg.lstsq(inner, slope, rcond=1e-12)[0]
+        x = np.linalg.lstsq(inner, slope, rcond=1e-12)[0] if len(slope) else slope
         return x / own, (rest - back @ x) / size
 
 
@@ -369,51 +381,55 @@ def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int
     """The free numbers that predict the motion in the windows best, from a guess close to them."""
     search = _Search(windows, numbers, starts, blocks)
     sums, left, converged = search.run()
-    covariance, changes, weights = jackknife(sums, len(search.starts), len(search.numbers.free))
-    return JointFit(windows, search.numbers, search.starts, covariance, left, sums, changes, weights, converged)
+    spread = block_spread(sums, len(search.starts), len(search.numbers.free))
+    covariance, working, changes, weights = spread
+    time = search.cut.time
+    return JointFit(windows, search.numbers, search.starts, covariance, working, left, changes, weights, time, converged)
 
 
-def jackknife(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats]:
-    """Spread of the free numbers, from leaving out each block of a linearised fit.
+def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Spread of the free numbers by what each block of a linearised fit adds to them.
 
-    With N = sum of A_g^T A_g over the blocks and P the part of N^-1 that a block sees, leaving block g out changes
-    the parameters by  -N^-1 u_g,  u_g = (1 - S_g P)^-1 A_g^T r_g,  S_g = A_g^T A_g.
-    Returns  covariance (p, p), changes (G, p), and (G, p, G, p) covariances of the changes for independent
-             residuals of size 1
+    With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, block g changes the
+    numbers by  N^-1 (1 - S_g P_g)^-1/2 A_g^T r_g.  The root makes up for the residuals that the fit has taken away:
+    the sum of squares of the changes then has the right mean where the residuals are independent (Bell and McCaffrey
+    2002, known at second hand), and holds for blocks with any correlation inside.
+    Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
     """
-    whole, _ = assembled(blocks, count)
+    whole = assembled(blocks, count)
     size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     inverse, lost = _inverse(whole / np.outer(size, size))
-    G, q = blocks.gradient.shape
+    G = len(blocks.window)
     columns = np.concatenate([np.tile(np.arange(free), (G, 1)), free + 2 * blocks.window[:, None] + [0, 1]], axis=1)
     scale = size[columns]
     S = blocks.gram / (scale[:, :, None] * scale[:, None, :])
-    P = inverse[columns[:, :, None], columns[:, None, :]]
-    left = np.eye(q) - S @ P
-    with np.errstate(all="ignore"):
-        try:
-            grown = np.linalg.inv(left)
-        except np.linalg.LinAlgError:
-            grown = np.array([np.linalg.pinv(one) for one in left])
-    u = np.einsum("gij,gj->gi", grown, blocks.gradient / scale)
-    wide = np.zeros((G, len(whole)))
-    np.put_along_axis(wide, columns, u, axis=1)
-    changes = (wide @ inverse)[:, :free] / size[:free]
-    covariance = (G - 1) / G * changes.T @ changes
+    grown = _enlarged(S, inverse[columns[:, :, None], columns[:, None, :]])
+    to = inverse[:free][:, columns].transpose(1, 0, 2) @ grown  # (G, p, q)
+    changes = np.einsum("gpq,gq->gp", to, blocks.gradient / scale) / size[:free]
+    covariance = changes.T @ changes
     for i in np.flatnonzero(lost[:free]):
         covariance[i, i] = np.inf
-    # covariances under residuals of size 1: each block's own, less what the fit takes from all
     rows = np.zeros((G, free, len(whole)))
-    own = np.zeros((G, free, free))
-    for g in range(G):
-        to = inverse[:free][:, columns[g]] @ grown[g]
-        rows[g][:, columns[g]] = to @ S[g]
-        own[g] = to @ S[g] @ to.T
-    shared = np.einsum("gia,ab,hjb->gihj", rows, inverse, rows, optimize=True)
-    weights = -shared
-    weights[np.arange(G), :, np.arange(G), :] += own
+    taken = to @ S
+    np.put_along_axis(rows, np.broadcast_to(columns[:, None, :], taken.shape), taken, axis=2)
+    weights = -np.einsum("gia,ab,hjb->gihj", rows, inverse, rows, optimize=True)
+    weights[np.arange(G), :, np.arange(G), :] += taken @ np.swapaxes(to, 1, 2)
     weights /= size[:free][None, :, None, None] * size[:free][None, None, None, :]
-    return covariance, changes, weights
+    working = inverse[:free, :free] / np.outer(size[:free], size[:free])
+    return covariance, working, changes, weights
+
+
+def _enlarged(S: Floats, P: Floats) -> Floats:
+    """(1 - S P)^-1/2 (G, q, q), through the symmetric matrix R S R with R the root of P."""
+    values, vectors = np.linalg.eigh(P)
+    root = np.sqrt(np.maximum(values, 0.0))
+    R = (vectors * root[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    back = np.divide(1.0, root, out=np.zeros_like(root), where=root > 1e-9 * np.max(root))
+    inverse_root = (vectors * back[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    leverage, axes = np.linalg.eigh(R @ S @ R)
+    # a direction that one block alone determines leaves no residual there to be enlarged
+    factor = np.where(leverage < 1.0 - 1e-9, 1.0 / np.sqrt(np.maximum(1.0 - leverage, 1e-9)), 1.0)
+    return np.asarray(inverse_root @ ((axes * factor[:, None, :]) @ np.swapaxes(axes, 1, 2)) @ R)
 
 
 def _inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:

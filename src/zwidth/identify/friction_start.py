@@ -17,6 +17,11 @@ MOVING: Final = 0.7  # share of it that must be motion
 PARTS: Final = (8, 2, 1)
 TRIES: Final = 3
 OUTLYING: Final = 9.0
+PARTLY: Final = 0.2  # the same where nothing moves for longer
+FEWEST_ROWS: Final = 8
+GOOD: Final = 1.5  # times the noise, that the right numbers leave
+MOST_GUESSES: Final = 8  # that are followed
+LEVELS: Final = (0.3, 0.6, 0.85)  # shares of the forces below which a joint may stand
 DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
 
 
@@ -34,13 +39,16 @@ class Guess:
     error: float
 
 
-def weighted_balance(windows: Windows, size: int, step: float, delay: int) -> tuple[Floats, Floats]:
+def weighted_balance(
+    windows: Windows, size: int, step: float, delay: int, moving: float = MOVING
+) -> tuple[Floats, Floats]:
     """Rows of the force balance in segments of so many samples, half of each in the next.
 
     With w(t) = (1 - t^2)^3 on a segment, integrated by parts:
-        m int w'' x - b int -w' x ... = int w f - F_f int w [x' > 0] + F_b int w [x' < 0]
+        m int w'' x - b int w' x + F_f int w [x' > 0] - F_b int w [x' < 0] + k int w x = int w f
     step     of the encoder [m or rad]: what moves by less within an eighth of a segment counts as standing
-    Returns  (s, 4) of m, b, F forward and backward, and (s,) of the force; rows of much standing left out
+    moving   share of a segment that must be motion for its row to count
+    Returns  (s, 5) of m, b, F forward and backward, and k, and (s,) of the force
     """
     u = (np.arange(size) - 0.5 * (size - 1)) / (0.5 * size)
     weight = (1.0 - u**2) ** 3
@@ -66,52 +74,56 @@ def weighted_balance(windows: Windows, size: int, step: float, delay: int) -> tu
                 -(y @ slope) / half,
                 (side > 0.0) @ weight,
                 -((side < 0.0) @ weight),
+                windows.position[at] @ weight,
             ],
             axis=1,
         )
-        moving = np.mean(side != 0.0, axis=1) >= MOVING
-        rows.append(one[moving])
-        sides.append((force @ weight)[moving])
+        kept = np.mean(side != 0.0, axis=1) >= moving
+        rows.append(one[kept])
+        sides.append((force @ weight)[kept])
     if not rows:
-        return np.zeros((0, 4)), np.zeros(0)
+        return np.zeros((0, 5)), np.zeros(0)
     return np.concatenate(rows), np.concatenate(sides)
 
 
-def first_guess(windows: Windows, size: int, step: float) -> Guess | None:
+def first_guess(windows: Windows, size: int, step: float, *, spring: bool = False, moving: float = MOVING) -> Guess | None:
     """The numbers that balance the weighted forces best, over delays of the force; None of too few segments.
 
     Of free motion all numbers are those over the mass.
     """
     best: Guess | None = None
     for delay in DELAYS if windows.driven else (0,):
-        A, f = weighted_balance(windows, size, step, delay)
-        if len(f) < 8:
+        A, f = weighted_balance(windows, size, step, delay, moving)
+        if len(f) < FEWEST_ROWS:
             return None
+        A = A if spring else A[:, :4]
         if not windows.driven:
             A, f = A[:, 1:], -A[:, 0]
-        norms = np.linalg.norm(A, axis=0)
-        used = norms > 0.0
-        if not used.any():
-            return None
-        x, *_ = np.linalg.lstsq(A[:, used] / norms[used], f, rcond=1e-10)
-        left = f - A[:, used] / norms[used] @ x
-        total = float(f @ f)
-        explained = 1.0 - float(left @ left) / total if total > 0.0 else 0.0
-        numbers = np.zeros(A.shape[1])
-        numbers[used] = x / norms[used]
-        error = 0.0
-        if windows.driven:
-            inverse = np.linalg.pinv((A[:, used] / norms[used]).T @ (A[:, used] / norms[used]))
-            deviation = np.sqrt(2.0 * float(left @ left) / max(len(f) - 4, 1))  # segments overlap by half
-            error = float(deviation * np.sqrt(inverse[0, 0]) / norms[0] / numbers[0]) if numbers[0] != 0.0 else np.inf
-        else:
-            numbers = np.append(1.0, numbers)
-        m, b, forward, backward = numbers
-        T = float(np.mean(windows.period))
-        guess = Guess(np.array([m, b, b, forward, backward, 0.0, delay * T]), explained, error)
+        guess = _balanced(A, f, windows.driven, delay * float(np.mean(windows.period)))
         if best is None or guess.explained > best.explained:
             best = guess
     return best
+
+
+def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
+    norms = np.linalg.norm(A, axis=0)
+    used = norms > 0.0
+    scaled = A[:, used] / norms[used]
+    x = np.linalg.lstsq(scaled, f, rcond=1e-10)[0]
+    left, total = f - scaled @ x, float(f @ f)
+    explained = 1.0 - float(left @ left) / total if total > 0.0 else 0.0
+    numbers = np.zeros(A.shape[1])
+    numbers[used] = x / norms[used]
+    error = 0.0
+    if driven:
+        deviation = np.sqrt(2.0 * float(left @ left) / max(len(f) - A.shape[1], 1))  # segments overlap by half
+        spread = np.sqrt(np.diag(np.linalg.pinv(scaled.T @ scaled))[0]) / norms[used][0]
+        error = float(deviation * spread / abs(numbers[0])) if numbers[0] != 0.0 else np.inf
+    else:
+        numbers = np.append(1.0, numbers)
+    m, b, forward, backward = numbers[:4]
+    stiffness = float(numbers[4]) if len(numbers) > 4 else 0.0
+    return Guess(np.array([m, b, b, forward, backward, stiffness, delay]), explained, error)
 
 
 def first_starts(windows: Windows, values: Floats, starts: Floats | None = None) -> Floats:
@@ -137,39 +149,85 @@ def first_starts(windows: Windows, values: Floats, starts: Floats | None = None)
     return np.array(guesses)[best, np.arange(len(here))]
 
 
-def search_guess(windows: Windows, free: tuple[int, ...], tied: tuple[tuple[int, int], ...], step: float) -> tuple[Numbers, Floats]:
+def search_guess(windows: Windows, numbers: Numbers, step: float, noise: float) -> tuple[Numbers, Floats]:
     """Numbers and starts close to those that predict the motion best.
 
     Short windows forgive a wrong guess, for the start of each is its own; the longer ones then begin where those
-    have led.
+    have led. Of several first guesses that which does best in short windows is followed first, the others only
+    where it leaves more than the noise.
+    numbers  which are free and which are tied; those that are fixed keep their values
+    step     of the encoder;   noise  standard deviation of the readings' noise, steps included [m or rad]
     """
-    size, best = int(np.median(windows.length)), None
     short = windows.cut(PARTS[0])
-    for length in (size, size // 2, size // 4, size // 8):
-        guess = first_guess(windows, length, step) if length >= SHORTEST else None
-        if guess is None:
-            continue
-        values = guess.values.copy()
-        values[0] = max(values[0], 1e-3 * scales(windows)[0])
-        numbers = Numbers(values, tuple(i for i in free if i != 5), tied)
-        found = approach(short, numbers, first_starts(short, values), 6)
+    begun = [approach(short, one, first_starts(short, one.values), 6) for one in _guesses(windows, numbers, step)]
+    begun.sort(key=lambda one: float(np.sum(one[2])))
+    enough = (GOOD * noise) ** 2 * float(np.sum(windows.length))
+    best: tuple[Numbers, Floats, Floats] | None = None
+    for one in begun[:MOST_GUESSES]:
+        found = _followed(windows, short, one)
         if best is None or np.sum(found[2]) < np.sum(best[2]):
             best = found
-    if best is None:
-        raise ValueError("too few segments")
-    numbers, starts, _ = best
-    numbers = replace(numbers, free=free)
+        if np.sum(best[2]) <= enough:
+            break
+    assert best is not None
+    return best[0], best[1]
+
+
+def _followed(
+    windows: Windows, short: Windows, begun: tuple[Numbers, Floats, Floats]
+) -> tuple[Numbers, Floats, Floats]:
+    """From short windows to the whole ones; windows that are badly predicted then begin anew."""
+    numbers, starts, squares = begun
     before = short
     for parts in PARTS[1:]:
         now = windows.cut(parts) if parts > 1 else windows
-        at = np.searchsorted(before.first, now.first)
+        at = np.minimum(np.searchsorted(before.first, now.first), len(starts) - 1)
         numbers, starts, squares = approach(now, numbers, first_starts(now, numbers.values, starts[at]), 10)
         before = now
     for _ in range(TRIES):
         means = squares / windows.length
-        bad = means > OUTLYING * np.median(means)
-        if not bad.any():
+        if not np.any(means > OUTLYING * np.median(means)):
             break
         fresh = first_starts(windows, numbers.values, starts)
         numbers, starts, squares = approach(windows, numbers, fresh, 10)
-    return numbers, starts
+    return numbers, starts, squares
+
+
+def _guesses(windows: Windows, numbers: Numbers, step: float) -> list[Numbers]:
+    """First guesses by segments of several lengths; of motion in short bursts by those that are partly motion."""
+    sizes = scales(windows)
+    found = list[Floats]()
+    size = int(np.median(windows.length))
+    for length in dict.fromkeys((size, size // 2, size // 4, size // 8, 2 * SHORTEST)):
+        if length >= SHORTEST:
+            some = [first_guess(windows, length, step)]
+            some += [first_guess(windows, length, step, spring=True)] if 5 in numbers.free else []
+            found += [guess.values for guess in some if guess is not None]
+    partly = [first_guess(windows, length, step, moving=PARTLY) for length in (SHORTEST, 2 * SHORTEST)]
+    found += [guess.values for guess in partly if guess is not None]
+    found += [_in_bursts(windows, share) for share in LEVELS] if windows.driven else []
+    found = found or [np.array([sizes[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])]
+    guesses = []
+    for given in found:
+        values = given.copy()
+        values[0] = max(values[0], 1e-3 * sizes[0])
+        values[1:3] = np.maximum(values[1:3], 0.0)
+        values[3:5] += max(-0.5 * float(np.sum(values[3:5])), 0.0)
+        values = np.where(np.isin(np.arange(len(values)), numbers.free), values, numbers.values)
+        guesses.append(replace(numbers, values=values).with_free(values[list(numbers.free)]))
+    return guesses
+
+
+def _in_bursts(windows: Windows, share: float) -> Floats:
+    """Numbers of a joint that stands until the force is above this share of all forces, and then moves in bursts of
+    half a period of the force."""
+    sizes = np.abs(windows.force[windows.rows])
+    level, most = float(np.quantile(sizes, share)), float(np.max(sizes))
+    signs = np.sign(windows.force[windows.rows] - np.mean(windows.force[windows.rows]))
+    turns = max(int(np.sum(signs[1:] != signs[:-1])), 1)
+    T = float(np.mean(windows.period))
+    burst = 0.5 * len(signs) / turns * T
+    short = windows.cut(max(int(np.median(windows.length) * T / (2.0 * burst)), 1))
+    way = np.array([np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)])
+    moved = max(float(np.quantile(way, 0.8)), 1e-300)
+    return np.array([max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T])
