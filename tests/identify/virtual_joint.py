@@ -1,4 +1,4 @@
-"""Virtual benches of one joint: zwidth's own contact simulation of a mass with friction, counts, noise and delay."""
+"""Virtual benches of one joint: the contact simulation of a mass with friction, counts, noise and delay."""
 
 from __future__ import annotations
 
@@ -63,7 +63,13 @@ class Joint:
         parts = Nonlinear(friction=friction, counters=counters)
         square = one[:, None]
         plant = Plant(
-            self.mass * square, self.damping * square, self.stiffness * square, one, one, handle=one, nonlinear=parts
+            self.mass * square,
+            self.damping * square,
+            self.stiffness * square,
+            one,
+            one,
+            handle=one,
+            nonlinear=parts,
         )
         values = np.append(self.tones.ravel(), [self.bias, float(self.steps)])
         return Run(
@@ -105,7 +111,10 @@ def random_joint(seed, samples=4000):
     damping = span(0.01, 5.0) * mass * rate
     size = mass * rate**2 * span(1e-3, 0.1)
     tones = np.array(
-        [[size * rng.uniform(0.3, 1.0), rate * factor, rng.uniform(0.0, 2.0 * np.pi)] for factor in (1.0, 1.7, 2.9, 4.3)]
+        [
+            [size * rng.uniform(0.3, 1.0), rate * factor, rng.uniform(0.0, 2.0 * np.pi)]
+            for factor in (1.0, 1.7, 2.9, 4.3)
+        ]
     )
     peak = float(np.sum(tones[:, 0]))
     coulomb = 0.0 if rng.random() < 0.1 else span(0.003, 0.6) * peak

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from zwidth.device.device import Device
 from zwidth.identify.friction_command import ALIKE, compare_with_command
-from zwidth.identify.friction_fit import DELAY, JointFit
+from zwidth.identify.friction_fit import DELAY, MASS, STIFFNESS, JointFit
 from zwidth.identify.friction_joint import COLUMNS as COLUMNS
 from zwidth.identify.friction_joint import Joint
-from zwidth.identify.friction_start import SHORTEST, weighted_balance
+from zwidth.identify.friction_start import SHORTEST, weighted_balance, weighting
 from zwidth.identify.identification import Check, Estimate, Identification, refused
-from zwidth.identify.joint_identification import MASS, STIFFNESS, FittedJoint, fitted_joint
+from zwidth.identify.joint_identification import FittedJoint, fitted_joint
 from zwidth.identify.record import Record
 from zwidth.progress import Progress
 
@@ -91,6 +91,8 @@ def identification(
     lines[[not fitted.forward, not fitted.backward]] = np.nan
     position = fitted.joint.position
     remarks, details = remarks_of(fitted)
+    curves: dict[str, Any] = {"time_s": time, position: measured}
+    curves[position.replace("_", "_predicted_")] = predicted
     return JointIdentification(
         kind,
         device.label,
@@ -100,7 +102,7 @@ def identification(
         f"position in {len(fitted.unseen.first)} windows that were not fitted, each predicted from its own position and "
         "velocity at the beginning",
         tuple(remarks),
-        {"time_s": time, position: measured, position.replace("_", "_predicted_"): predicted},
+        curves,
         details,
         fitted.joint.angular,
         velocity,
@@ -109,7 +111,9 @@ def identification(
     )
 
 
-def _estimate(fitted: FittedJoint, name: str, quantity: str, weights: Any, *, key: str = "", least: float = -np.inf) -> Estimate:
+def _estimate(
+    fitted: FittedJoint, name: str, quantity: str, weights: Any, *, key: str = "", least: float = -np.inf
+) -> Estimate:
     """A sum over the numbers as an estimate, in the file's key where it has one; no less than `least`."""
     value, low, high = fitted.fit.interval(np.asarray(weights, dtype=float))
     path, factor = fitted.joint.paths.get(key, ("", 1.0))
@@ -145,7 +149,10 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
             _estimate(fitted, f"level {way}", "force", np.eye(7)[level]),
             _estimate(fitted, f"viscous friction {way}", "damping", np.eye(7)[damping]),
             _estimate(
-                fitted, f"friction {way} at {speed:.3g} {unit}/s", "force", np.eye(7)[level] + speed * np.eye(7)[damping]
+                fitted,
+                f"friction {way} at {speed:.3g} {unit}/s",
+                "force",
+                np.eye(7)[level] + speed * np.eye(7)[damping],
             ),
         ]
     if STIFFNESS in fitted.fit.numbers.free:
@@ -183,11 +190,10 @@ def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
     windows, v = fitted.fit.windows, fitted.fit.numbers.values
     size = int(max(np.median(windows.length) // 8, SHORTEST))
     delay = max(int(round(float(v[DELAY]) / float(np.mean(windows.period)))), 0)
-    A, force = weighted_balance(windows, size, fitted.motion.resolution, delay, 1.0)
-    u = (np.arange(size) - 0.5 * (size - 1)) / (0.5 * size)
-    whole = float(np.sum((1.0 - u**2) ** 3))
+    A, force = weighted_balance(windows, size, fitted.motion.resolution, [delay], 1.0)
+    whole = float(np.sum(weighting(size)[0]))
     one_way = np.abs(A[:, 2] + A[:, 3]) > 0.999 * whole
-    A, force = A[one_way], force[one_way]
+    A, force = A[one_way], force[one_way, 0]
     return A[:, 1] / whole, (force - v[MASS] * A[:, 0] - v[STIFFNESS] * A[:, 4]) / whole
 
 
@@ -250,7 +256,14 @@ def check_drift(fitted: FittedJoint) -> list[Check]:
         return []
     unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s^2"
     text = f"the bias drifts by about {drift:.3g} {unit} over {np.ptp(fit.block_time):.4g} s"
-    return [Check("drift", False, f"{text}; the numbers are those of its mean: let amplifier and sensor warm up", warning=True)]
+    return [
+        Check(
+            "drift",
+            False,
+            f"{text}; the numbers are those of its mean: let amplifier and sensor warm up",
+            warning=True,
+        )
+    ]
 
 
 def _bias_changes(fit: JointFit) -> Floats:
@@ -277,19 +290,25 @@ def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
             "friction is the mean of both levels, the bias half their difference"
         )
     if STIFFNESS in fitted.fit.numbers.free:
-        remarks.append(f"the bias is that at {joint.position} = {motion.reference:.6g}, and the spring acts from there")
+        remarks.append(
+            f"the bias is that at {joint.position} = {motion.reference:.6g}, and the spring acts from there"
+        )
     if motion.driven and joint.mass > 0.0:
         ratio = float(fitted.fit.numbers.values[MASS]) / joint.mass
         low, high = MASS_IN_FILE
         agrees = "agrees with" if low < ratio < high else "is far from"
-        remarks.append(f"{joint.mass_name} {agrees} the {joint.mass:.4g} {joint.unit('mass')} of the file, {ratio:.3g} of it")
+        remarks.append(
+            f"{joint.mass_name} {agrees} the {joint.mass:.4g} {joint.unit('mass')} of the file, {ratio:.3g} of it"
+        )
     if not fitted.fit.converged:
         remarks.append("the search for the best numbers did not arrive; take them with care")
     seen = compare_with_command(motion)
     if seen is not None:
         details |= {"command_gain": seen.gain, "command_lag_s": seen.lag, "command_correlation": seen.correlation}
         if seen.correlation < ALIKE:
-            remarks.append(f"{joint.command} and {motion.force_name} are hardly alike, correlation {seen.correlation:.2f}")
+            remarks.append(
+                f"{joint.command} and {motion.force_name} are hardly alike, correlation {seen.correlation:.2f}"
+            )
         else:
             remarks.append(
                 f"{motion.force_name} is {seen.gain:.4g} times {joint.command}, {1e3 * seen.lag:.3g} ms later"
@@ -302,7 +321,9 @@ def _force_text(joint: Joint, name: str) -> str:
     if not name:
         return "free motion: friction follows only as a ratio to the mass"
     if name == "current_A":
-        return f"used is current_A times the motor's torque constant, {joint.per_ampere:.4g} per ampere {joint.place}"
+        return (
+            f"used is current_A times the motor's torque constant, {joint.per_ampere:.4g} per ampere {joint.place}"
+        )
     if name == joint.command:
         return (
             f"used is {name}, a command: an amplifier's gain and offset are in all numbers; record {joint.measured} "

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf, isfinite, isnan
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from zwidth.device.faults import comma_list, plural
+from zwidth.device.faults import plural
 from zwidth.identify.friction_fit import Windows
 from zwidth.identify.friction_joint import Joint
 from zwidth.identify.friction_record import Motion
-from zwidth.identify.friction_start import SHORTEST, first_guess
 from zwidth.identify.identification import Check
-from zwidth.identify.record import Record
-
-Floats = NDArray[np.float64]
 
 FEWEST_COUNTS: Final = 10.0  # steps of the encoder
 FEWEST_WINDOWS: Final = 4  # with motion
@@ -30,11 +24,9 @@ LONGEST: Final = 5.0  # m, of a travel
 MOST_TURNS: Final = 1000.0  # rad, of a motor's travel
 FLAT: Final = 0.02  # share of a force's samples at its largest or smallest value
 FEW_LEVELS: Final = 50  # values of a force that is meant to have flat tops, as square waves have
-CERTAIN: Final = 0.2  # relative error of a mass whose sign counts
-GROUPS: Final = 6  # parts of a single record, in which the sense of force and motion must be the same
 
 
-def checks_of(motion: Motion, windows: Windows, joint: Joint, records: Sequence[Record]) -> list[Check]:
+def checks_of(motion: Motion, windows: Windows, joint: Joint) -> list[Check]:
     """All checks of what was recorded, in an order in which each assumes those before it."""
     checks = [check_motion(motion, joint), check_units(motion, joint)]
     if not checks[0].passed:
@@ -46,8 +38,6 @@ def checks_of(motion: Motion, windows: Windows, joint: Joint, records: Sequence[
         checks.append(check_directions(windows, motion))
         checks.append(check_standstill(motion))
         checks += check_saturation(motion, joint)
-        if motion.driven:
-            checks.append(check_sense(windows, motion, records))
     return checks
 
 
@@ -75,14 +65,18 @@ def check_units(motion: Motion, joint: Joint) -> Check:
     if motion.step and not isnan(joint.step):
         ratio = motion.step / joint.step
         slip = _slip(ratio, angular=joint.angular)
-        said = f"readings go in steps of {motion.step:.4g} {unit}, those of the file's encoder are {joint.step:.4g}"
+        said = (
+            f"readings go in steps of {motion.step:.4g} {unit}, those of the file's encoder are {joint.step:.4g}"
+        )
         if slip:
             faults.append(f"{said}: {joint.position} looks like {slip}; record it in {unit}")
         else:
             seen.append(said)
     room = joint.upper - joint.lower
     if isfinite(room) and travel > 3.0 * room:
-        faults.append(f"{joint.position} travels {travel:.4g} {unit}, the file's limits leave {room:.4g}; is it in {unit}?")
+        faults.append(
+            f"{joint.position} travels {travel:.4g} {unit}, the file's limits leave {room:.4g}; is it in {unit}?"
+        )
     if not joint.angular and travel > LONGEST:
         faults.append(f"position_m travels {travel:.4g} m; is it in millimetres? multiply by 0.001")
     if joint.angular and travel > MOST_TURNS:
@@ -112,7 +106,10 @@ def check_force(motion: Motion, joint: Joint) -> Check:
     forces, unit = motion.forces, joint.unit("force")
     if not motion.driven:
         return Check(
-            "force", True, f"{motion.force_name or joint.measured} is 0 throughout: taken as free motion", warning=True
+            "force",
+            True,
+            f"{motion.force_name or joint.measured} is 0 throughout: taken as free motion",
+            warning=True,
         )
     low, high = float(np.min(forces)), float(np.max(forces))
     if high - low <= 1e-3 * max(abs(low), abs(high)):
@@ -206,7 +203,7 @@ def check_saturation(motion: Motion, joint: Joint) -> list[Check]:
                 warning=True,
             )
         ]
-    levels = len(np.unique(forces[: 200_000]))
+    levels = len(np.unique(forces[:200_000]))
     flat = max(float(np.mean(forces == np.max(forces))), float(np.mean(forces == np.min(forces))))
     if flat > FLAT and levels > FEW_LEVELS:
         return [
@@ -220,47 +217,3 @@ def check_saturation(motion: Motion, joint: Joint) -> list[Check]:
             )
         ]
     return [Check("saturation", True, f"{name} has no flat tops")]
-
-
-def check_sense(windows: Windows, motion: Motion, records: Sequence[Record]) -> Check:
-    """That a positive force accelerates forward, in every record and all the time."""
-    size = max(int(np.median(windows.length)) // 2, SHORTEST)
-    groups = _groups(windows, motion, records)
-    masses = dict[str, float]()
-    for name, which in groups.items():
-        guesses = [first_guess(windows.chosen(which), n, motion.resolution) for n in (size, size // 2, size // 4) if n >= SHORTEST]
-        sure = [one for one in guesses if one is not None and one.error < CERTAIN]
-        if sure:
-            masses[name] = float(max(sure, key=lambda one: one.explained).values[0])
-    wrong = [name for name, mass in masses.items() if mass < 0.0]
-    if not wrong:
-        return Check("sense", True, "a positive force accelerates forward")
-    if len(wrong) == len(masses):
-        return Check(
-            "sense",
-            False,
-            f"a positive {motion.force_name} accelerates backward; change the sign of one of the two columns, or "
-            "exchange them if they are swapped",
-        )
-    return Check(
-        "sense",
-        False,
-        f"a positive {motion.force_name} accelerates backward in {comma_list(wrong)}, and forward in the rest; a sign has "
-        "flipped between them: change it there",
-    )
-
-
-def _groups(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, NDArray[np.bool_]]:
-    """Windows of each record, or of parts of a single one, by their names."""
-    record_of_run = {one.run: one.record for one in motion.sections}
-    owner = np.array([record_of_run[int(run)] for run in windows.run])
-    if len(records) > 1:
-        return {record.label: owner == n for n, record in enumerate(records) if np.any(owner == n)}
-    parts = np.array_split(np.arange(len(owner)), min(GROUPS, len(owner) // 2))
-    return {
-        f"{windows.time[part[0]]:.4g} to {windows.time[part[-1]] + windows.length[part[-1]] * windows.period[part[-1]]:.4g} s": np.isin(
-            np.arange(len(owner)), part
-        )
-        for part in parts
-        if len(part)
-    }

@@ -47,4 +47,6 @@ def compare_with_command(motion: Motion) -> Comparison | None:
     before, here, after = sums[inner - 1 : inner + 2, 0]
     bend = before - 2.0 * here + after
     part = 0.5 * (before - after) / bend if bend < 0.0 and best == inner else 0.0
-    return Comparison(float(sums[best, 1]), float((shifts[best] + part) * motion.sections[0].period), float(sums[best, 0]))
+    return Comparison(
+        float(sums[best, 1]), float((shifts[best] + part) * motion.sections[0].period), float(sums[best, 0])
+    )

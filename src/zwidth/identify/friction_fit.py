@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 LEVEL: Final = 0.95
-NUMBERS: Final = ("mass", "damping forward", "damping backward", "level forward", "level backward", "stiffness")
+MASS, STIFFNESS = 0, 5  # indices among the numbers
 DELAY: Final = 6  # index of the force's delay behind the six numbers of the motion
 STEP: Final = 1e-6  # of a derivative, of parameters in units of their effect
 MOST_STEPS: Final = 40  # of the optimiser
@@ -216,9 +216,6 @@ class _Search:
         self.edges = np.concatenate([[0], np.cumsum(self.cut.length)])
         self.scales = scales(windows)
 
-    def residuals(self, numbers: Numbers, starts: Floats) -> Floats:
-        return self.reading - predict(self.windows, numbers.values, starts)
-
     def linearised(self) -> tuple[Blocks, Floats]:
         """Sums over the blocks at the present numbers, and what remains."""
         p = len(self.numbers.free)
@@ -229,7 +226,9 @@ class _Search:
             moved = x.copy()
             step = STEP * self.scales[number]
             moved[i] += step
-            columns[:, i] = (predict(self.windows, self.numbers.with_free(moved).values, self.starts) - base) / step
+            columns[:, i] = (
+                predict(self.windows, self.numbers.with_free(moved).values, self.starts) - base
+            ) / step
         for j in range(2):
             starts = self.starts.copy()
             step = STEP * self.scales[7 + j]
@@ -270,17 +269,10 @@ class _Search:
         """The numbers a step further; each window's start as far along its step as predicts it best."""
         numbers = self._moved(step)
         guesses = [self.starts + share * along for share in SHARES]
-        squares = np.array([self.squares(numbers, guess) for guess in guesses])
+        squares = np.array([squares_of(self.windows, numbers, guess) for guess in guesses])
         best = np.argmin(squares, axis=0)
         starts = np.array(guesses)[best, np.arange(len(best))]
         return numbers, starts, float(np.sum(squares[best, np.arange(len(best))]))
-
-    def squares(self, numbers: Numbers, starts: Floats) -> Floats:
-        """Sum of squares of what remains in each window; inf where the prediction runs away."""
-        edges = np.cumsum(self.windows.length) - self.windows.length
-        with np.errstate(over="ignore", invalid="ignore"):
-            sums = np.add.reduceat(self.residuals(numbers, starts) ** 2, edges)
-        return np.where(np.isfinite(sums), sums, np.inf)
 
     @property
     def floor(self) -> Floats:
@@ -306,7 +298,9 @@ class _Search:
 def scales(windows: Windows) -> Floats:
     """Sizes (9,) of the seven numbers and of a start by what the record has of force, motion and time."""
     y, T = windows.position, float(np.mean(windows.period))
-    x = max(float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300)
+    x = max(
+        float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300
+    )
     length = float(np.mean(windows.length)) * T
     v = x / (0.25 * length)
     a = v / (0.25 * length)
@@ -370,11 +364,27 @@ class Arrow:
         return x / own, (rest - back @ x) / size
 
 
+def squares_of(windows: Windows, numbers: Numbers, starts: Floats) -> Floats:
+    """Sum of squares (W,) of what the numbers leave in each window; inf where the prediction runs away."""
+    edges = np.cumsum(windows.length) - windows.length
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = windows.position[windows.rows] - predict(windows, numbers.values, starts)
+        sums = np.add.reduceat(left**2, edges)
+    return np.where(np.isfinite(sums), sums, np.inf)
+
+
+def explained(windows: Windows, squares: Floats) -> float:
+    """1 less the squares (W,) that remain over those of the motion about its mean in each window."""
+    parts = zip(windows.first, windows.length, strict=True)
+    moved = [float(np.var(windows.position[a : a + n])) * n for a, n in parts]
+    return 1.0 - float(np.sum(squares)) / max(float(np.sum(moved)), 1e-300)
+
+
 def approach(windows: Windows, numbers: Numbers, starts: Floats, most: int) -> tuple[Numbers, Floats, Floats]:
     """A few steps of the search, for a better guess: numbers, starts (W, 2), and sums of squares (W,)."""
     search = _Search(windows, numbers, starts, 0)
     search.run(most)
-    return search.numbers, search.starts, search.squares(search.numbers, search.starts)
+    return search.numbers, search.starts, squares_of(windows, search.numbers, search.starts)
 
 
 def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int = BLOCKS) -> JointFit:
@@ -384,7 +394,9 @@ def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int
     spread = block_spread(sums, len(search.starts), len(search.numbers.free))
     covariance, working, changes, weights = spread
     time = search.cut.time
-    return JointFit(windows, search.numbers, search.starts, covariance, working, left, changes, weights, time, converged)
+    return JointFit(
+        windows, search.numbers, search.starts, covariance, working, left, changes, weights, time, converged
+    )
 
 
 def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats, Floats]:
@@ -400,7 +412,9 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     inverse, lost = _inverse(whole / np.outer(size, size))
     G = len(blocks.window)
-    columns = np.concatenate([np.tile(np.arange(free), (G, 1)), free + 2 * blocks.window[:, None] + [0, 1]], axis=1)
+    columns = np.concatenate(
+        [np.tile(np.arange(free), (G, 1)), free + 2 * blocks.window[:, None] + [0, 1]], axis=1
+    )
     scale = size[columns]
     S = blocks.gram / (scale[:, :, None] * scale[:, None, :])
     grown = _enlarged(S, inverse[columns[:, :, None], columns[:, None, :]])

@@ -137,7 +137,9 @@ def _of_plant(device: Device, name: str | None) -> Joint:
         return Joint("at the device's encoder", False, remarks=(remark,))
     n = len(plant.sensor)
     if name is None and n > 1:
-        raise fail(device.label, "joint", f"must be the number of the coordinate that was moved, from 0 to {n - 1}")
+        raise fail(
+            device.label, "joint", f"must be the number of the coordinate that was moved, from 0 to {n - 1}"
+        )
     if name is not None and not (name.isdigit() and int(name) < n):
         raise fail(device.label, "joint", f"must be a coordinate from 0 to {n - 1}, got '{name}'")
     i = int(name or 0)
@@ -148,7 +150,10 @@ def _of_plant(device: Device, name: str | None) -> Joint:
     if n == 1:
         s, a = float(plant.sensor[0]), float(plant.actuator[0])
         numbers = table(document, "plant")
-        ends = {key: ".0.0" * isinstance(numbers.get(key), list) for key in ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")}
+        ends = {
+            key: ".0.0" * isinstance(numbers.get(key), list)
+            for key in ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
+        }
         friction = ".0" * isinstance(table(document, "friction").get("coulomb_N"), list)
         paths = {
             "mass": (f"plant.mass_kg{ends['mass_kg']}", s * a),
@@ -156,7 +161,14 @@ def _of_plant(device: Device, name: str | None) -> Joint:
             "stiffness": (f"plant.stiffness_N_per_m{ends['stiffness_N_per_m']}", s * a),
             "coulomb": (f"friction.coulomb_N{friction}", abs(a)),
         }
-        return Joint("at the device's encoder", False, step=step, limit=float(limit), mass=float(plant.mass[0, 0]) / (s * a), paths=paths)
+        return Joint(
+            "at the device's encoder",
+            False,
+            step=step,
+            limit=float(limit),
+            mass=float(plant.mass[0, 0]) / (s * a),
+            paths=paths,
+        )
     levels = table(document, "friction").get("coulomb_N")
     path = {"coulomb": (f"friction.coulomb_N.{i}", 1.0)} if isinstance(levels, list) else {}
     remark = (
@@ -187,7 +199,9 @@ def _at_motor(device: Device, index: int, drive: Member, links: dict[str, Member
     ratio = float(np.asarray(drives.transmission)[..., index])
     counts = float(np.asarray(drives.encoder_counts)[..., index])
     paths = {"coulomb": (_path(drive, "coulomb_Nm", device.document), 1.0)}
-    remarks = [f"all numbers are those at the shaft of motor '{name}': angle and torque of the motor, not of the joint"]
+    remarks = [
+        f"all numbers are those at the shaft of motor '{name}': angle and torque of the motor, not of the joint"
+    ]
     if np.isfinite(ratio):
         paths |= _link_paths(link, device.document, ratio)
         remarks.append(
@@ -195,7 +209,9 @@ def _at_motor(device: Device, index: int, drive: Member, links: dict[str, Member
             "for the file has no key for it at the motor"
         )
     if any(key in link.entry for key in ("joint_coulomb_Nm", "joint_coulomb_N")):
-        remarks.append(f"what was identified includes the dry friction of joint '{link.entry['name']}'; remove it there")
+        remarks.append(
+            f"what was identified includes the dry friction of joint '{link.entry['name']}'; remove it there"
+        )
     return Joint(
         f"at the shaft of motor '{name}'",
         True,
@@ -212,7 +228,9 @@ def _at_link(device: Device, link: Member, drives: dict[str, tuple[int, Member]]
     entry, document = link.entry, device.document
     name, kind = entry["name"], entry.get("joint")
     if kind not in ("revolute", "prismatic"):
-        raise fail(device.label, "joint", f"'{name}' is {kind}; friction is identified of a revolute or prismatic one")
+        raise fail(
+            device.label, "joint", f"'{name}' is {kind}; friction is identified of a revolute or prismatic one"
+        )
     angular = kind == "revolute"
     lower, upper = entry.get("limits_rad" if angular else "limits_m", (-inf, inf))
     paths = {"coulomb": (_path(link, "joint_coulomb_Nm" if angular else "joint_coulomb_N", document), 1.0)}
@@ -234,7 +252,9 @@ def _at_link(device: Device, link: Member, drives: dict[str, tuple[int, Member]]
         }
         numbers = {key: value for key, value in numbers.items() if value == value}
         if drive.entry.get("coulomb_Nm"):
-            remarks.append(f"what was identified includes coulomb_Nm of motor '{drive.entry['name']}'; remove it there")
+            remarks.append(
+                f"what was identified includes coulomb_Nm of motor '{drive.entry['name']}'; remove it there"
+            )
     return Joint(
         f"at joint '{name}'",
         angular,

@@ -19,7 +19,9 @@ MOST_TURNS: Final = 8  # reversals within one part of an interval; more are thos
 
 
 @compiled_lean
-def flow(mass: float, damping: float, stiffness: float, h: float) -> tuple[float, float, float, float, float, float]:
+def flow(
+    mass: float, damping: float, stiffness: float, h: float
+) -> tuple[float, float, float, float, float, float]:
     """Transition of position and velocity over h, and what a unit force held meanwhile adds to them.
 
     m x'' + b x' + k x = f;  exp(A h) by its series after halving h, which is exact for any sign and size of b and

@@ -94,7 +94,9 @@ def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint:
     names = sorted({name for name, _ in columns})
     if len(names) > 1:
         listed = " and ".join(name or "no force" for name in names)
-        raise records[0].fault(f"and the other records differ in what drives the joint, {listed}; give records alike")
+        raise records[0].fault(
+            f"and the other records differ in what drives the joint, {listed}; give records alike"
+        )
     sections, run = list[Section](), 0
     for n, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
         name, factor = columns[n]
@@ -142,7 +144,9 @@ def planned_sections(runs: NDArray[np.int64], total: int) -> list[tuple[int, int
 def encoder_step(readings: Sequence[Floats]) -> float:
     """The step of which all differences of consecutive readings are whole multiples; 0 where there is none."""
     steps = np.abs(np.concatenate([np.diff(one) for one in readings]))
-    least = SHORTEST_STEP * max(float(np.max(steps, initial=0.0)), max(float(np.max(np.abs(one))) for one in readings) * 1e-3)
+    least = SHORTEST_STEP * max(
+        float(np.max(steps, initial=0.0)), max(float(np.max(np.abs(one))) for one in readings) * 1e-3
+    )
     steps = steps[steps > least]
     if not len(steps):
         return 0.0
@@ -172,7 +176,9 @@ def windows_of(motion: Motion) -> Windows:
     for many in MANY:
         windows = _cut(motion, max(total // many, FEWEST))
         bends = [_bend(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)]
-        moves = np.array([np.ptp(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])
+        moves = np.array(
+            [np.ptp(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)]
+        )
         moving = moves > STANDING * motion.resolution
         if moving.any() and np.median(np.array(bends)[moving]) >= BEND * motion.resolution:
             break

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.identify.friction_fit import Numbers, Windows, approach, predict, scales
+from zwidth.identify.friction_fit import MASS, STIFFNESS, Numbers, Windows, approach, predict, scales
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +21,6 @@ OUTLYING: Final = 9.0
 PARTLY: Final = 0.2  # the same where nothing moves for longer
 FEWEST_ROWS: Final = 8
 GOOD: Final = 1.5  # times the noise, that the right numbers leave
-MOST_GUESSES: Final = 8  # that are followed
 LEVELS: Final = (0.3, 0.6, 0.85)  # shares of the forces below which a joint may stand
 DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
 
@@ -40,69 +40,73 @@ class Guess:
 
 
 def weighted_balance(
-    windows: Windows, size: int, step: float, delay: int, moving: float = MOVING
+    windows: Windows, size: int, step: float, delays: Sequence[int], moving: float = MOVING
 ) -> tuple[Floats, Floats]:
     """Rows of the force balance in segments of so many samples, half of each in the next.
 
     With w(t) = (1 - t^2)^3 on a segment, integrated by parts:
         m int w'' x - b int w' x + F_f int w [x' > 0] - F_b int w [x' < 0] + k int w x = int w f
     step     of the encoder [m or rad]: what moves by less within an eighth of a segment counts as standing
+    delays   (D,) of the force, samples
     moving   share of a segment that must be motion for its row to count
-    Returns  (s, 5) of m, b, F forward and backward, and k, and (s,) of the force
+    Returns  (s, 5) of m, b, F forward and backward, and k, and (s, D) of the force
     """
-    u = (np.arange(size) - 0.5 * (size - 1)) / (0.5 * size)
-    weight = (1.0 - u**2) ** 3
-    slope = -6.0 * u * (1.0 - u**2) ** 2
-    bend = -6.0 * (1.0 - u**2) ** 2 + 24.0 * u**2 * (1.0 - u**2)
+    weight, slope, bend = weighting(size)
     reach = max(size // 8, 1)
-    rows, sides = list[Floats](), list[Floats]()
-    for first, length, T in zip(windows.first, windows.length, windows.period, strict=True):
-        starts = np.arange(first, first + length - size + 1, max(size // 2, 1))
-        if not len(starts):
-            continue
-        at = starts[:, None] + np.arange(size)
-        y = windows.position[at] - windows.position[starts][:, None]
-        last = len(windows.position) - 1
-        moved = windows.position[np.minimum(at + reach, last)] - windows.position[np.maximum(at - reach, 0)]
-        side = np.where(np.abs(moved) > 1.5 * step, np.sign(moved), 0.0)
-        here, before = np.clip(at - delay, 0, last), np.clip(at - delay - 1, 0, last)
-        force = 0.5 * (windows.force[here] + windows.force[before])
-        half = 0.5 * size * T
-        one = np.stack(
-            [
-                y @ bend / half**2,
-                -(y @ slope) / half,
-                (side > 0.0) @ weight,
-                -((side < 0.0) @ weight),
-                windows.position[at] @ weight,
-            ],
-            axis=1,
-        )
-        kept = np.mean(side != 0.0, axis=1) >= moving
-        rows.append(one[kept])
-        sides.append((force @ weight)[kept])
-    if not rows:
-        return np.zeros((0, 5)), np.zeros(0)
-    return np.concatenate(rows), np.concatenate(sides)
+    starts = [
+        np.arange(first, first + length - size + 1, max(size // 2, 1))
+        for first, length in zip(windows.first, windows.length, strict=True)
+    ]
+    T = np.repeat(windows.period, [len(some) for some in starts])
+    at = np.concatenate(starts)[:, None] + np.arange(size)
+    last = len(windows.position) - 1
+    moved = windows.position[np.minimum(at + reach, last)] - windows.position[np.maximum(at - reach, 0)]
+    side = np.where(np.abs(moved) > 1.5 * step, np.sign(moved), 0.0)
+    kept = np.mean(side != 0.0, axis=1) >= moving
+    at, side, T = at[kept], side[kept], T[kept]
+    place = windows.position[at]
+    y = place - place[:, :1]
+    rows = [
+        y @ bend / T**2,
+        -(y @ slope) / T,
+        (side > 0.0) @ weight,
+        -((side < 0.0) @ weight),
+        place @ weight,
+    ]
+    # a force is held from its sample to the next: its mean about a sample is that of two
+    forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
+    right = [forces[np.clip(at - delay, 0, last)] @ weight for delay in delays]
+    return np.stack(rows, axis=1), np.stack(right, axis=1)
 
 
-def first_guess(windows: Windows, size: int, step: float, *, spring: bool = False, moving: float = MOVING) -> Guess | None:
+def weighting(size: int) -> tuple[Floats, Floats, Floats]:
+    """w(t) = (1 - t^2)^3 at so many samples in [-1, 1], its slope and its bend per sample.
+
+    Slope and bend are differences of the samples, not derivatives: summed by parts they give the second differences
+    of a position, which are exactly what a force held from sample to sample causes in a free mass.
+    """
+    w = (1.0 - np.linspace(-1.0, 1.0, size) ** 2) ** 3
+    around = np.concatenate([[0.0], w, [0.0]])
+    return w, 0.5 * (around[2:] - around[:-2]), around[2:] - 2.0 * w + around[:-2]
+
+
+def first_guess(
+    windows: Windows, size: int, step: float, *, spring: bool = False, moving: float = MOVING
+) -> Guess | None:
     """The numbers that balance the weighted forces best, over delays of the force; None of too few segments.
 
     Of free motion all numbers are those over the mass.
     """
-    best: Guess | None = None
-    for delay in DELAYS if windows.driven else (0,):
-        A, f = weighted_balance(windows, size, step, delay, moving)
-        if len(f) < FEWEST_ROWS:
-            return None
-        A = A if spring else A[:, :4]
-        if not windows.driven:
-            A, f = A[:, 1:], -A[:, 0]
-        guess = _balanced(A, f, windows.driven, delay * float(np.mean(windows.period)))
-        if best is None or guess.explained > best.explained:
-            best = guess
-    return best
+    delays = DELAYS if windows.driven else DELAYS[:1]
+    A, forces = weighted_balance(windows, size, step, delays, moving)
+    if len(A) < FEWEST_ROWS:
+        return None
+    A = A if spring else A[:, :4]
+    T = float(np.mean(windows.period))
+    if not windows.driven:
+        return _balanced(A[:, 1:], -A[:, 0], False, 0.0)
+    guesses = [_balanced(A, f, True, delay * T) for delay, f in zip(delays, forces.T, strict=True)]
+    return max(guesses, key=lambda guess: guess.explained)
 
 
 def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
@@ -133,7 +137,8 @@ def first_starts(windows: Windows, values: Floats, starts: Floats | None = None)
     """
     here = windows.position[windows.first]
     guesses = [np.stack([here, np.zeros(len(here))], axis=1)]
-    for reach in (1, 2, 4, 8, 16, *(windows.length // share for share in (3, 6, 12, 24))):
+    reaches = [np.full(len(here), n) for n in (1, 2, 4, 8, 16)] + [windows.length // n for n in (3, 6, 12, 24)]
+    for reach in reaches:
         n = np.minimum(np.maximum(reach, 1), (windows.length - 1) // 2)
         middle, end = windows.position[windows.first + n], windows.position[windows.first + 2 * n]
         span = 2.0 * np.maximum(n, 1) * windows.period
@@ -146,7 +151,7 @@ def first_starts(windows: Windows, values: Floats, starts: Floats | None = None)
     with np.errstate(over="ignore", invalid="ignore"):
         costs = [np.add.reduceat((reading - predict(windows, values, guess)) ** 2, edges) for guess in guesses]
     best = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=0)
-    return np.array(guesses)[best, np.arange(len(here))]
+    return np.asarray(np.array(guesses)[best, np.arange(len(here))])
 
 
 def search_guess(windows: Windows, numbers: Numbers, step: float, noise: float) -> tuple[Numbers, Floats]:
@@ -159,12 +164,10 @@ def search_guess(windows: Windows, numbers: Numbers, step: float, noise: float) 
     step     of the encoder;   noise  standard deviation of the readings' noise, steps included [m or rad]
     """
     short = windows.cut(PARTS[0])
-    begun = [approach(short, one, first_starts(short, one.values), 6) for one in _guesses(windows, numbers, step)]
-    begun.sort(key=lambda one: float(np.sum(one[2])))
     enough = (GOOD * noise) ** 2 * float(np.sum(windows.length))
     best: tuple[Numbers, Floats, Floats] | None = None
-    for one in begun[:MOST_GUESSES]:
-        found = _followed(windows, short, one)
+    for one in _guesses(windows, numbers, step):
+        found = _followed(windows, short, approach(short, one, first_starts(short, one.values), 6))
         if best is None or np.sum(found[2]) < np.sum(best[2]):
             best = found
         if np.sum(best[2]) <= enough:
@@ -193,29 +196,23 @@ def _followed(
     return numbers, starts, squares
 
 
-def _guesses(windows: Windows, numbers: Numbers, step: float) -> list[Numbers]:
-    """First guesses by segments of several lengths; of motion in short bursts by those that are partly motion."""
+def _guesses(windows: Windows, numbers: Numbers, step: float) -> Iterator[Numbers]:
+    """First guesses: by segments of several lengths, the best first; then, for motion in short bursts, by segments
+    that are partly motion, and by levels below which the joint may stand."""
     sizes = scales(windows)
-    found = list[Floats]()
-    size = int(np.median(windows.length))
-    for length in dict.fromkeys((size, size // 2, size // 4, size // 8, 2 * SHORTEST)):
-        if length >= SHORTEST:
-            some = [first_guess(windows, length, step)]
-            some += [first_guess(windows, length, step, spring=True)] if 5 in numbers.free else []
-            found += [guess.values for guess in some if guess is not None]
-    partly = [first_guess(windows, length, step, moving=PARTLY) for length in (SHORTEST, 2 * SHORTEST)]
-    found += [guess.values for guess in partly if guess is not None]
-    found += [_in_bursts(windows, share) for share in LEVELS] if windows.driven else []
-    found = found or [np.array([sizes[0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])]
-    guesses = []
-    for given in found:
-        values = given.copy()
-        values[0] = max(values[0], 1e-3 * sizes[0])
-        values[1:3] = np.maximum(values[1:3], 0.0)
-        values[3:5] += max(-0.5 * float(np.sum(values[3:5])), 0.0)
-        values = np.where(np.isin(np.arange(len(values)), numbers.free), values, numbers.values)
-        guesses.append(replace(numbers, values=values).with_free(values[list(numbers.free)]))
-    return guesses
+    size, spring = int(np.median(windows.length)), STIFFNESS in numbers.free
+    lengths = [n for n in dict.fromkeys((size, size // 2, size // 4, size // 8, 2 * SHORTEST)) if n >= SHORTEST]
+    found = [first_guess(windows, n, step, spring=spring) for n in lengths]
+    sure = sorted((one for one in found if one is not None), key=lambda one: -one.explained)
+    partly = [first_guess(windows, n, step, moving=PARTLY) for n in (SHORTEST, 2 * SHORTEST)]
+    values = [one.values for one in (*sure, *partly) if one is not None]
+    values += [_in_bursts(windows, share) for share in LEVELS] if windows.driven else []
+    for given in values or [np.eye(len(sizes))[MASS] * sizes]:
+        one = given[: len(numbers.values)].copy()
+        one[MASS] = max(one[MASS], 1e-3 * sizes[MASS])
+        one[1:3] = np.maximum(one[1:3], 0.0)
+        one[3:5] += max(-0.5 * float(np.sum(one[3:5])), 0.0)
+        yield numbers.with_free(one[list(numbers.free)])
 
 
 def _in_bursts(windows: Windows, share: float) -> Floats:

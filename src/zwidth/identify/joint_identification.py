@@ -14,16 +14,20 @@ from zwidth.device.faults import fail
 from zwidth.identify.friction_checks import checks_of, directions
 from zwidth.identify.friction_fit import (
     DELAY,
+    MASS,
+    STIFFNESS,
     JointFit,
     Numbers,
     Windows,
     approach,
+    explained,
     fit_joint,
     predict,
 )
 from zwidth.identify.friction_joint import Joint, joint_of
 from zwidth.identify.friction_record import Motion, read_motion, windows_of
 from zwidth.identify.friction_start import first_starts, search_guess
+from zwidth.identify.friction_sense import reason_of_misfit
 from zwidth.identify.identification import Check
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling
@@ -31,7 +35,6 @@ from zwidth.progress import Progress
 
 Floats = NDArray[np.float64]
 
-MASS, STIFFNESS = 0, 5  # among the numbers of a fit
 UNSEEN: Final = 3  # of so many windows one is kept for validation
 OUTLYING: Final = 6.0  # times the usual deviation, from which a window does not follow the model
 MOST_OUTLYING: Final = 0.25  # share of the windows that may be left out for it
@@ -99,7 +102,9 @@ def fitted_joint(
                     are no numbers, and no mass in the file
     """
     if not records:
-        raise fail(device.label, "", "there is no record; give at least one file with columns time_s and position_m")
+        raise fail(
+            device.label, "", "there is no record; give at least one file with columns time_s and position_m"
+        )
     joint = joint_of(device, name)
     for record in records:
         joint.force_column(record)  # columns are wrong before samples are
@@ -120,14 +125,16 @@ def fitted_joint(
         return joint, tuple(checks), None
     motion = _limited(motion, joint)
     windows = windows_of(motion)
-    checks += checks_of(motion, windows, joint, records)
+    checks += checks_of(motion, windows, joint)
     if any(not (check.passed or check.warning) for check in checks):
         return joint, tuple(checks), None
     mass = 1.0
     if mass_from_file and not motion.driven:
         mass = joint.mass
         if not mass > 0.0:
-            raise fail(device.label, "", f"gives no mass that moves {joint.place}; set it, or record a driven motion")
+            raise fail(
+                device.label, "", f"gives no mass that moves {joint.place}; set it, or record a driven motion"
+            )
     report("fitting", steps - 3, steps)
     forward, backward = directions(windows, motion)
     numbers = _numbers(motion, forward, backward, mass, spring is not False)
@@ -138,13 +145,13 @@ def fitted_joint(
     _, starts, squares = approach(unseen, replace(fit.numbers, free=(), tied=()), starts, 20)
     kept = squares <= OUTLYING**2 * _mean_square(fit, motion) * unseen.length
     kept |= np.mean(~kept) > MOST_OUTLYING  # then it is the model that is wrong
-    explained = _explained(unseen.chosen(kept), squares[kept])
+    share = explained(unseen.chosen(kept), squares[kept])
     unit_mass = not motion.driven and not mass_from_file
     outlying += tuple(unseen.time[~kept].tolist())
     fitted = FittedJoint(
-        joint, motion, samplings[0], (), fit, unseen, starts, forward, backward, explained, outlying, unit_mass
+        joint, motion, samplings[0], (), fit, unseen, starts, forward, backward, share, outlying, unit_mass
     )
-    checks.append(_check_model(fitted, len(windows.first)))
+    checks.append(_check_model(fitted, windows, numbers, records))
     fitted = replace(fitted, checks=tuple(checks))
     return joint, tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
 
@@ -169,7 +176,7 @@ def _limited(motion: Motion, joint: Joint) -> Motion:
 
 def _numbers(motion: Motion, forward: bool, backward: bool, mass: float, spring: bool) -> Numbers:
     """Which numbers are fitted: those of a direction only where the joint slides so."""
-    free = (MASS, DELAY) if motion.driven else ()
+    free: tuple[int, ...] = (MASS, DELAY) if motion.driven else ()
     free += (1, 3) if forward else ()
     free += (2, 4) if backward else ()
     free += (STIFFNESS,) if spring else ()
@@ -179,14 +186,14 @@ def _numbers(motion: Motion, forward: bool, backward: bool, mass: float, spring:
 
 def _unseen(windows: Windows) -> NDArray[np.bool_]:
     """Every third window."""
-    return np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1
+    return np.asarray(np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1)
 
 
 def _mean_square(fit: JointFit, motion: Motion) -> float:
     """Usual square of what remains, at least that of the noise."""
     edges = np.cumsum(fit.windows.length) - fit.windows.length
     means = np.add.reduceat(fit.residuals**2, edges) / fit.windows.length
-    return max(float(np.median(means)), motion.deviation ** 2)
+    return max(float(np.median(means)), motion.deviation**2)
 
 
 def _fit(
@@ -207,36 +214,28 @@ def _fit(
         value, error, _ = fit.combination(np.eye(7)[STIFFNESS])
         if not abs(value) > SHOWN * error:
             free = tuple(i for i in numbers.free if i != STIFFNESS)
-            plain = replace(fit.numbers, free=free, values=np.where(np.arange(7) == STIFFNESS, 0.0, fit.numbers.values))
-            guess, starts = search_guess(fit.windows, plain, motion.resolution, motion.deviation)
-            fit = fit_joint(fit.windows, guess, starts)
+            plain = replace(
+                fit.numbers, free=free, values=np.where(np.arange(7) == STIFFNESS, 0.0, fit.numbers.values)
+            )
+            fit = fit_joint(fit.windows, plain, fit.starts)
     return fit, tuple(seen.time[bad].tolist())
 
 
-def _explained(windows: Windows, squares: Floats) -> float:
-    """1 less the squares that remain over those of the motion about its mean in each window."""
-    moved = [float(np.var(windows.position[a : a + n])) * n for a, n in zip(windows.first, windows.length, strict=True)]
-    return 1.0 - float(np.sum(squares)) / float(np.sum(moved))
-
-
-def _check_model(fitted: FittedJoint, count: int) -> Check:
-    """That one mass with friction predicts the windows that were not fitted."""
+def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, records: Sequence[Record]) -> Check:
+    """That one mass with friction predicts the windows that were not fitted; else why not."""
+    count = len(windows.first)
     text = f"{100.0 * max(fitted.explained, 0.0):.4g} % of the motion in unseen windows is predicted"
     times = ", ".join(f"{t:.4g}" for t in sorted(fitted.outlying)[:5])
-    if fitted.explained < LEAST_EXPLAINED:
-        return Check(
-            "model",
-            False,
-            f"{text}: no mass with friction moves so under this force; columns may be swapped or another force, as of "
-            "a hand or an end stop, may act",
-        )
-    if len(fitted.outlying) > MOST_OUTLYING * count:
-        return Check("model", False, f"{text}, and {len(fitted.outlying)} of {count} windows follow no such model, at {times} s")
+    if fitted.explained < LEAST_EXPLAINED or len(fitted.outlying) > MOST_OUTLYING * count:
+        text += f"; {len(fitted.outlying)} of {count} windows do not follow the rest" * bool(fitted.outlying)
+        cause = reason_of_misfit(windows, fitted.motion, numbers, records)
+        other = "no mass with friction moves so under this force; another one, as of a hand or an end stop, may act"
+        return Check("model", False, f"{text}: {cause or other}")
     if fitted.outlying:
         return Check(
             "model",
             False,
-            f"{text}; the windows at {times} s do not follow the rest: an end stop, a hand or a saturated stretch?",
+            f"{text}; the windows at {times} s do not follow the rest: an end stop, a hand, a saturated stretch?",
             warning=True,
         )
     return Check("model", True, text)

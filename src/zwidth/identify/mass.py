@@ -27,7 +27,7 @@ def identify_mass(
     spring: bool | None = None,
     progress: Progress | None = None,
 ) -> Identification:
-    """Mass that resists a joint's acceleration: at a motor its rotor and the links behind it over the ratio squared.
+    """Mass that resists a joint's acceleration; at a motor of rotor and links together.
 
     The same fit as `friction.identify_friction`, whose columns and options these are; friction is told too. Where
     friction or a delay hide the mass, so that its interval reaches 0, the data are refused.
