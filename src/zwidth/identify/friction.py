@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from zwidth.device.device import Device
 from zwidth.identify.friction_command import ALIKE, compare_with_command
-from zwidth.identify.friction_fit import DELAY, MASS, STIFFNESS, JointFit
+from zwidth.identify.friction_fit import DELAY, MASS, STIFFNESS, bias_of_windows
 from zwidth.identify.friction_joint import COLUMNS as COLUMNS
 from zwidth.identify.friction_joint import Joint
 from zwidth.identify.friction_start import SHORTEST, weighted_balance, weighting
@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 ALIKE_SPEEDS: Final = 0.98  # correlation of dry and viscous friction from which one speed is seen
 UNKNOWN_MASS: Final = 0.5  # half the interval over the mass, from which the mass is not known
 DRIFTING: Final = 4.0  # standard errors of a drift that is told
+FEWEST_FOR_DRIFT: Final = 8  # windows
 DRIFT_SHARE: Final = 0.05  # of the dry friction that it must have
 MASS_IN_FILE: Final = 0.5, 2.0  # ratios to the file's mass within which the two agree
 
@@ -99,8 +100,8 @@ def identification(
         tuple(checks),
         tuple(estimates),
         fitted.explained,
-        f"position in {len(fitted.unseen.first)} windows that were not fitted, each predicted from its own position and "
-        "velocity at the beginning",
+        f"position in {len(fitted.unseen.first)} windows that were not fitted, each from its own position and velocity "
+        "at the beginning; the share of what a straight line leaves there",
         tuple(remarks),
         curves,
         details,
@@ -244,18 +245,22 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
 
 def check_drift(fitted: FittedJoint) -> list[Check]:
     """Whether the bias drifts: a warning, or nothing."""
-    fit = fitted.fit
-    if not (fitted.forward and fitted.backward) or np.ptp(fit.block_time) == 0.0:
+    windows = fitted.fit.windows
+    if not (fitted.forward and fitted.backward) or len(windows.first) < FEWEST_FOR_DRIFT:
         return []
-    sizes, time = _bias_changes(fit), fit.block_time - np.mean(fit.block_time)
-    slope = float(sizes @ time / (time @ time))
-    error = float(np.sqrt(np.sum((sizes * time) ** 2)) / (time @ time))
-    level = 0.5 * abs(float(fit.numbers.values[3] + fit.numbers.values[4]))
-    drift = slope * len(sizes) * float(np.ptp(time))
+    difference, weight = bias_of_windows(fitted.fit)
+    time = windows.time - np.average(windows.time, weights=weight)
+    spread = float(weight @ time**2)
+    if not spread > 0.0:
+        return []
+    slope = float((weight * time) @ difference) / spread
+    error = float(np.sqrt(np.sum((weight * time * (difference - slope * time)) ** 2))) / spread
+    level = 0.5 * abs(float(fitted.fit.numbers.values[3] + fitted.fit.numbers.values[4]))
+    drift = slope * float(np.ptp(time))
     if abs(slope) < DRIFTING * error or abs(drift) < DRIFT_SHARE * level:
         return []
     unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s^2"
-    text = f"the bias drifts by about {drift:.3g} {unit} over {np.ptp(fit.block_time):.4g} s"
+    text = f"the bias drifts by about {drift:.3g} {unit} over {np.ptp(time):.4g} s"
     return [
         Check(
             "drift",
@@ -266,20 +271,14 @@ def check_drift(fitted: FittedJoint) -> list[Check]:
     ]
 
 
-def _bias_changes(fit: JointFit) -> Floats:
-    """What each block adds to the bias (G,)."""
-    free = fit.numbers.free
-    return np.asarray(0.5 * (fit.changes[:, free.index(4)] - fit.changes[:, free.index(3)]))
-
-
 def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
     """Sentences beside the numbers, and further keys of the result."""
     joint, motion = fitted.joint, fitted.motion
-    used = _force_text(joint, motion.force_name)
+    used = _force_text(joint, motion.force_name if motion.driven else "")
     remarks = [*joint.remarks, used]
     details: dict[str, Any] = {
         "measured_at": joint.place,
-        "force": motion.force_name or None,
+        "force": motion.force_name if motion.driven else None,
         "sampling_period_s": fitted.sampling.period,
         "reference_" + joint.position: motion.reference,
         "residual_over_noise": fitted.misfit if isfinite(fitted.misfit) else None,

@@ -78,7 +78,7 @@ def check_units(motion: Motion, joint: Joint) -> Check:
             f"{joint.position} travels {travel:.4g} {unit}, the file's limits leave {room:.4g}; is it in {unit}?"
         )
     if not joint.angular and travel > LONGEST:
-        faults.append(f"position_m travels {travel:.4g} m; is it in millimetres? multiply by 0.001")
+        faults.append(f"position_m travels {travel:.4g} m; is it in millimetres, or swapped with the force?")
     if joint.angular and travel > MOST_TURNS:
         faults.append(f"angle_rad travels {travel:.4g} rad; is it in degrees, or in counts?")
     if motion.driven and isfinite(joint.limit):
@@ -107,8 +107,8 @@ def check_force(motion: Motion, joint: Joint) -> Check:
     if not motion.driven:
         return Check(
             "force",
-            True,
-            f"{motion.force_name or joint.measured} is 0 throughout: taken as free motion",
+            False,
+            f"{motion.force_name} is 0 throughout: taken as free motion",
             warning=True,
         )
     low, high = float(np.min(forces)), float(np.max(forces))

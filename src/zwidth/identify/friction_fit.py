@@ -28,8 +28,9 @@ MOST_STEPS: Final = 40  # of the optimiser
 ARRIVED: Final = 1e-8  # relative fall of the sum of squares that ends it
 RIDGES: Final = (0.0, 1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4)  # of Levenberg and Marquardt, tried in this order
 LONGEST_DELAY: Final = (-1.0, 6.0)  # of the force, samples
-BLOCKS: Final = 40  # of consecutive samples, of all windows together, at least
+BLOCKS: Final = 24  # of consecutive samples, of all windows together, at least
 SHARES: Final = (1.0, 0.3, 0.0)  # of a step that a window's start may take
+LEVERAGE: Final = 1e-9  # short of 1, from which one block alone determines a direction
 LEAST_SHARE: Final = 1e-3  # of a variance that must be seen in the blocks' changes
 LEAST_MASS: Final = 1e-3  # times b T: a mass that stops within a thousandth of a sample
 
@@ -151,7 +152,6 @@ class JointFit:
     residuals   (n,) at `windows.rows`
     changes     (G, p) of the numbers by each block's residuals, enlarged for what the fit takes from them
     weights     (G, p, G, p) covariances of these changes if the residuals were independent, of size 1
-    block_time  (G,) when each block begins [s]
     converged   whether the optimiser arrived
     """
 
@@ -163,7 +163,6 @@ class JointFit:
     residuals: Floats
     changes: Floats
     weights: Floats
-    block_time: Floats
     converged: bool
 
     @property
@@ -188,12 +187,12 @@ class JointFit:
         known = c != 0.0
         if np.any(~np.isfinite(np.diag(self.covariance)[known])):
             return value, np.inf, np.inf
-        sizes = self.changes @ c
         spread = np.einsum("i,gihj,j->gh", c, self.weights, c)
-        expected, exact = float(np.trace(spread)), float(c @ self.working @ c)
-        if not expected > LEAST_SHARE * exact:
+        expected = float(np.trace(spread))
+        if not expected > LEAST_SHARE * float(c @ self.working @ c):
             return value, np.inf, np.inf
-        error = float(np.sqrt(np.sum(sizes**2) * exact / expected))
+        blocks = len(self.changes)
+        error = float(np.sqrt((blocks - 1) / blocks * np.sum((self.changes @ c) ** 2)))
         freedom = expected**2 / float(np.sum(spread**2))
         return value, error, float(t.ppf(0.5 + 0.5 * LEVEL, max(freedom, 1.0)))
 
@@ -374,10 +373,16 @@ def squares_of(windows: Windows, numbers: Numbers, starts: Floats) -> Floats:
 
 
 def explained(windows: Windows, squares: Floats) -> float:
-    """1 less the squares (W,) that remain over those of the motion about its mean in each window."""
-    parts = zip(windows.first, windows.length, strict=True)
-    moved = [float(np.var(windows.position[a : a + n])) * n for a, n in parts]
-    return 1.0 - float(np.sum(squares)) / max(float(np.sum(moved)), 1e-300)
+    """1 less the squares (W,) that remain over those that the best straight line leaves in each window.
+
+    The start of each window is its own, and a line is what a start alone explains.
+    """
+    total = 0.0
+    for first, length in zip(windows.first, windows.length, strict=True):
+        y, t = windows.position[first : first + length], np.arange(length) - 0.5 * (length - 1)
+        y = y - np.mean(y)
+        total += float(y @ y - (y @ t) ** 2 / (t @ t))
+    return 1.0 - float(np.sum(squares)) / max(total, 1e-300)
 
 
 def approach(windows: Windows, numbers: Numbers, starts: Floats, most: int) -> tuple[Numbers, Floats, Floats]:
@@ -393,19 +398,32 @@ def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int
     sums, left, converged = search.run()
     spread = block_spread(sums, len(search.starts), len(search.numbers.free))
     covariance, working, changes, weights = spread
-    time = search.cut.time
-    return JointFit(
-        windows, search.numbers, search.starts, covariance, working, left, changes, weights, time, converged
-    )
+    return JointFit(windows, search.numbers, search.starts, covariance, working, left, changes, weights, converged)
+
+
+def bias_of_windows(fit: JointFit) -> tuple[Floats, Floats]:
+    """By how much the bias in each window differs from that of all, the other numbers as they are fitted.
+
+    Returns  (W,) differences, linearised, and (W,) the squares that they rest on: their weights
+    """
+    numbers = replace(fit.numbers, free=(3, 4), tied=())
+    sums, _ = _Search(fit.windows, numbers, fit.starts, 0).linearised()
+    turn = np.zeros((4, 3))  # bias alone: less of the level forward, more of that backward; and the start
+    turn[0, 0], turn[1, 0], turn[2, 1], turn[3, 2] = -1.0, 1.0, 1.0, 1.0
+    gram, slope = turn.T @ sums.gram @ turn, sums.gradient @ turn
+    back = np.linalg.pinv(gram[:, 1:, 1:], rcond=1e-12, hermitian=True) @ gram[:, 1:, :1]
+    weight = gram[:, 0, 0] - np.einsum("wi,wij->w", gram[:, 0, 1:], back)
+    score = slope[:, 0] - np.einsum("wi,wij->w", slope[:, 1:], back)
+    felt = weight > 1e-9 * np.max(gram[:, 0, 0])
+    return np.where(felt, score / np.where(felt, weight, 1.0), 0.0), np.where(felt, weight, 0.0)
 
 
 def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Spread of the free numbers by what each block of a linearised fit adds to them.
+    """Spread of the free numbers by what leaving out each block of a linearised fit changes.
 
-    With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, block g changes the
-    numbers by  N^-1 (1 - S_g P_g)^-1/2 A_g^T r_g.  The root makes up for the residuals that the fit has taken away:
-    the sum of squares of the changes then has the right mean where the residuals are independent (Bell and McCaffrey
-    2002, known at second hand), and holds for blocks with any correlation inside.
+    With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, leaving out block g
+    changes the numbers by  -N^-1 (1 - S_g P_g)^-1 A_g^T r_g  (the jackknife, in closed form for a linear fit), which
+    holds for any correlation within blocks, and errs to the safe side where blocks are few.
     Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
     """
     whole = assembled(blocks, count)
@@ -420,7 +438,7 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     grown = _enlarged(S, inverse[columns[:, :, None], columns[:, None, :]])
     to = inverse[:free][:, columns].transpose(1, 0, 2) @ grown  # (G, p, q)
     changes = np.einsum("gpq,gq->gp", to, blocks.gradient / scale) / size[:free]
-    covariance = changes.T @ changes
+    covariance = (G - 1) / G * changes.T @ changes
     for i in np.flatnonzero(lost[:free]):
         covariance[i, i] = np.inf
     rows = np.zeros((G, free, len(whole)))
@@ -434,7 +452,7 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
 
 
 def _enlarged(S: Floats, P: Floats) -> Floats:
-    """(1 - S P)^-1/2 (G, q, q), through the symmetric matrix R S R with R the root of P."""
+    """(1 - S P)^-1 (G, q, q), through the symmetric matrix R S R with R the root of P."""
     values, vectors = np.linalg.eigh(P)
     root = np.sqrt(np.maximum(values, 0.0))
     R = (vectors * root[:, None, :]) @ np.swapaxes(vectors, 1, 2)
@@ -442,7 +460,7 @@ def _enlarged(S: Floats, P: Floats) -> Floats:
     inverse_root = (vectors * back[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     leverage, axes = np.linalg.eigh(R @ S @ R)
     # a direction that one block alone determines leaves no residual there to be enlarged
-    factor = np.where(leverage < 1.0 - 1e-9, 1.0 / np.sqrt(np.maximum(1.0 - leverage, 1e-9)), 1.0)
+    factor = np.where(leverage < 1.0 - LEVERAGE, 1.0 / np.maximum(1.0 - leverage, LEVERAGE), 1.0)
     return np.asarray(inverse_root @ ((axes * factor[:, None, :]) @ np.swapaxes(axes, 1, 2)) @ R)
 
 

@@ -50,7 +50,7 @@ class Motion:
 
     sections    samples
     driven      whether a force or torque is known
-    force_name  the column that drives; "" in free motion
+    force_name  the column that drives, which may be 0 throughout; "" where there is none
     reference   reading that counts as position 0 of the fit [m or rad]
     step        of the encoder as seen in the readings [m or rad]; 0 where no step is seen
     noise       standard deviation of the readings' noise, steps included [m or rad]
@@ -122,7 +122,7 @@ def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint:
     y = np.concatenate([one.position for one in sections])
     step = encoder_step([one.position for one in sections])
     reference = 0.5 * float(np.min(y) + np.max(y))
-    return Motion(tuple(sections), driven, name if driven else "", reference, step, noise_of(sections))
+    return Motion(tuple(sections), driven, name, reference, step, noise_of(sections))
 
 
 def planned_sections(runs: NDArray[np.int64], total: int) -> list[tuple[int, int, int]]:

@@ -15,39 +15,58 @@ from zwidth.identify.friction_record import Motion
 from zwidth.identify.friction_start import search_guess
 from zwidth.identify.record import Record
 
-Floats = NDArray[np.float64]
-
 GROUPS: Final = 6  # parts of a single record
 FEWEST: Final = 3  # windows of a part
 CLEARLY: Final = 0.9  # share of the motion that is explained where the cause is right
-HARDLY: Final = 0.7  # share that is explained at most where it is not
+BETTER: Final = 0.1  # share of what remains that may remain with the right cause
+GUESSES: Final = 3  # that are followed
+MOST: Final = 6  # windows that are looked at of each part
 
 
-def reason_of_misfit(windows: Windows, motion: Motion, numbers: Numbers, records: Sequence[Record]) -> str:
-    """A sentence with the cause, and what to do; "" where none of them explains the motion."""
+def reason_of_misfit(
+    windows: Windows, motion: Motion, numbers: Numbers, records: Sequence[Record], share: float
+) -> str:
+    """A sentence with the cause, and what to do; "" where none explains the motion far better.
+
+    share  of the motion that is explained as it was recorded
+    """
     if not motion.driven:
         return ""
-    reversed_ = replace(windows, force=-windows.force)
-    name = motion.force_name
-    if _explained(reversed_, motion, numbers) > CLEARLY:
-        return f"a positive {name} accelerates backward: change the sign of one of the two columns"
-    swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
-    if _explained(swapped, motion, numbers) > CLEARLY:
-        return f"the columns of position and {name} are swapped: exchange their names"
-    backward = list[str]()
+    name, reversed_ = motion.force_name, replace(windows, force=-windows.force)
+    enough = 1.0 - min(BETTER * (1.0 - share), 1.0 - CLEARLY)
+    along, against = list[str](), list[str]()
     for group, which in _groups(windows, motion, records).items():
-        along, against = windows.chosen(which), reversed_.chosen(which)
-        if _explained(along, motion, numbers) < HARDLY and _explained(against, motion, numbers) > CLEARLY:
-            backward.append(group)
-    if backward:
-        return f"a positive {name} accelerates backward in {comma_list(backward)}: a sign has flipped, change it there"
+        left = 1.0 - _explained(windows.chosen(which), motion, numbers)
+        left_reversed = 1.0 - _explained(reversed_.chosen(which), motion, numbers)
+        if min(left, left_reversed) > 1.0 - CLEARLY:
+            continue
+        if left_reversed < BETTER * left:
+            against.append(group)
+        elif left < BETTER * left_reversed:
+            along.append(group)
+    if against and not along:
+        return f"a positive {name} accelerates backward: change the sign of one of the two columns"
+    if against:
+        return (
+            f"a positive {name} accelerates backward in {comma_list(against)}: a sign has flipped, change it there"
+        )
+    swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
+    if _explained(swapped.chosen(_some(np.ones(len(windows.first), dtype=bool))), motion, numbers) > enough:
+        return f"the columns of position and {name} are swapped: exchange their names"
     return ""
 
 
 def _explained(windows: Windows, motion: Motion, numbers: Numbers) -> float:
     """Share of the motion in windows that is explained by the numbers that explain it best."""
-    found, starts = search_guess(windows, numbers, motion.resolution, motion.deviation)
+    found, starts = search_guess(windows, numbers, motion.resolution, motion.deviation, GUESSES)
     return explained(windows, squares_of(windows, found, starts))
+
+
+def _some(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Of these windows at most six, evenly spread."""
+    places = np.flatnonzero(which)
+    kept = places[np.unique(np.linspace(0, len(places) - 1, min(MOST, len(places))).astype(int))]
+    return np.isin(np.arange(len(which)), kept)
 
 
 def _groups(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, NDArray[np.bool_]]:
@@ -61,4 +80,4 @@ def _groups(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict
         for part in np.array_split(np.arange(len(owner)), max(min(GROUPS, len(owner) // FEWEST), 1)):
             end = windows.time[part[-1]] + windows.length[part[-1]] * windows.period[part[-1]]
             groups[f"{windows.time[part[0]]:.4g} to {end:.4g} s"] = np.isin(np.arange(len(owner)), part)
-    return {name: which for name, which in groups.items() if np.sum(which) >= FEWEST}
+    return {name: _some(which) for name, which in groups.items() if np.sum(which) >= FEWEST}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,8 @@ PARTLY: Final = 0.2  # the same where nothing moves for longer
 FEWEST_ROWS: Final = 8
 GOOD: Final = 1.5  # times the noise, that the right numbers leave
 LEVELS: Final = (0.3, 0.6, 0.85)  # shares of the forces below which a joint may stand
+MOST_GUESSES: Final = 8
+ALIKE: Final = 0.01  # relative difference of two sums of squares that are one
 DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
 
 
@@ -154,7 +157,9 @@ def first_starts(windows: Windows, values: Floats, starts: Floats | None = None)
     return np.asarray(np.array(guesses)[best, np.arange(len(here))])
 
 
-def search_guess(windows: Windows, numbers: Numbers, step: float, noise: float) -> tuple[Numbers, Floats]:
+def search_guess(
+    windows: Windows, numbers: Numbers, step: float, noise: float, most: int = MOST_GUESSES
+) -> tuple[Numbers, Floats]:
     """Numbers and starts close to those that predict the motion best.
 
     Short windows forgive a wrong guess, for the start of each is its own; the longer ones then begin where those
@@ -162,15 +167,18 @@ def search_guess(windows: Windows, numbers: Numbers, step: float, noise: float) 
     where it leaves more than the noise.
     numbers  which are free and which are tied; those that are fixed keep their values
     step     of the encoder;   noise  standard deviation of the readings' noise, steps included [m or rad]
+    most     guesses that are followed
     """
     short = windows.cut(PARTS[0])
     enough = (GOOD * noise) ** 2 * float(np.sum(windows.length))
     best: tuple[Numbers, Floats, Floats] | None = None
-    for one in _guesses(windows, numbers, step):
+    for one in islice(_guesses(windows, numbers, step), most):
         found = _followed(windows, short, approach(short, one, first_starts(short, one.values), 6))
-        if best is None or np.sum(found[2]) < np.sum(best[2]):
+        squares = float(np.sum(found[2]))
+        again = best is not None and abs(squares / float(np.sum(best[2])) - 1.0) < ALIKE
+        if best is None or squares < np.sum(best[2]):
             best = found
-        if np.sum(best[2]) <= enough:
+        if again or squares <= enough:  # two guesses that lead to one place need no third
             break
     assert best is not None
     return best[0], best[1]

@@ -38,7 +38,9 @@ Floats = NDArray[np.float64]
 UNSEEN: Final = 3  # of so many windows one is kept for validation
 OUTLYING: Final = 6.0  # times the usual deviation, from which a window does not follow the model
 MOST_OUTLYING: Final = 0.25  # share of the windows that may be left out for it
-LEAST_EXPLAINED: Final = 0.5  # of the unseen motion
+LEAST_EXPLAINED: Final = 0.7  # of the unseen motion
+WELL_EXPLAINED: Final = 0.99  # of it, below which other causes are tried
+POOR: Final = 5.0  # times the readings' noise, which then remains
 SHOWN: Final = 3.0  # standard errors by which the data show a spring
 
 
@@ -226,10 +228,17 @@ def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, record
     count = len(windows.first)
     text = f"{100.0 * max(fitted.explained, 0.0):.4g} % of the motion in unseen windows is predicted"
     times = ", ".join(f"{t:.4g}" for t in sorted(fitted.outlying)[:5])
-    if fitted.explained < LEAST_EXPLAINED or len(fitted.outlying) > MOST_OUTLYING * count:
-        text += f"; {len(fitted.outlying)} of {count} windows do not follow the rest" * bool(fitted.outlying)
-        cause = reason_of_misfit(windows, fitted.motion, numbers, records)
-        other = "no mass with friction moves so under this force; another one, as of a hand or an end stop, may act"
+    if fitted.outlying and len(fitted.outlying) > MOST_OUTLYING * count:
+        text += f", and {len(fitted.outlying)} of {count} windows do not follow the rest"
+    poor = fitted.explained < LEAST_EXPLAINED or len(fitted.outlying) > MOST_OUTLYING * count
+    doubtful = fitted.explained < WELL_EXPLAINED and fitted.misfit > POOR
+    cause = (
+        reason_of_misfit(windows, fitted.motion, numbers, records, fitted.explained) if poor or doubtful else ""
+    )
+    if poor or cause:
+        other = (
+            "no mass with friction moves so under this force; another one, as of a hand or an end stop, may act"
+        )
         return Check("model", False, f"{text}: {cause or other}")
     if fitted.outlying:
         return Check(

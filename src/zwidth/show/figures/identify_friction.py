@@ -57,7 +57,9 @@ def draw_friction(ax: Axes, identification: JointIdentification) -> None:
 
 def _draw_motion(ax: Axes, identification: JointIdentification) -> None:
     """The first window that was not fitted, measured and predicted, in an inset."""
-    names = ("angle_rad", "angle_predicted_rad") if identification.angular else ("position_m", "position_predicted_m")
+    names = (
+        ("angle_rad", "angle_predicted_rad") if identification.angular else ("position_m", "position_predicted_m")
+    )
     time, measured, predicted = (np.asarray(identification.curves[name]) for name in ("time_s", *names))
     steps = np.diff(time)
     breaks = np.flatnonzero((steps > 1.5 * np.median(steps)) | (steps <= 0.0))
@@ -73,4 +75,6 @@ def _draw_motion(ax: Axes, identification: JointIdentification) -> None:
         axis.label.set_fontsize(6.5)
         axis.labelpad = 1.0
     share = f"{100.0 * identification.validation:.4g}"
-    inset.set_title(f"unseen {quantity(float(time[end - 1] - time[0]), 's')}: {share} % predicted", fontsize=6.5, pad=2.0)
+    inset.set_title(
+        f"unseen {quantity(float(time[end - 1] - time[0]), 's')}: {share} % predicted", fontsize=6.5, pad=2.0
+    )

@@ -1,0 +1,121 @@
+"""Records that are not like simulations: what is refused, and with what reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify.test_friction_joint import JOINT, failed, record
+from identify.virtual_joint import records_of
+
+import zwidth
+from zwidth.identify.friction import identify_friction
+
+
+@pytest.fixture(scope="module")
+def device():
+    return zwidth.load("hapkit-course")
+
+
+@pytest.fixture(scope="module")
+def driven():
+    return records_of([JOINT])[0]
+
+
+def refusal(device, columns, what):
+    result = identify_friction(device, [record(columns)])
+    assert result.estimates == ()
+    assert what in failed(result)
+    assert result.document()["parameters"] == []
+    return result.reason
+
+
+def test_a_constant_position_or_force(device, driven):
+    assert "constant" in refusal(device, {**driven, "position_m": np.zeros(3000)}, "motion")
+    assert "up to a factor" in refusal(device, {**driven, "force_N": np.full(3000, 2.0)}, "force")
+
+
+def test_a_force_of_zero_is_free_motion(device, driven):
+    result = identify_friction(device, [record({**driven, "force_N": np.zeros(3000)})])
+    assert "force" in failed(result)
+
+
+def test_fewer_than_ten_counts(device, driven):
+    step = np.ptp(driven["position_m"]) / 8.0
+    coarse = step * np.rint(driven["position_m"] / step)
+    assert "move the joint farther" in refusal(device, {**driven, "position_m": coarse}, "motion")
+
+
+def test_too_short_and_irregular(device, driven):
+    assert "at least 100" in refusal(device, {name: one[:60] for name, one in driven.items()}, "sampling")
+    shaken = driven["time_s"] + 0.4e-3 * np.sin(np.arange(3000.0) ** 2)
+    assert "do not follow" in refusal(device, {**driven, "time_s": shaken}, "sampling")
+    assert "sort" in refusal(device, {**driven, "time_s": driven["time_s"][::-1]}, "sampling")
+
+
+def test_a_reversed_sense_and_swapped_columns(device, driven):
+    reason = refusal(device, {**driven, "force_N": -driven["force_N"]}, "model")
+    assert "accelerates backward: change the sign" in reason
+    swapped = {**driven, "force_N": driven["position_m"], "position_m": 0.1 * driven["force_N"]}
+    assert "swapped" in refusal(device, swapped, "model")
+
+
+def test_a_sign_that_flips_between_records(device, driven):
+    other = records_of([replace(JOINT, tones=JOINT.tones[::-1], seed=3)])[0]
+    flipped = {**other, "force_N": -other["force_N"]}
+    result = identify_friction(device, [record(driven, "one.csv"), record(flipped, "two.csv")])
+    assert result.estimates == ()
+    assert "one.csv" in result.reason or "two.csv" in result.reason
+    assert "a sign has flipped" in result.reason
+
+
+def test_readings_in_degrees_or_millimetres(device, driven):
+    counted = device.with_({"loop.encoder.resolution_m": JOINT.step})
+    assert identify_friction(counted, [record(driven)]).estimates
+    reason = refusal(counted, {**driven, "position_m": 1e3 * driven["position_m"]}, "units")
+    assert "a thousandth of the unit" in reason
+    limited = device.with_({"loop.saturation.force_N": 8.0})
+    assert "mN" in refusal(limited, {**driven, "force_N": 1e3 * driven["force_N"]}, "units")
+
+
+def test_a_force_beyond_the_limit_and_one_with_flat_tops_are_warned_of(device, driven):
+    limited = device.with_({"loop.saturation.force_N": 3.0})
+    result = identify_friction(limited, [record(driven)])
+    assert "saturation" in failed(result)
+    clipped = np.clip(driven["force_N"], -2.0, 2.0)
+    reasons = [
+        check.reason for check in identify_friction(device, [record({**driven, "force_N": clipped})]).checks
+    ]
+    assert any("smaller" in reason or "saturated" in reason for reason in reasons)
+
+
+def test_missing_samples_cost_nothing_but_themselves(device, driven):
+    holes = {name: column.copy() for name, column in driven.items()}
+    holes["position_m"][700:740] = np.nan
+    kept = np.delete(np.arange(3000), np.arange(1500, 1600))
+    result = identify_friction(device, [record({name: column[kept] for name, column in holes.items()})])
+    assert "140 samples missing in 2 gaps" in result.checks[0].reason
+    one = result["plant.mass_kg"]
+    assert one.low < JOINT.mass < one.high < 1.05 * JOINT.mass
+
+
+def test_a_push_of_a_hand_in_between_is_told_and_left_out(device, driven):
+    """What a hand does for 100 samples is no friction: those windows do not follow the rest."""
+    pushed = driven["position_m"].copy()
+    pushed[1200:1300] += 4e-3 * np.sin(np.linspace(0.0, np.pi, 100)) ** 2
+    result = identify_friction(device, [record({**driven, "position_m": pushed})])
+    assert "model" in failed(result)
+    (text,) = [check.reason for check in result.checks if check.what == "model"]
+    assert "1.1" in text or "1.2" in text
+    one = result["plant.mass_kg"]
+    assert one.low < JOINT.mass < one.high
+
+
+def test_a_bias_that_drifts_is_told(device, driven):
+    """An amplifier's offset that grows by half the friction over the record is in the motion, not in the command."""
+    drifting = driven["force_N"] + 0.3 * driven["time_s"] / driven["time_s"][-1]
+    result = identify_friction(device, [record({**driven, "force_N": drifting})], spring=False)
+    (text,) = [check.reason for check in result.checks if check.what == "drift"]
+    drift = float(text.split("about ")[1].split()[0])
+    assert drift == pytest.approx(-0.3, rel=0.3)
