@@ -73,9 +73,9 @@ def test_a_joint_that_sticks_and_slips_moves_as_by_many_small_steps(seed):
     numbers = (0.003, *rng.uniform(0.0, 0.5, 2), *rng.uniform(0.1, 0.6, 2), rng.choice([0.0, 20.0]))
     delay, start = rng.uniform(0.0, 2.0) * 2e-3, (0.01, 0.5)
     exact = follow(force, numbers, 2e-3, delay, start)
-    close = slow_steps(force, numbers, 2e-3, delay, start, 400)
+    close = slow_steps(force, numbers, 2e-3, delay, start, 100)
     assert np.ptp(exact) > 1e-3
-    assert exact == pytest.approx(close, abs=2e-3 * np.ptp(exact))
+    assert exact == pytest.approx(close, abs=5e-3 * np.ptp(exact))
 
 
 def test_a_push_below_the_level_moves_nothing_and_one_above_it_does():

@@ -27,6 +27,7 @@ STEP: Final = 1e-6  # of a derivative, of parameters in units of their effect
 MOST_STEPS: Final = 40  # of the optimiser
 ARRIVED: Final = 1e-8  # relative fall of the sum of squares that ends it
 RIDGES: Final = (0.0, 1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4)  # of Levenberg and Marquardt, tried in this order
+GROWTH: Final = 5.0  # logarithm of it, within a window
 LONGEST_DELAY: Final = (-1.0, 6.0)  # of the force, samples
 BLOCKS: Final = 24  # of consecutive samples, of all windows together, at least
 SHARES: Final = (1.0, 0.3, 0.0)  # of a step that a window's start may take
@@ -282,16 +283,24 @@ class _Search:
         return 1e-3 * samples * np.array([1.0, span**2])
 
     def _moved(self, step: Floats) -> Numbers:
-        x = self.numbers.free_values + step
-        T = float(np.mean(self.windows.period))
-        for i, number in enumerate(self.numbers.free):
-            if number == 0:
-                damping = max(abs(self.numbers.values[1]), abs(self.numbers.values[2]))
-                floor = max(LEAST_MASS * damping * T, 1e-6 * self.scales[0])
-                x[i] = max(x[i], floor, 0.1 * self.numbers.values[0])
-            elif number == DELAY:
-                x[i] = np.clip(x[i], LONGEST_DELAY[0] * T, LONGEST_DELAY[1] * T)
-        return self.numbers.with_free(x)
+        """The numbers a step further, within bounds that keep the motion from running away."""
+        values = self.numbers.with_free(self.numbers.free_values + step).values
+        values[MASS] = max(values[MASS], 0.1 * self.numbers.values[MASS])
+        return self.numbers.with_free(bounded(values, self.windows)[list(self.numbers.free)])
+
+
+def bounded(values: Floats, windows: Windows) -> Floats:
+    """The seven numbers within what can be meant: a mass above 0, a delay of a few samples, and no friction or
+    spring that drives the joint so that its motion grows by more than some orders within a window."""
+    T, span = float(np.mean(windows.period)), float(np.max(windows.length * windows.period))
+    least = max(LEAST_MASS * max(abs(values[1]), abs(values[2])) * T, 1e-6 * scales(windows)[MASS])
+    m = max(float(values[MASS]), least)
+    after = values.copy()
+    after[MASS] = m
+    after[1:3] = np.maximum(after[1:3], -GROWTH * m / span)
+    after[STIFFNESS] = max(float(after[STIFFNESS]), -m * (GROWTH / span) ** 2)
+    after[DELAY] = np.clip(after[DELAY], LONGEST_DELAY[0] * T, LONGEST_DELAY[1] * T)
+    return after
 
 
 def scales(windows: Windows) -> Floats:

@@ -34,6 +34,9 @@ def reason_of_misfit(
         return ""
     name, reversed_ = motion.force_name, replace(windows, force=-windows.force)
     enough = 1.0 - min(BETTER * (1.0 - share), 1.0 - CLEARLY)
+    swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
+    if _explained(swapped.chosen(_some(np.ones(len(windows.first), dtype=bool))), motion, numbers) > enough:
+        return f"the columns of position and {name} are swapped: exchange their names"
     along, against = list[str](), list[str]()
     for group, which in _groups(windows, motion, records).items():
         left = 1.0 - _explained(windows.chosen(which), motion, numbers)
@@ -50,9 +53,6 @@ def reason_of_misfit(
         return (
             f"a positive {name} accelerates backward in {comma_list(against)}: a sign has flipped, change it there"
         )
-    swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
-    if _explained(swapped.chosen(_some(np.ones(len(windows.first), dtype=bool))), motion, numbers) > enough:
-        return f"the columns of position and {name} are swapped: exchange their names"
     return ""
 
 

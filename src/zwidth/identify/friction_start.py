@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.identify.friction_fit import MASS, STIFFNESS, Numbers, Windows, approach, predict, scales
+from zwidth.identify.friction_fit import MASS, STIFFNESS, Numbers, Windows, approach, bounded, predict, scales
 
 Floats = NDArray[np.float64]
 
@@ -220,7 +220,7 @@ def _guesses(windows: Windows, numbers: Numbers, step: float) -> Iterator[Number
         one[MASS] = max(one[MASS], 1e-3 * sizes[MASS])
         one[1:3] = np.maximum(one[1:3], 0.0)
         one[3:5] += max(-0.5 * float(np.sum(one[3:5])), 0.0)
-        yield numbers.with_free(one[list(numbers.free)])
+        yield numbers.with_free(bounded(one, windows)[list(numbers.free)])
 
 
 def _in_bursts(windows: Windows, share: float) -> Floats:
