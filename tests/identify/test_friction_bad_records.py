@@ -118,7 +118,7 @@ def test_a_push_of_a_hand_in_between_is_told_and_left_out(device, driven):
 
 
 def test_a_bias_that_drifts_is_told(device, driven):
-    """An amplifier's offset that grows by half the friction over the record is in the motion, not in the command."""
+    """An amplifier's offset that grows by half the friction is in the motion, not in the command."""
     drifting = driven["force_N"] + 0.3 * driven["time_s"] / driven["time_s"][-1]
     result = identify_friction(device, [record({**driven, "force_N": drifting})], spring=False)
     (text,) = [check.reason for check in result.checks if check.what == "drift"]

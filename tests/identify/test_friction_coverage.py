@@ -29,14 +29,16 @@ def truth_of(joint, reference):
 
 
 def hits_of(joint, columns):
-    """Whether each interval holds the true value; {} where the checks refuse the record."""
+    """Whether each interval holds the true value; {} where the checks refuse the record, and without the numbers
+    of a direction in which the joint does not slide."""
     result = identify_friction(
         zwidth.load("hapkit-course"), [record_of(columns, COLUMNS)], spring=joint.stiffness > 0.0
     )
     if not result.estimates:
         return {}
     truth = truth_of(joint, result.details["reference_position_m"])
-    return {name: result[name].low <= value <= result[name].high for name, value in truth.items()}
+    told = {one.name: one for one in result.estimates}
+    return {name: told[name].low <= truth[name] <= told[name].high for name in told if name in truth}
 
 
 def test_intervals_of_a_few_joints_hold_the_true_values():
@@ -53,5 +55,6 @@ def test_intervals_hold_the_true_values_of_93_to_97_percent_of_1000_joints():
     hits = [one for pair in zip(joints, records_of(joints), strict=True) if (one := hits_of(*pair))]
     assert len(hits) > 850  # the rest moves by less than ten counts, or stands
     for name in NAMES:
-        share = np.mean([one[name] for one in hits])
+        share = np.mean([one[name] for one in hits if name in one])
+        print(name, share)
         assert 0.93 <= share <= 0.97, (name, share)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identify.virtual_joint import Joint, records_of
+from paddle import PADDLE
 
 import zwidth
-from paddle import PADDLE
 from zwidth.device.faults import DeviceError
 from zwidth.identify.friction import COLUMNS, identify_friction
 from zwidth.identify.mass import identify_mass

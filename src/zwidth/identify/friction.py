@@ -73,7 +73,7 @@ def identify_friction(
     Raises          DeviceError  for a joint that the device has not, columns that are not the joint's, cells that
                     are no numbers
     """
-    place, checks, fitted = fitted_joint(device, records, joint, spring, mass_from_file, progress)
+    checks, fitted = fitted_joint(device, records, joint, spring, mass_from_file, progress)
     if fitted is None:
         return refused("friction", device.label, checks) or Identification("friction", device.label, checks)
     estimates = [*friction_estimates(fitted), *mass_estimates(fitted)]
@@ -100,8 +100,8 @@ def identification(
         tuple(checks),
         tuple(estimates),
         fitted.explained,
-        f"position in {len(fitted.unseen.first)} windows that were not fitted, each from its own position and velocity "
-        "at the beginning; the share of what a straight line leaves there",
+        f"position in {len(fitted.unseen.first)} windows that were not fitted, each from its own position and "
+        "velocity at the beginning; the share of what a straight line leaves there",
         tuple(remarks),
         curves,
         details,
@@ -190,7 +190,7 @@ def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
     """Mean velocity (s,) and friction (s,) in segments in which the joint slides one way throughout."""
     windows, v = fitted.fit.windows, fitted.fit.numbers.values
     size = int(max(np.median(windows.length) // 8, SHORTEST))
-    delay = max(int(round(float(v[DELAY]) / float(np.mean(windows.period)))), 0)
+    delay = max(round(float(v[DELAY]) / float(np.mean(windows.period))), 0)
     A, force = weighted_balance(windows, size, fitted.motion.resolution, [delay], 1.0)
     whole = float(np.sum(weighting(size)[0]))
     one_way = np.abs(A[:, 2] + A[:, 3]) > 0.999 * whole
@@ -217,8 +217,8 @@ def check_speeds(fitted: FittedJoint) -> Check:
     return Check(
         "speeds",
         False,
-        f"the joint slides {text}, {' and '.join(alike)} at speeds too much alike: viscous and dry friction are hardly told "
-        "apart, while their sum at that speed is; record slow and fast motion",
+        f"the joint slides {text}, {' and '.join(alike)} at speeds too much alike: viscous and dry friction are "
+        "hardly told apart, while their sum at that speed is; record slow and fast motion",
         warning=True,
     )
 
@@ -237,8 +237,8 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
     return Check(
         "acceleration",
         False,
-        f"{name} is told {upper}: friction or a delay of the force hide it; record faster changes of a larger force, "
-        "such as steps in both directions",
+        f"{name} is told {upper}: friction or a delay of the force hide it; record faster changes of a larger "
+        "force, such as steps in both directions",
         warning=not (needed and useless),
     )
 
@@ -325,7 +325,7 @@ def _force_text(joint: Joint, name: str) -> str:
         )
     if name == joint.command:
         return (
-            f"used is {name}, a command: an amplifier's gain and offset are in all numbers; record {joint.measured} "
-            "too to see them"
+            f"used is {name}, a command: an amplifier's gain and offset are in all numbers; record "
+            f"{joint.measured} too to see them"
         )
     return f"used is {name} as measured"

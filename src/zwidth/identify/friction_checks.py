@@ -116,8 +116,8 @@ def check_force(motion: Motion, joint: Joint) -> Check:
         return Check(
             "force",
             False,
-            f"{motion.force_name} stays at {high:.4g} {unit}; under a constant force friction and mass are told only "
-            "up to a factor: record one that changes in size and sign",
+            f"{motion.force_name} stays at {high:.4g} {unit}; under a constant force friction and mass are told "
+            "only up to a factor: record one that changes in size and sign",
         )
     return Check("force", True, f"{motion.force_name} from {low:.4g} to {high:.4g} {unit}")
 
@@ -164,8 +164,8 @@ def check_directions(windows: Windows, motion: Motion) -> Check:
     return Check(
         "directions",
         False,
-        f"the joint slides {way} only: dry friction cannot be told from a constant force such as gravity's; record "
-        "motion in both directions",
+        f"the joint slides {way} only: dry friction cannot be told from a constant force such as gravity's; "
+        "record motion in both directions",
         warning=True,
     )
 
@@ -210,9 +210,9 @@ def check_saturation(motion: Motion, joint: Joint) -> list[Check]:
             Check(
                 "saturation",
                 False,
-                f"{name} stays at its largest or smallest value, {peak:.4g} {unit}, in {100.0 * flat:.2g} % of the "
-                "samples: if the amplifier or the recorder was saturated there, another force acted; record with a "
-                "smaller one",
+                f"{name} stays at its largest or smallest value, {peak:.4g} {unit}, in {100.0 * flat:.2g} % of "
+                "the samples: if the amplifier or the recorder was saturated there, another force acted; record "
+                "with a smaller one",
                 warning=True,
             )
         ]

@@ -1,9 +1,9 @@
 """Friction and mass of one joint by output error: the motion predicted in windows, each from its own start.
 
-Within a window the motion follows from the recorded force alone; position and velocity at the window's first sample
-are parameters too (multiple shooting). What an encoder's steps add to slow motion is correlated over many samples,
-so the intervals do not come from the residuals' size but from blocks of consecutive samples: what each of them adds
-to the numbers, and how that differs from block to block.
+Within a window the motion follows from the recorded force alone; position and velocity at the window's first
+sample are parameters too (multiple shooting). What an encoder's steps add to slow motion is correlated over many
+samples, so the intervals do not come from the residuals' size but from blocks of consecutive samples: by how much
+the numbers change where one of them is left out.
 """
 
 from __future__ import annotations
@@ -253,7 +253,8 @@ class _Search:
             blocks, left = self.linearised()
             least = float(left @ left)
             arrow = Arrow.of(blocks, len(self.starts))
-            for ridge in range(max(ridge - 1, 0), len(RIDGES)):
+            for tried in range(max(ridge - 1, 0), len(RIDGES)):
+                ridge = tried
                 numbers, starts, squares = self._best_step(*arrow.solved(RIDGES[ridge], self.floor))
                 if squares < least:
                     break
@@ -276,8 +277,8 @@ class _Search:
 
     @property
     def floor(self) -> Floats:
-        """Least squares (2,) of the derivatives by a window's start: starts of windows in which nothing moves change
-        nothing, and must not run away."""
+        """Least squares (2,) of the derivatives by a window's start: starts of windows in which nothing moves
+        change nothing, and must not run away."""
         samples = float(np.mean(self.windows.length))
         span = samples * float(np.mean(self.windows.period))
         return 1e-3 * samples * np.array([1.0, span**2])
@@ -431,8 +432,8 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     """Spread of the free numbers by what leaving out each block of a linearised fit changes.
 
     With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, leaving out block g
-    changes the numbers by  -N^-1 (1 - S_g P_g)^-1 A_g^T r_g  (the jackknife, in closed form for a linear fit), which
-    holds for any correlation within blocks, and errs to the safe side where blocks are few.
+    changes the numbers by  -N^-1 (1 - S_g P_g)^-1 A_g^T r_g  (the jackknife, in closed form for a linear fit),
+    which holds for any correlation within blocks, and errs to the safe side where blocks are few.
     Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
     """
     whole = assembled(blocks, count)

@@ -1,4 +1,4 @@
-"""The joint whose friction is identified: where it is read, what drives it, and where its numbers stand in the file."""
+"""The joint whose friction is identified: where it is read, what drives it, and its numbers in the file."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def _path(member: Member, key: str, document: dict[str, Any]) -> str:
 
 
 def _link_paths(link: Member, document: dict[str, Any], ratio: float) -> dict[str, tuple[str, float]]:
-    """Keys of a joint's own damper and spring; numbers at the motor are larger there by the square of the ratio."""
+    """Keys of a joint's own damper and spring; numbers at the motor are larger there by the ratio's square."""
     along = link.entry.get("joint") == "prismatic"
     damping, stiffness = ("Ns_per_m", "N_per_m") if along else ("Nms_per_rad", "Nm_per_rad")
     return {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -32,7 +33,7 @@ class Section:
     """Consecutive samples without a gap.
 
     time of the first [s];  period [s];  record, run  numbers of the record, and of the stretch over all records
-    position, force, command  (n,); force of zeros where nothing drives, command empty where there is none beside it
+    position, force, command  (n,); force of zeros where nothing drives, command empty where there is none
     """
 
     time: float
@@ -169,7 +170,7 @@ def noise_of(sections: Sequence[Section]) -> float:
 
 
 def windows_of(motion: Motion) -> Windows:
-    """The motion cut into windows: as many as still bend enough in the middle one, those without motion left out."""
+    """The motion cut into windows: as many as still bend enough, those without motion left out."""
     lengths = [len(one.position) - (BEFORE if motion.driven else 0) for one in motion.sections]
     total = sum(lengths)
     windows = None
@@ -198,7 +199,7 @@ def _cut(motion: Motion, length: int) -> Windows:
         samples = len(one.position) - before
         many = max(1, round(samples / length))
         edges = np.linspace(before, before + samples, many + 1).astype(int)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             first.append(row + a)
             lengths.append(b - a)
             period.append(one.period)

@@ -18,25 +18,17 @@ from zwidth.identify.record import Record
 GROUPS: Final = 6  # parts of a single record
 FEWEST: Final = 3  # windows of a part
 CLEARLY: Final = 0.9  # share of the motion that is explained where the cause is right
+SWAPPED: Final = 0.995  # the same of swapped columns, for two smooth ones explain each other in part
 BETTER: Final = 0.1  # share of what remains that may remain with the right cause
 GUESSES: Final = 3  # that are followed
 MOST: Final = 6  # windows that are looked at of each part
 
 
-def reason_of_misfit(
-    windows: Windows, motion: Motion, numbers: Numbers, records: Sequence[Record], share: float
-) -> str:
-    """A sentence with the cause, and what to do; "" where none explains the motion far better.
-
-    share  of the motion that is explained as it was recorded
-    """
+def reason_of_misfit(windows: Windows, motion: Motion, numbers: Numbers, records: Sequence[Record]) -> str:
+    """A sentence with the cause, and what to do; "" where none explains the motion."""
     if not motion.driven:
         return ""
     name, reversed_ = motion.force_name, replace(windows, force=-windows.force)
-    enough = 1.0 - min(BETTER * (1.0 - share), 1.0 - CLEARLY)
-    swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
-    if _explained(swapped.chosen(_some(np.ones(len(windows.first), dtype=bool))), motion, numbers) > enough:
-        return f"the columns of position and {name} are swapped: exchange their names"
     along, against = list[str](), list[str]()
     for group, which in _groups(windows, motion, records).items():
         left = 1.0 - _explained(windows.chosen(which), motion, numbers)
@@ -47,13 +39,14 @@ def reason_of_misfit(
             against.append(group)
         elif left < BETTER * left_reversed:
             along.append(group)
-    if against and not along:
-        return f"a positive {name} accelerates backward: change the sign of one of the two columns"
-    if against:
+    if against and along:
         return (
             f"a positive {name} accelerates backward in {comma_list(against)}: a sign has flipped, change it there"
         )
-    return ""
+    swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
+    if _explained(swapped.chosen(_some(np.ones(len(windows.first), dtype=bool))), motion, numbers) > SWAPPED:
+        return f"the columns of position and {name} are swapped: exchange their names"
+    return f"a positive {name} accelerates backward: change the sign of one of the two columns" if against else ""
 
 
 def _explained(windows: Windows, motion: Motion, numbers: Numbers) -> float:

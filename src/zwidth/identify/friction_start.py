@@ -85,8 +85,8 @@ def weighted_balance(
 def weighting(size: int) -> tuple[Floats, Floats, Floats]:
     """w(t) = (1 - t^2)^3 at so many samples in [-1, 1], its slope and its bend per sample.
 
-    Slope and bend are differences of the samples, not derivatives: summed by parts they give the second differences
-    of a position, which are exactly what a force held from sample to sample causes in a free mass.
+    Slope and bend are differences of the samples, not derivatives: summed by parts they give the second
+    differences of a position, which are exactly what a force held from sample to sample causes in a free mass.
     """
     w = (1.0 - np.linspace(-1.0, 1.0, size) ** 2) ** 3
     around = np.concatenate([[0.0], w, [0.0]])
@@ -224,8 +224,8 @@ def _guesses(windows: Windows, numbers: Numbers, step: float) -> Iterator[Number
 
 
 def _in_bursts(windows: Windows, share: float) -> Floats:
-    """Numbers of a joint that stands until the force is above this share of all forces, and then moves in bursts of
-    half a period of the force."""
+    """Numbers of a joint that stands until the force is above this share of all forces, and then moves in bursts
+    of half a period of the force."""
     sizes = np.abs(windows.force[windows.rows])
     level, most = float(np.quantile(sizes, share)), float(np.max(sizes))
     signs = np.sign(windows.force[windows.rows] - np.mean(windows.force[windows.rows]))

@@ -26,8 +26,8 @@ from zwidth.identify.friction_fit import (
 )
 from zwidth.identify.friction_joint import Joint, joint_of
 from zwidth.identify.friction_record import Motion, read_motion, windows_of
-from zwidth.identify.friction_start import first_starts, search_guess
 from zwidth.identify.friction_sense import reason_of_misfit
+from zwidth.identify.friction_start import first_starts, search_guess
 from zwidth.identify.identification import Check
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling
@@ -95,8 +95,8 @@ def fitted_joint(
     spring: bool | None,
     mass_from_file: bool,
     progress: Progress | None,
-) -> tuple[Joint, tuple[Check, ...], FittedJoint | None]:
-    """The joint, all checks, and what was fitted; None where a check refuses the data.
+) -> tuple[tuple[Check, ...], FittedJoint | None]:
+    """All checks, and what was fitted; None where a check refuses the data.
 
     spring          whether a spring holds the joint; None: where the file has one, or the data show one
     mass_from_file  free motion tells friction over mass: take the mass of the file
@@ -119,17 +119,17 @@ def fitted_joint(
         checks.append(check)
         samplings += [] if sampling is None else [sampling]
     if len(samplings) < len(records):
-        return joint, tuple(checks), None
+        return tuple(checks), None
     report("reading records", len(records), steps)
     motion = read_motion(records, samplings, joint)
     checks += _enough(motion, samplings)
     if any(not check.passed for check in checks):
-        return joint, tuple(checks), None
+        return tuple(checks), None
     motion = _limited(motion, joint)
     windows = windows_of(motion)
     checks += checks_of(motion, windows, joint)
     if any(not (check.passed or check.warning) for check in checks):
-        return joint, tuple(checks), None
+        return tuple(checks), None
     mass = 1.0
     if mass_from_file and not motion.driven:
         mass = joint.mass
@@ -140,7 +140,7 @@ def fitted_joint(
     report("fitting", steps - 3, steps)
     forward, backward = directions(windows, motion)
     numbers = _numbers(motion, forward, backward, mass, spring is not False)
-    fit, outlying = _fit(windows, motion, numbers, spring, joint)
+    fit, outlying = _fit(windows, motion, numbers, spring)
     report("validating", steps - 1, steps)
     unseen = windows.chosen(_unseen(windows))
     starts = first_starts(unseen, fit.numbers.values)
@@ -155,7 +155,7 @@ def fitted_joint(
     )
     checks.append(_check_model(fitted, windows, numbers, records))
     fitted = replace(fitted, checks=tuple(checks))
-    return joint, tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
+    return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
 
 
 def _enough(motion: Motion, samplings: Sequence[Sampling]) -> list[Check]:
@@ -199,7 +199,7 @@ def _mean_square(fit: JointFit, motion: Motion) -> float:
 
 
 def _fit(
-    windows: Windows, motion: Motion, numbers: Numbers, spring: bool | None, joint: Joint
+    windows: Windows, motion: Motion, numbers: Numbers, spring: bool | None
 ) -> tuple[JointFit, tuple[float, ...]]:
     """The fit, without windows that follow no such model, and with a spring where there is one."""
     seen = windows.chosen(~_unseen(windows))
@@ -232,9 +232,7 @@ def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, record
         text += f", and {len(fitted.outlying)} of {count} windows do not follow the rest"
     poor = fitted.explained < LEAST_EXPLAINED or len(fitted.outlying) > MOST_OUTLYING * count
     doubtful = fitted.explained < WELL_EXPLAINED and fitted.misfit > POOR
-    cause = (
-        reason_of_misfit(windows, fitted.motion, numbers, records, fitted.explained) if poor or doubtful else ""
-    )
+    cause = reason_of_misfit(windows, fitted.motion, numbers, records) if poor or doubtful else ""
     if poor or cause:
         other = (
             "no mass with friction moves so under this force; another one, as of a hand or an end stop, may act"

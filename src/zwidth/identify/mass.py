@@ -33,7 +33,7 @@ def identify_mass(
     friction or a delay hide the mass, so that its interval reaches 0, the data are refused.
     Raises  DeviceError  as `identify_friction` does
     """
-    _, checks, fitted = fitted_joint(device, records, joint, spring, False, progress)
+    checks, fitted = fitted_joint(device, records, joint, spring, False, progress)
     if fitted is not None and not fitted.motion.driven:
         reason = "free motion tells only ratios of friction to mass; record force_N, torque_Nm or current_A too"
         checks += (Check("force", False, reason),)

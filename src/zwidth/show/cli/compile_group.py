@@ -96,8 +96,22 @@ def run_estimators() -> None:
     mode_growth(1.0, 1e4, 100.0, 0.001, 0.0)
 
 
+def identify_friction_of_a_step() -> None:
+    """Friction of a short record: a mass that a square wave moves to and fro."""
+    import numpy as np
+
+    from zwidth.identify.friction_fit import Numbers, Windows, predict
+
+    force, one = np.repeat([1.0, -1.0], 20), np.array([40])
+    windows = Windows(force, force, np.array([0]), one, np.array([0.001]), np.zeros(1), np.zeros(1, int), True)
+    predict(windows, Numbers(np.array([0.1, 0.2, 0.2, 0.3, 0.3, 4.0, 0.001]), ()).values, np.zeros((1, 2)))
+
+
 # What no short command line reaches, by group.
-RARE: Final[tuple[tuple[Callable[[], None], ...], ...]] = ((compile_environments, run_estimators), ())
+RARE: Final[tuple[tuple[Callable[[], None], ...], ...]] = (
+    (compile_environments, run_estimators, identify_friction_of_a_step),
+    (),
+)
 
 
 def run_group(group: int) -> None:
