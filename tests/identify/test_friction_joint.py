@@ -84,6 +84,12 @@ def test_driven_motion_tells_friction_mass_and_delay(device, driven):
     assert len({len(column) for column in result.table().values()}) == 1
 
 
+def test_the_device_identifies_from_columns(device, driven):
+    result = device.identify("mass", driven)
+    assert result.estimates[0].name == "effective mass"
+    assert device.identify("friction", {**driven, "force_N": 0.0 * driven["force_N"]}).settings == {}
+
+
 def test_mass_comes_first_where_it_is_asked_for(device, driven):
     result = identify_mass(device, [record(driven)])
     assert result.kind == "mass"

@@ -10,7 +10,7 @@ from identify.test_friction_joint import JOINT, record
 from identify.virtual_joint import records_of
 
 import zwidth
-from zwidth.identify.friction import JointIdentification, identify_friction
+from zwidth.identify.friction import identify_friction
 from zwidth.show.figures.identify_friction import draw_friction
 from zwidth.show.figures.style import figure
 
@@ -39,7 +39,7 @@ def test_the_lines_are_the_fitted_friction_and_the_points_lie_about_them(identif
     made.canvas.draw()
 
 
-def test_nothing_identified_is_said():
-    _, ax = figure()
-    draw_friction(ax, JointIdentification("friction", "device", ()))
-    assert [text.get_text() for text in ax.texts] == ["nothing was identified"]
+def test_plot_draws_friction_and_mass_alike(identified):
+    for result in (identified, replace(identified, kind="mass")):
+        _, ax = figure()
+        assert "fitted forward" in [line.get_label() for line in result.plot(ax).get_lines()]

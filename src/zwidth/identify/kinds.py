@@ -45,6 +45,8 @@ class Kind:
 
 KINDS: Final[dict[str, Kind]] = {
     "stiffness": Kind("stiffness"),
+    "friction": Kind("friction"),
+    "mass": Kind("mass"),
     "impedance": Kind("impedance", takes_point=True),
     "boundary": Kind("boundary", takes_point=True),
     "arm": Kind("arm", takes_point=True),

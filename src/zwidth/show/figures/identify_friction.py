@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from zwidth.identify.friction import JointIdentification
-from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION, draw_empty, label, legend_above
+from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION, label, legend_above
 from zwidth.show.units import quantity
 
 INSET: Final = (0.6, 0.1, 0.38, 0.3)  # of the predicted motion, where friction has no points: backward is below
@@ -19,9 +19,6 @@ SHOWN: Final = 600  # samples of the unseen motion
 
 def draw_friction(ax: Axes, identification: JointIdentification) -> None:
     """Measured friction in segments of the motion, the fitted levels and slopes, and in an inset unseen motion."""
-    if not identification.estimates:
-        draw_empty(ax, "nothing was identified")
-        return
     angular = identification.angular
     velocity, friction = identification.velocity, identification.friction
     every = max(len(velocity) // MOST_POINTS, 1)
