@@ -56,5 +56,4 @@ def test_intervals_hold_the_true_values_of_93_to_97_percent_of_1000_joints():
     assert len(hits) > 850  # the rest moves by less than ten counts, or stands
     for name in NAMES:
         share = np.mean([one[name] for one in hits if name in one])
-        print(name, share)
         assert 0.93 <= share <= 0.97, (name, share)
