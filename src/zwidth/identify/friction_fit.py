@@ -2,8 +2,8 @@
 
 Within a window the motion follows from the recorded force alone; position and velocity at the window's first
 sample are parameters too (multiple shooting). What an encoder's steps add to slow motion is correlated over many
-samples, so the intervals do not come from the residuals' size but from blocks of consecutive samples: by how much
-the numbers change where one of them is left out.
+samples, so the intervals do not come from the residuals' size but from blocks of consecutive samples: what each of
+them adds to the numbers, and how that differs from block to block.
 """
 
 from __future__ import annotations
@@ -192,8 +192,7 @@ class JointFit:
         expected = float(np.trace(spread))
         if not expected > LEAST_SHARE * float(c @ self.working @ c):
             return value, np.inf, np.inf
-        blocks = len(self.changes)
-        error = float(np.sqrt((blocks - 1) / blocks * np.sum((self.changes @ c) ** 2)))
+        error = float(np.sqrt(np.sum((self.changes @ c) ** 2)))
         freedom = expected**2 / float(np.sum(spread**2))
         return value, error, float(t.ppf(0.5 + 0.5 * LEVEL, max(freedom, 1.0)))
 
@@ -429,11 +428,13 @@ def bias_of_windows(fit: JointFit) -> tuple[Floats, Floats]:
 
 
 def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Spread of the free numbers by what leaving out each block of a linearised fit changes.
+    """Spread of the free numbers by what each block of a linearised fit adds to them.
 
-    With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, leaving out block g
-    changes the numbers by  -N^-1 (1 - S_g P_g)^-1 A_g^T r_g  (the jackknife, in closed form for a linear fit),
-    which holds for any correlation within blocks, and errs to the safe side where blocks are few.
+    With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, block g adds
+    N^-1 (1 - S_g P_g)^-1/2 A_g^T r_g  to the numbers. The root makes up for what the fit has taken from the
+    residuals: the sum of squares then has the right mean where they are independent (Bell and McCaffrey 2002,
+    known at second hand), and it holds for any correlation within blocks. Leaving blocks out one by one, a
+    jackknife, has the power -1 in its place, too wide with the degrees of freedom of `JointFit.combination`.
     Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
     """
     whole = assembled(blocks, count)
@@ -448,7 +449,7 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     grown = _enlarged(S, inverse[columns[:, :, None], columns[:, None, :]])
     to = inverse[:free][:, columns].transpose(1, 0, 2) @ grown  # (G, p, q)
     changes = np.einsum("gpq,gq->gp", to, blocks.gradient / scale) / size[:free]
-    covariance = (G - 1) / G * changes.T @ changes
+    covariance = changes.T @ changes
     for i in np.flatnonzero(lost[:free]):
         covariance[i, i] = np.inf
     rows = np.zeros((G, free, len(whole)))
@@ -462,7 +463,7 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
 
 
 def _enlarged(S: Floats, P: Floats) -> Floats:
-    """(1 - S P)^-1 (G, q, q), through the symmetric matrix R S R with R the root of P."""
+    """(1 - S P)^-1/2 (G, q, q), through the symmetric matrix R S R with R the root of P."""
     values, vectors = np.linalg.eigh(P)
     root = np.sqrt(np.maximum(values, 0.0))
     R = (vectors * root[:, None, :]) @ np.swapaxes(vectors, 1, 2)
@@ -470,7 +471,7 @@ def _enlarged(S: Floats, P: Floats) -> Floats:
     inverse_root = (vectors * back[:, None, :]) @ np.swapaxes(vectors, 1, 2)
     leverage, axes = np.linalg.eigh(R @ S @ R)
     # a direction that one block alone determines leaves no residual there to be enlarged
-    factor = np.where(leverage < 1.0 - LEVERAGE, 1.0 / np.maximum(1.0 - leverage, LEVERAGE), 1.0)
+    factor = np.where(leverage < 1.0 - LEVERAGE, 1.0 / np.sqrt(np.maximum(1.0 - leverage, LEVERAGE)), 1.0)
     return np.asarray(inverse_root @ ((axes * factor[:, None, :]) @ np.swapaxes(axes, 1, 2)) @ R)
 
 
