@@ -40,6 +40,13 @@ joint_option = click.option(
 )
 
 
+spring_option = click.option(
+    "--spring/--no-spring",
+    default=None,
+    help="Whether a spring holds the joint. Default: where the data show one.",
+)
+
+
 def _refuse_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
     for value in values:
         refuse_empty(ctx, param, value)
@@ -125,7 +132,7 @@ class IdentifyCommand(Command):
         yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.estimates])
         yield f"validation: {100.0 * result.validation:.6g} % of the variance explained, {result.validated_on}"
         yield from result.remarks
-        if result.settings and not case["write"]:
+        if result.settings and not case["write"] and Path(case.question.name).is_file():
             yield f"to write them into {printable(case.question.name)}, comments kept: add --write"
 
     def write(
@@ -203,6 +210,43 @@ class StiffnessCommand(IdentifyCommand):
         ),
     )
     kind_options = ("joint", "side")
+
+
+class FrictionCommand(IdentifyCommand):
+    """Find the dry and viscous friction of a joint, both ways, from its motion and what drove it.
+
+    FILE has columns time_s, position_m or angle_rad, and force_N, torque_Nm or current_A as measured, or
+    force_command_N or torque_command_Nm; none of these where the joint moves freely. Record motion both ways,
+    slow and fast.
+    """
+
+    name = "friction"
+    summary = "Dry and viscous friction of a joint, both ways, from its motion."
+    examples = ("zwidth identify friction back-and-forth.csv --device my-device.toml --joint upper",)
+    options = (
+        joint_option,
+        spring_option,
+        click.option(
+            "--mass-from-file",
+            is_flag=True,
+            help="In free motion, which tells only friction over mass, take the mass that DEVICE gives.",
+        ),
+    )
+    kind_options = ("joint", "spring", "mass_from_file")
+
+
+class MassCommand(IdentifyCommand):
+    """Find the effective mass of a joint from its motion and what drove it.
+
+    FILE has columns time_s, position_m or angle_rad, and force_N, torque_Nm or current_A as measured, or
+    force_command_N or torque_command_Nm. Record motion with strong accelerations, both ways.
+    """
+
+    name = "mass"
+    summary = "Effective mass of a joint, from its motion and what drove it."
+    examples = ("zwidth identify mass shaken.csv --device my-device.toml --joint upper",)
+    options = (joint_option, spring_option)
+    kind_options = ("joint", "spring")
 
 
 class BoundaryCommand(IdentifyCommand):
@@ -319,6 +363,8 @@ class ArmCommand(IdentifyCommand):
 
 KINDS: tuple[Callable[[], IdentifyCommand], ...] = (
     StiffnessCommand,
+    FrictionCommand,
+    MassCommand,
     ImpedanceCommand,
     BoundaryCommand,
     ArmCommand,

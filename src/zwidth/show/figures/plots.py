@@ -296,5 +296,4 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Sweep": _sweep,
     "CommonArea": _common_area,
     "Identification": _identification,
-    "JointIdentification": _identification,
 }
