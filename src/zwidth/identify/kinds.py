@@ -47,6 +47,7 @@ KINDS: Final[dict[str, Kind]] = {
     "stiffness": Kind("stiffness"),
     "friction": Kind("friction"),
     "mass": Kind("mass"),
+    "response": Kind("response"),
     "impedance": Kind("impedance", takes_point=True),
     "boundary": Kind("boundary", takes_point=True),
     "arm": Kind("arm", takes_point=True),

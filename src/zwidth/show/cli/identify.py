@@ -361,10 +361,40 @@ class ArmCommand(IdentifyCommand):
     takes_point = True
 
 
+class ResponseCommand(IdentifyCommand):
+    """Find the response of DEVICE from raw sweeps, as a [response] reads it, and the chart that follows.
+
+    FILE has columns time_s, force_command_N, position_m, every sample of the loop; each file is a sweep, and
+    several are repetitions. `--output sweep.csv` is a file for a [response].
+    """
+
+    name = "response"
+    summary = "A frequency response with coherence from raw sweeps, and its chart."
+    examples = (
+        "zwidth identify response noise.csv --device my-device.toml --output sweep.csv",
+        "zwidth identify response up.csv down.csv --device my-device.toml --output response.svg",
+    )
+    options = (
+        click.option(
+            "--integrators",
+            type=click.IntRange(0, 2),
+            help="Poles at z = 1: 2 of a free device, 1 with a dashpot, 0 on a spring. Default: as the data say.",
+        ),
+        click.option(
+            "--segment",
+            metavar="SAMPLES",
+            type=click.IntRange(64),
+            help="Samples whose transform resolves what must be told apart. Default: by itself.",
+        ),
+    )
+    kind_options = ("integrators", "segment")
+
+
 KINDS: tuple[Callable[[], IdentifyCommand], ...] = (
     StiffnessCommand,
     FrictionCommand,
     MassCommand,
+    ResponseCommand,
     ImpedanceCommand,
     BoundaryCommand,
     ArmCommand,
