@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.low_frequencies import LowFrequencies, fit_low_frequencies
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
 
 # Phase of P (z - 1)^m at the lowest frequency, beyond which m is not believed [rad]
 CLEAR, CONTRADICTED = np.radians(30.0), np.radians(75.0)
+SETTLED = np.radians(5.0)  # the same phase, below which nothing else is asked
 UNLIKE = 0.75  # by which the exponent of |P| may differ from the one that its phase tells
 
 
@@ -73,7 +80,8 @@ class Response:
     value        (n,) complex [m/N]; the mean where there are several sweeps
     integrators  poles at z = 1 (0, 1 or 2); None: to be read off the phase, see `integrators_of`
     coherence    (n,) magnitude squared, 0 to 1; None: not known
-    averages     independent averages behind the coherence
+    averages     independent averages behind the coherence; 1: not known how many
+    freedom      (n,) complex values from which the coherence is known, beyond those fitted; None: averages - 1
     sweeps       (k, n) complex, the repetitions of which `value` is the mean; None: one measurement
     note         how the response was made, a sentence for people; "" where it was read unchanged
     handle       what is known at the handle; None: nothing
@@ -85,6 +93,7 @@ class Response:
     integrators: int | None = None
     coherence: Floats | None = None
     averages: float = 1.0
+    freedom: Floats | None = None
     sweeps: Complexes | None = None
     note: str = ""
     handle: MeasuredHandle | None = None
@@ -125,16 +134,35 @@ def relative_error(coherence: Floats, averages: float) -> Floats:
         return np.asarray(np.sqrt((1.0 - coherence) / (2.0 * averages * coherence)))
 
 
+def usable_frequencies(response: Response) -> Flags:
+    """Which frequencies (n,) a chart is made of: the response finite, not zero, and coherent enough."""
+    good = np.isfinite(response.value) & (response.value != 0.0)
+    if response.coherence is not None:
+        good &= response.coherence >= LEAST_COHERENCE
+    return np.asarray(good)
+
+
+def low_frequencies(response: Response) -> LowFrequencies:
+    """Stiffness, damping and mass to the ground that the lowest usable frequencies show."""
+    good = usable_frequencies(response)
+    error = None
+    if response.coherence is not None:
+        error = np.sqrt(2.0) * relative_error(response.coherence[good], response.averages)
+    return fit_low_frequencies(response.frequency[good], response.value[good], error)
+
+
 def integrators_of(response: Response, period: float) -> int:
-    """Poles of P at z = 1: as stated, or read off the phase at the lowest frequencies.
+    """Poles of P at z = 1: as stated, or read off the lowest frequencies.
 
     P (z - 1)^m is real and positive at z = 1, so that its phase falls to 0 with the frequency for the right m, and
-    to a multiple of 90 degrees for any other.
+    to a multiple of 90 degrees for any other. Where it has not yet done so at the lowest frequency, stiffness,
+    damping and mass to the ground are fitted (`low_frequencies`), and the first of them that is seen decides.
 
     Raises ResponseError  where the phase contradicts what is stated, leaves the number open, or does not belong to
                           the magnitude, which falls like f^-m
     """
-    f, P = response.frequency, response.value
+    good = usable_frequencies(response)
+    f, P = response.frequency[good], response.value[good]
     lowest = slice(0, max(3, int(np.searchsorted(f, 2.0 * f[0], side="right"))))
     d = np.exp(2j * np.pi * f[:3] * period) - 1.0
     whole = P[:3] * d ** np.arange(3)[:, None]
@@ -143,22 +171,30 @@ def integrators_of(response: Response, period: float) -> int:
     measured = np.degrees(np.angle(P[0]))
     where = f"the phase is {measured:.0f} degrees at {f[0]:.6g} Hz, the lowest frequency"
     nearest = int(np.argmin(np.abs(phases)))
-    if abs(phases[nearest]) < CLEAR and abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5:
+    clear, settled = abs(phases[nearest]) < CLEAR, abs(phases[nearest]) < SETTLED
+    unlike = abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5
+    fit = low_frequencies(response) if unlike or not settled or response.integrators == 1 else None
+    if clear and unlike and not (fit and fit.integrators is not None):
         raise ResponseError(
             f"{where}, but the magnitude falls like f^-{fall:.1f} there, which goes with "
             f"{-90 * min(round(fall), 2)} degrees; are columns swapped, or is this no force to position?"
         )
     if response.integrators is not None:
         m = response.integrators
-        if abs(phases[m]) > CONTRADICTED:
+        # the corner of a mass and a dashpot may lie below the data: there it is a free mass
+        hidden = m == 1 and fit is not None and fit.integrators in (1, 2)
+        if abs(phases[m]) > CONTRADICTED and not hidden:
             raise ResponseError(
                 f"integrators = {m} does not fit: {where}, where {-90 * m} is expected; give 0 for a device on a "
                 "spring, 1 for one with a dashpot to the ground, 2 for a free one, or measure lower"
             )
         return m
-    if abs(phases[nearest]) > CLEAR:
+    if fit is not None and fit.integrators is not None:
+        return fit.integrators
+    if not clear:
         raise ResponseError(
-            f"the number of integrators cannot be read off: {where}, which is not near 0, -90 or -180; "
-            "state integrators = 0, 1 or 2 in [response], or measure lower"
+            f"the number of integrators cannot be read off: {where}, and no stiffness, damping and mass to the "
+            "ground explain what is measured there; are the sign, the columns and the units right? If so, state "
+            "integrators = 0, 1 or 2 in [response], or measure lower"
         )
     return nearest

@@ -5,29 +5,38 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.local_polynomials import MOST_TILES, NARROWEST, local_response
 from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 SHORTEST_SEGMENT = 64  # samples
-SEGMENTS = 8  # into which a record is cut where nothing is said, half of each shared with the next
-OVERLAP_KEPT = 1.0 + 2.0 / 36.0  # Hann windows that share a half: variance as of so many times fewer segments
+FEWEST_SAMPLES = 2 * SHORTEST_SEGMENT
 EXCITED = 1e-7  # power of the force, over its largest, below which a frequency was not excited
+LEFT_AT_END = 0.1  # the same over that at frequencies from half of it on: there an excitation ends
+AVERAGES = 8.0  # in a spectrum of which the coherence that is given leaves the same error
+CLOSEST = 3.0  # spacing of the response's frequencies, in those of the record's transform
+RATIO = 0.01  # the same in shares of the frequency
+BELOW_ALL_STEPS = 1e-9  # of the largest reading: what is closer is no step of an encoder, but rounding
 
 
 def sweep_response(
     force: Floats, position: Floats, period: float, integrators: int | None = None, segment: int | None = None
 ) -> Response:
-    """The response P of a sampled record by averaged cross-spectra, P = S_fy / S_ff, and its coherence.
+    """The response P of a sampled record, and the coherence that tells its error.
 
-    Welch's method (Welch 1967): Hann windows of `segment` samples that overlap by half. A device without a spring
-    drifts, and what it drifts leaks into every frequency; so the position is differenced first, once for each
-    integrator (twice where their number is not known), and the spectrum divided by (z - 1)^m again. The coherence
-    is that of the differenced position.
+    By polynomials over the transform of the whole record (`local_polynomials`). A device without a spring drifts;
+    so the position is differenced first, once for each integrator (twice where their number is not known), and the
+    result divided by (z - 1)^m again. Noise is taken to be at least that of the encoder's steps, q^2 / 12 in each
+    reading, whatever the record shows: readings that follow the force alone hide it.
 
     force, position  (n,) [N], [m], one sample per period; position[j] is read when force[j] is sent
     integrators      poles at z = 1: 0, 1 or 2; None: not known
-    segment          samples in a segment; None: the power of two that makes about 15 of them
+    segment          samples that resolve what must be told apart: no window is narrower than one spacing of a
+                     transform of so many; None: 13 spacings of that of the whole record
+    Returns          frequencies 1 % apart, the lowest at three periods in the record; `coherence` is what would
+                     leave the same error in a spectrum of `averages` averages
     Raises           ResponseError  where the record is shorter than two segments, or the force is constant
 
     >>> rng = np.random.default_rng(1)
@@ -38,10 +47,10 @@ def sweep_response(
     >>> float(np.max(np.abs(found.value * (z - 1.0) - 1.0))) < 1e-9
     True
     """
-    from scipy.signal import csd, welch
+    from scipy.fft import rfft
 
     m = 2 if integrators is None else integrators
-    length = segment or 2 ** int(np.log2(max(len(force) / SEGMENTS, 1.0)))
+    length = segment or SHORTEST_SEGMENT
     if length < SHORTEST_SEGMENT or len(force) < 2 * length + m:
         raise ResponseError(
             f"has {len(force)} samples, too few for two segments of {max(length, SHORTEST_SEGMENT)}; record "
@@ -50,22 +59,48 @@ def sweep_response(
     if np.ptp(force) == 0.0:
         raise ResponseError(f"the commanded force is {force[0]:g} N all the time; excite the device")
     differences = np.diff(position, n=m)
-    force_samples = force[: len(differences)]
-    settings = {"fs": 1.0 / period, "window": "hann", "nperseg": length, "noverlap": length // 2}
-    f, cross = csd(force_samples, differences, **settings)
-    _, of_force = welch(force_samples, **settings)
-    _, of_moved = welch(differences, **settings)
+    count = len(differences)
+    U, Y = rfft(force[:count]), rfft(differences)
+    one = np.abs(2.0 * np.sin(np.pi * np.arange(len(U)) / count)) ** (2 * m)
+    floor = count * encoder_step(position) ** 2 / 12.0 * one
+    narrowest = max(NARROWEST, 2 * (count // (4 * segment)) if segment else 2 * (len(U) // (2 * MOST_TILES)))
+    places = _places(len(force)) * count
+    local = local_response(U, Y, places, floor, min(narrowest, 2 * ((len(U) - 2) // 4)))
     with np.errstate(divide="ignore", invalid="ignore"):
-        coherence = np.abs(cross) ** 2 / (of_force * of_moved)
-        value = cross / of_force / (np.exp(2j * np.pi * f * period) - 1.0) ** m
-    excited = (of_force > EXCITED * np.max(of_force)) & np.isfinite(coherence)
-    count = 1 + (len(force_samples) - length) // (length - length // 2)
-    usable = slice(2, None)  # the window mixes the mean into the first frequency
+        relative = local.variance / np.abs(local.value) ** 2
+        coherence = 1.0 / (1.0 + AVERAGES * relative)
+        value = local.value / (np.exp(2j * np.pi * places / count) - 1.0) ** m
+    excited = _excited(places, local.excited) & np.isfinite(coherence) & np.isfinite(value)
     return Response(
-        frequency=f[usable],
-        value=np.where(np.isfinite(value), value, 0.0)[usable],
+        frequency=places / count / period,
+        value=np.where(np.isfinite(value), value, 0.0),
         integrators=integrators,
-        coherence=np.where(excited, np.clip(coherence, 0.0, 1.0), 0.0)[usable],
-        averages=count / OVERLAP_KEPT,
-        note=f"from {len(force)} samples by {count} Hann segments of {length}",
+        coherence=np.where(excited, coherence, 0.0),
+        averages=AVERAGES,
+        freedom=local.freedom,
+        note=f"from {len(force)} samples by local polynomials",
     )
+
+
+def _excited(places: Floats, power: Floats) -> Flags:
+    """Which places (n,) the force excites: with some power, and not above the frequency where it ends."""
+    usual = np.array([np.median(power[(places >= 0.5 * place) & (places <= place)]) for place in places])
+    enough = np.flatnonzero(power >= LEFT_AT_END * usual)
+    return np.asarray((power > EXCITED * np.max(power)) & (np.arange(len(places)) <= enough[-1]))
+
+
+def _places(samples: int) -> Floats:
+    """Frequencies of the response, in those of sampling, (n,) up to 1/2: for all records of about one length."""
+    whole = 2 ** int(np.log2(samples))
+    first = np.arange(CLOSEST, CLOSEST / RATIO, CLOSEST)
+    first = first[first < 0.5 * whole]
+    steps = np.ceil(np.log(0.5 * whole / first[-1]) / RATIO)
+    above = first[-1] * np.exp(np.log(0.5 * whole / first[-1]) * np.arange(1, steps + 1) / max(steps, 1.0))
+    return np.minimum(np.concatenate([first, above]) / whole, 0.5)
+
+
+def encoder_step(position: Floats) -> float:
+    """The smallest step [m] between readings (n,): that of the encoder, or next to nothing without one."""
+    gaps = np.diff(np.unique(position))
+    gaps = gaps[gaps > BELOW_ALL_STEPS * np.max(np.abs(position))]
+    return float(np.min(gaps)) if len(gaps) else 0.0

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isnan, nan
+from functools import cached_property
+from math import nan
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.chart_base import BoundaryArc, Chart, DrawnChart
-from zwidth.chart.measured.boundary import Boundary, coarse_angles, real_root, sample_boundary
+from zwidth.chart.measured.boundary import (
+    Boundary,
+    coarse_angles,
+    first_angles,
+    real_root,
+    refine_angles,
+    sample_boundary,
+)
+from zwidth.chart.measured.doubt import Doubt, doubt_of
 from zwidth.chart.measured.extreme_walls import angles_at_wall, largest_damping, refine_peak
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.measured.stable_regions import (
@@ -23,14 +32,15 @@ from zwidth.chart.measured.stable_regions import (
     regions_within,
     window_of_regions,
 )
-from zwidth.chart.measured.uncertainty_band import Band, uncertainty_band
+from zwidth.chart.measured.stiffness_limits import CertainWall, certain_wall, largest_possible
+from zwidth.chart.measured.uncertainty_band import Band, band_rings
 from zwidth.chart.measured.usable_frequencies import UnusableRange
 from zwidth.chart.measured.verdict import EdgeFrequencies, MeasuredVerdicts, judge_measured
 from zwidth.chart.rings import Window, cut_at_holes, window_of
 from zwidth.chart.traced_edge import TracedEdge
-from zwidth.chart.verdict import UNDECIDED
 from zwidth.loop.controller import Controller
 from zwidth.model.argument_checks import require
+from zwidth.model.joint_confidence import CONFIDENCE, joint_radius
 from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
@@ -38,16 +48,25 @@ Floats = NDArray[np.float64]
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it
 FEWEST_ON_EDGE = 3  # measured frequencies that a cell's edge needs to be credible
+GRID = 7  # walls along K and along B that are tried in a cell
+DOUBT_CHORD = 1e-3  # distance of chords between angles of doubt from the curve, as a share of the window
+MOST_DOUBTED = 1000  # angles of the edge among these
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class MeasuredChart(DrawnChart):
     """The stable walls of a measured device.
 
+    `stiffness_max`, its damping and its frequencies are those of the stiffest wall that is stable for certain: whatever
+    the true response within the measurement's error. `regions`, `boundary`, `damping_max` and `stable_area` are
+    nominal, of the response as it was measured. Where no error is known, both are the same.
+
+    stiffness_max_nominal, damping_at_stiffness_max_nominal, frequencies_at_stiffness_max_nominal
+                          of the response as it was measured [N/m], [N s/m], [Hz]; nan, () if no wall is stable
     edge                  every wall with a root on the circle, as far as it was measured
     boundary              arcs of measured points, ascending in frequency, and lines of real roots by their two
                           ends; what is interpolated between them shows in `regions` only
-    interpolation_error   relative error that interpolation is expected to leave in stiffness_max
+    interpolation_error   relative error that interpolation is expected to leave in stiffness_max_nominal
     measured_stiffness_max  the stiffest of the measured points on the edge with K > 0, B >= 0 [N/m]; nan: none
     band                  walls whose verdict the measurement's error leaves open; None where no error is known
     stiffness_max_of_sweeps  of each repeated sweep alone [N/m]; () for one measurement
@@ -57,6 +76,9 @@ class MeasuredChart(DrawnChart):
     """
 
     loop: MeasuredLoop
+    stiffness_max_nominal: float
+    damping_at_stiffness_max_nominal: float
+    frequencies_at_stiffness_max_nominal: tuple[float, ...]
     edge: Boundary
     interpolation_error: float
     measured_stiffness_max: float
@@ -77,6 +99,11 @@ class MeasuredChart(DrawnChart):
         """Poles of the response at z = 1."""
         return self.loop.integrators
 
+    @cached_property
+    def doubt(self) -> Doubt | None:
+        """What the measurement's error leaves in doubt; None where no error is known."""
+        return doubt_along(self.loop, self.edge, self.window)
+
     @property
     def measured_up_to_share(self) -> float:
         """Where the data end, as a share of half the sampling rate; 1 where they reach it."""
@@ -94,11 +121,16 @@ class MeasuredChart(DrawnChart):
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""
-        return judge_measured(self.loop, self.edge, wall_stiffness, wall_damping, edge_frequencies(self))
+        return judge_measured(
+            self.loop, self.edge, self.doubt, wall_stiffness, wall_damping, edge_frequencies(self)
+        )
 
     def document(self) -> dict[str, Any]:
         """The chart as numbers and lists, under the keys of `zwidth chart --json`; nan where there is none."""
         return super().document() | {
+            "stiffness_max_nominal_N_per_m": self.stiffness_max_nominal,
+            "damping_at_stiffness_max_nominal_Ns_per_m": self.damping_at_stiffness_max_nominal,
+            "frequencies_at_stiffness_max_nominal_Hz": list(self.frequencies_at_stiffness_max_nominal) or None,
             "integrators": self.integrators,
             "measurement": self.loop.response.note or None,
             "measured_stiffness_max_N_per_m": self.measured_stiffness_max,
@@ -112,9 +144,10 @@ class MeasuredChart(DrawnChart):
 
     def _numbers(self) -> list[str]:
         if self.band is None:
-            return super()._numbers()
-        low, high = self.band.stiffness_low, self.band.stiffness_high
-        return [*super()._numbers(), f"largest stiffness  {low:.6g} to {high:.6g} N/m within {self.band.meaning}"]
+            return [*super()._numbers(), "error              not known; nothing is said about how sure this is"]
+        high = self.band.stiffness_high
+        nominal = f"{self.stiffness_max_nominal:.6g} N/m as measured, at most {high:.6g} N/m"
+        return [*super()._numbers(), f"within the error   {nominal}, {self.band.meaning}"]
 
 
 def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
@@ -124,6 +157,9 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
 
     The stable cells are those without a root outside the unit circle (`root_count`). Assumed of the device:
     without a wall it is stable but for its integrators.
+
+    Where the error of the response is known, the largest stiffness is that of walls that are stable for every
+    response within it (`doubt`), and cells without a single such wall are noise and left out.
 
     response    force command sample -> encoder sample, hold and hardware delay included
     controller  the computer's part; its delay is what software adds, whole samples
@@ -145,8 +181,7 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     chart = _chart(loop, cells, not closed)
     if response.sweeps is None:
         return chart
-    each = [measured_chart(_one_sweep(response, k), controller).stiffness_max for k in range(len(response.sweeps))]
-    return replace(chart, stiffness_max_of_sweeps=tuple(each))
+    return replace(chart, stiffness_max_of_sweeps=tuple(_nominal_of_sweeps(response, controller)))
 
 
 def edge_frequencies(chart: MeasuredChart) -> EdgeFrequencies | None:
@@ -168,24 +203,44 @@ def edge_frequencies(chart: MeasuredChart) -> EdgeFrequencies | None:
     return EdgeFrequencies(np.vstack(pieces), np.concatenate(frequencies), high - low)
 
 
-def _one_sweep(response: Response, sweep: int) -> Response:
-    """One of the repeated sweeps as a response of its own."""
-    assert response.sweeps is not None
-    return replace(response, value=response.sweeps[sweep], sweeps=None, coherence=None)
+def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[float]:
+    """The largest stiffness [N/m] of each repeated sweep as it was measured; nan where none is certain.
+
+    Each is as far from the truth as their mean times the square root of their number.
+    """
+    radius, sweeps = joint_radius(response), response.sweeps
+    assert sweeps is not None and radius is not None
+    variance = radius**2 * len(sweeps) / np.log(len(radius) / (1.0 - CONFIDENCE))
+    for sweep in sweeps:
+        alone = replace(response, value=sweep, sweeps=None, coherence=1.0 / (1.0 + variance), averages=1.0)
+        try:
+            yield measured_chart(alone, controller).stiffness_max_nominal
+        except ResponseError:
+            yield nan
 
 
 def _credible_cells(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:
     """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
-    credible = []
-    for cell in cells.polygons:
-        unit = shapely.transform(cell, lambda xy: xy / scale)
-        on_it = np.count_nonzero(_edge_distances(loop, cell, scale) < ON_IT)
-        deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(unit))[0] * scale
-        doubtful = judge_measured(loop, cells.edge, *deepest).verdict == UNDECIDED
-        credible.append(on_it >= FEWEST_ON_EDGE and not doubtful)
+    doubt = doubt_along(loop, cells.edge, cells.box) if cells.polygons else None
+    credible = [
+        np.count_nonzero(_edge_distances(loop, cell, scale) < ON_IT) >= FEWEST_ON_EDGE
+        and (doubt is None or not np.all(doubt.stretches(_walls_within(cell, scale))[0]))
+        for cell in cells.polygons
+    ]
     return cells.select(np.array(credible, dtype=bool))
+
+
+def _walls_within(cell: shapely.Polygon, scale: Floats) -> Floats:
+    """Walls (n, 2) of a cell: the deepest one, and those of a grid over it."""
+    unit = shapely.transform(cell, lambda xy: xy / scale)
+    deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(unit))[:1]
+    low_K, low_B, high_K, high_B = unit.bounds
+    shares = (np.arange(GRID) + 0.5) / GRID
+    K, B = np.meshgrid(low_K + shares * (high_K - low_K), low_B + shares * (high_B - low_B))
+    grid = np.column_stack([K.ravel(), B.ravel()])
+    return np.asarray(np.vstack([deepest, grid[shapely.contains_xy(unit, *grid.T)]]) * scale)
 
 
 def _edge_distances(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) -> Floats:
@@ -214,23 +269,30 @@ def _stable_regions(loop: MeasuredLoop) -> tuple[StableRegions | None, bool]:
         room_K, room_B = 0.1 * (high_K - low_K), 0.1 * (high_B - low_B)
         near = (low_K - room_K, high_K + room_K, low_B - room_B, high_B + room_B)
         credible = _credible_cells(loop, regions_within(loop, known, near))
-    if cells.polygons and not credible.polygons:
+    if cells.polygons and not credible.polygons and loop.errors is None:
         raise ResponseError(_no_edge_message(loop))
     return (credible if credible.polygons else None), not credible.open
 
 
 def _empty_chart(loop: MeasuredLoop) -> MeasuredChart:
-    """The chart of a device without a stable wall. Raises ResponseError where the data cannot tell."""
-    if any(stretch.low == loop.response.frequency[loop.usable][-1] for stretch in loop.unusable):
+    """The chart of a device without a wall that is stable for certain.
+
+    Raises  ResponseError  where no error is known, and the data end before any edge
+    """
+    ends_early = any(stretch.low == loop.response.frequency[loop.usable][-1] for stretch in loop.unusable)
+    if ends_early and loop.errors is None:
         raise ResponseError(_no_edge_message(loop))
     none = TracedEdge(Arcs.of(()), ())
     return MeasuredChart(
         **none.chart_fields(loop.period, lambda K, B: False),
         loop=loop,
+        stiffness_max_nominal=nan,
+        damping_at_stiffness_max_nominal=nan,
+        frequencies_at_stiffness_max_nominal=(),
         edge=sample_boundary(loop, coarse_angles(loop)),
         interpolation_error=nan,
         measured_stiffness_max=nan,
-        band=None,
+        band=None if loop.errors is None else Band((), nan, nan, _meaning(loop)),
         stiffness_max_of_sweeps=(),
         unusable=loop.unusable,
         open=False,
@@ -256,6 +318,7 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
     h, w = loop.h(at_peak), loop.w(at_peak)
     errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
+    certain, band = _within_error(loop, cells, CertainWall(*peak, tuple(angles)), opened)
     return MeasuredChart(
         loop=loop,
         edge=cells.edge,
@@ -263,14 +326,17 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
             np.array(piece.exterior.coords) for cell in cells.polygons for piece in cut_at_holes(cell)
         ),
         drawn_boundary=arcs,
-        stiffness_max=peak[0],
-        damping_at_stiffness_max=peak[1],
-        frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
+        stiffness_max=certain.stiffness,
+        damping_at_stiffness_max=certain.damping,
+        frequencies_at_stiffness_max=tuple(a / (2.0 * np.pi * loop.period) for a in certain.angles),
+        stiffness_max_nominal=peak[0],
+        damping_at_stiffness_max_nominal=peak[1],
+        frequencies_at_stiffness_max_nominal=tuple(a / (2.0 * np.pi * loop.period) for a in angles),
         damping_max=nan if opened else largest_damping(loop, cells),
         stable_area=nan if opened else quadrant_area(cells.edge_arcs, ()),
         interpolation_error=float(np.max(errors, initial=0.0) / peak[0]) + ZOOMED,
         measured_stiffness_max=max((K for K, B in points if K > 0.0 and B >= 0.0), default=nan),
-        band=None if opened else _widen_to_peak(uncertainty_band(loop, cells), peak[0]),
+        band=band,
         stiffness_max_of_sweeps=(),
         unusable=tuple(_mark_on_edge(loop, cells)),
         open=opened,
@@ -278,13 +344,45 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
     )
 
 
-def _widen_to_peak(band: Band | None, stiffest: float) -> Band | None:
-    """The band, widened to hold the largest stiffness: that is found with finer chords than the ellipses."""
-    if band is None or isnan(stiffest):
-        return band
-    # where no wall is stable beyond doubt, nan stays
-    low = band.stiffness_low if isnan(band.stiffness_low) else min(band.stiffness_low, stiffest)
-    return replace(band, stiffness_low=low, stiffness_high=float(np.fmax(band.stiffness_high, stiffest)))
+def _within_error(
+    loop: MeasuredLoop, cells: StableRegions, nominal: CertainWall, opened: bool
+) -> tuple[CertainWall, Band | None]:
+    """The stiffest wall that is stable for certain, and the band of the error.
+
+    The nominal one and None where no error is known; none and None where the edge is open.
+    """
+    doubt = doubt_along(loop, cells.edge, cells.box)
+    if doubt is None:
+        return nominal, None
+    if opened:
+        return CertainWall(), None
+    most_damping = max(cells.box[3], 0.0)
+    certain = certain_wall(cells.edge, doubt, most_damping)
+    if nominal.stiffness < certain.stiffness:  # it is found with finer chords
+        certain = nominal
+    return certain, Band(
+        regions=band_rings(loop, cells),
+        stiffness_low=certain.stiffness,
+        stiffness_high=largest_possible(cells.edge, doubt, nominal, most_damping),
+        meaning=_meaning(loop),
+    )
+
+
+def doubt_along(loop: MeasuredLoop, edge: Boundary, box: Window) -> Doubt | None:
+    """What the measurement's error leaves in doubt, at angles close enough for walls within a box."""
+    if loop.errors is None:
+        return None
+    every = np.union1d(first_angles(loop), edge.angles[:: max(1, len(edge.angles) // MOST_DOUBTED)])
+    return doubt_of(loop, refine_angles(loop, every, box, DOUBT_CHORD))
+
+
+def _meaning(loop: MeasuredLoop) -> str:
+    """What the band covers, in words."""
+    response = loop.response
+    sources = ["coherence"] if response.coherence is not None else []
+    if response.sweeps is not None:
+        sources.append(f"the scatter of {len(response.sweeps)} sweeps")
+    return f"95 % confidence at all frequencies together, from {' and '.join(sources)}"
 
 
 def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
@@ -300,9 +398,8 @@ def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
         if loop.errors is None:
             yield BoundaryArc(K, B, given)
         else:
-            w = loop.w(theta)
-            reach = loop.error(theta) * np.abs(w) / np.abs(w.imag)
-            yield BoundaryArc(K, B, given, stiffness_low=K - reach, stiffness_high=K + reach)
+            low, high = _stiffness_in_doubt(loop, theta)
+            yield BoundaryArc(K, B, given, stiffness_low=low, stiffness_high=high)
     lines = [(-1, 0.0), (-2, half)] if loop.interpolation.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)
@@ -312,6 +409,17 @@ def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
             for low, high in _line_intervals(np.array(cell.exterior.coords), static, turned, scale):
                 ends = np.array([low, high])
                 yield BoundaryArc(static - ends * turned, ends, np.full(2, frequency))
+
+
+def _stiffness_in_doubt(loop: MeasuredLoop, theta: Floats) -> tuple[Floats, Floats]:
+    """The least and the largest K (n,) [N/m] that each angle leaves in doubt, at any B; infinite where it is all."""
+    h, w, r = loop.h(theta), loop.w(theta), loop.relative_error(theta)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        middle = h / (1.0 - r * r)
+        K = middle.real - middle.imag / w.imag * w.real
+        reach = np.where(r < 1.0, r * np.abs(middle) * np.abs(w / w.imag), np.inf)
+    K = np.where(r < 1.0, K, 0.0)
+    return K - reach, K + reach
 
 
 def _line_intervals(ring: Floats, h: float, w: float, scale: Floats) -> Iterator[tuple[float, float]]:

@@ -13,18 +13,32 @@ from zwidth.chart.measured.response_interpolation import (
     ResponseInterpolation,
     around_one,
     interpolate_response,
+    smooth_part,
 )
-from zwidth.chart.measured.usable_frequencies import UnusableRange, is_usable, reaches_half_rate, unusable_ranges
+from zwidth.chart.measured.usable_frequencies import (
+    CONTINUED,
+    UnusableRange,
+    reaches_half_rate,
+    unusable_ranges,
+)
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter, velocity_estimator
-from zwidth.model.response import Response, ResponseError, integrators_of, relative_error
+from zwidth.model.joint_confidence import CONFIDENCE, joint_radius
+from zwidth.model.low_frequencies import LowFrequencies
+from zwidth.model.response import Response, ResponseError, integrators_of, low_frequencies, usable_frequencies
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Whole = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
-# Radius of the disk that holds 95 % of a circular Gaussian error, in standard deviations: sqrt(-2 ln 0.05)
-DISK = float(np.sqrt(-2.0 * np.log(0.05)))
+BETWEEN = 2.0  # times the error that interpolation is expected to leave: what is allowed for between frequencies
+SETTLED = np.radians(3.0)  # phase at the lowest frequency, below which nothing is fitted to what lies below
+UNSURE_ACROSS = 0.1  # relative error from which the response is taken straight across what is not used
+UNSURE_BELOW = 0.5  # the same from which the lowest frequencies are left to what is fitted to them
+ENDING = 7  # last frequencies from which the response is continued to half the sampling rate, and steps of that
+HALVINGS = 12  # of the lowest frequency, at which what is fitted continues the response, at most
 
 
 @dataclass(frozen=True)
@@ -57,7 +71,7 @@ class MeasuredLoop:
                 f"has frequencies up to {f[-1]:.6g} Hz, above half the sampling rate, {half:.6g} Hz; leave them "
                 "out, or correct sampling_period_s"
             )
-        good = is_usable(self.response)
+        good = usable_frequencies(self.response) & ~_lowest_unsure(self.response)
         if np.count_nonzero(good) < FEWEST:
             raise ResponseError(
                 f"has {np.count_nonzero(good)} usable frequencies of {len(f)}; at least {FEWEST} are needed, "
@@ -88,10 +102,61 @@ class MeasuredLoop:
 
     @cached_property
     def interpolation(self) -> ResponseInterpolation:
-        """The response between these angles."""
-        P = self.response.value[self.usable]
+        """The response between these angles, below them, and above where it is known to be small."""
         closed, to_end = reaches_half_rate(self.angles)
-        return interpolate_response(self.angles, P, self.integrators, closed=closed, measured_to_half_rate=to_end)
+        low, P_low = self._continued_down()
+        high, P_high = (np.empty(0), np.empty(0)) if to_end or not self.bounded else self._continued_up()
+        return interpolate_response(
+            np.concatenate([low, self.angles, high]),
+            np.concatenate([P_low, self.response.value[self.usable], P_high]),
+            self.integrators,
+            closed=closed or self.bounded,
+            measured_to_half_rate=to_end,
+            straight=np.concatenate(
+                [np.zeros(len(low), dtype=bool), self._across_noise, np.ones(len(high), dtype=bool)]
+            ),
+        )
+
+    @property
+    def _across_noise(self) -> Flags:
+        """Between which of `angles` (n - 1,) noise was measured, and the response is not sure at the ends either."""
+        if self.errors is None:
+            return np.zeros(len(self.angles) - 1, dtype=bool)
+        left_out = np.diff(np.flatnonzero(self.usable)) > 1
+        return np.asarray(left_out & (np.maximum(self.errors[1:], self.errors[:-1]) > UNSURE_ACROSS))
+
+    @cached_property
+    def low_frequencies(self) -> LowFrequencies:
+        """Stiffness, damping and mass to the ground that the lowest frequencies show."""
+        return low_frequencies(self.response)
+
+    def _continued_down(self) -> tuple[Floats, Complexes]:
+        """Angles below the data and P there, from the fit; none where the phase has settled, or nothing fits."""
+        m, f = self.integrators, self.response.frequency[self.usable][0]
+        P = self.response.value[self.usable][0]
+        none = np.empty(0), np.empty(0, dtype=complex)
+        if abs(np.angle(P * around_one(self.angles[0]) ** m)) < SETTLED or not self.low_frequencies.fits:
+            return none
+        if self.low_frequencies.terms[m] <= 0.0:
+            return none
+        shares = 0.5 ** np.arange(HALVINGS, 0, -1)
+        fitted = 1.0 / self.low_frequencies.inverse(shares * f, m)
+        # to what was measured: the whole difference in size, and the part in phase that is left at the frequency
+        ratio = P * self.low_frequencies.inverse(np.array(f), m)
+        return self.angles[0] * shares, fitted * np.abs(ratio) * np.exp(1j * shares * np.angle(ratio))
+
+    def _continued_up(self) -> tuple[Floats, Complexes]:
+        """Angles above the last usable one, and P there: P (z - 1)^m as large as it was, its phase turned evenly to
+        that of a real number."""
+        P, m, last = self.response.value[self.usable], self.integrators, self.angles[-1]
+        G, delay = smooth_part(self.angles, P, m)
+        near = slice(-ENDING, None)
+        size, phase = np.exp(np.median(np.log(np.abs(G[near])))), np.angle(np.sum(G[near] / np.abs(G[near])))
+        share = np.arange(1, ENDING + 1) / ENDING
+        turned = phase + share * (np.pi * np.round(phase / np.pi) - phase)
+        theta = last + share * (np.pi - last)
+        continued = size * np.exp(1j * (turned - delay * theta)) / around_one(theta) ** m
+        return theta, continued
 
     @cached_property
     def unusable(self) -> tuple[UnusableRange, ...]:
@@ -126,19 +191,101 @@ class MeasuredLoop:
 
     @cached_property
     def errors(self) -> Floats | None:
-        """Radius (n,) of the disk round each h of `angles` that holds the true one, over |h|; None: unknown.
+        """Radius (n,) of the disk round each P of `angles` that holds the true one, over |P|; None: unknown.
 
-        From coherence: 95 % of the error. From repeated sweeps: the farthest of them.
+        All of them together with 95 %: see `joint_radius`.
         """
-        response, good = self.response, self.usable
-        if response.sweeps is not None:
-            return np.asarray(np.max(np.abs(response.value[good] / response.sweeps[:, good] - 1.0), axis=0))
-        if response.coherence is not None:
-            return np.asarray(DISK * relative_error(response.coherence[good], response.averages))
-        return None
+        return None if self._radius is None else self._radius[self.usable]
 
-    def error(self, theta: Floats) -> Floats:
-        """The radius (...) of the disk round h at any angle; 0 where no error is known."""
-        if self.errors is None:
+    @cached_property
+    def _radius(self) -> Floats | None:
+        """Radius (n,) over |P| at all frequencies, usable or not."""
+        return joint_radius(self.response)
+
+    @cached_property
+    def _doubted(self) -> Whole:
+        """Indices of frequencies that are not used, although something was measured there."""
+        known = self._radius is not None and np.isfinite(self._radius) & np.isfinite(self.response.value)
+        return np.flatnonzero(known & ~self.usable)
+
+    @cached_property
+    def error_nodes(self) -> tuple[Floats, Floats] | None:
+        """Angles (k,) within the data, and how far the true response may be from the interpolated one there,
+        over the latter (k,); None where no error is known."""
+        if self._radius is None or self.errors is None:
+            return None
+        at = self._doubted
+        theta = 2.0 * np.pi * self.response.frequency[at] * self.period
+        within = (theta > self.angles[0]) & (theta <= self.largest_angle * (1.0 + 1e-9))
+        at, theta = at[within], np.minimum(theta[within], np.pi)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            measured = self.response.value[at] * self.interpolation.inverse(theta)
+        radius = np.abs(measured - 1.0) + self._radius[at] * np.abs(measured)
+        order = np.argsort(np.concatenate([self.angles, theta]), kind="stable")
+        return np.concatenate([self.angles, theta])[order], np.concatenate([self.errors, radius])[order]
+
+    def _node_error(self, theta: Floats) -> Floats:
+        """The error of `error_nodes` at angles (...): relative between used frequencies, else that of P (z - 1)^m."""
+        assert self.error_nodes is not None
+        angles, radius = self.error_nodes
+        used = np.isin(angles, self.angles)
+        with np.errstate(divide="ignore"):
+            size = 1.0 / np.abs(self.interpolation.inverse(angles) * around_one(angles) ** -self.integrators)
+            own = np.abs(self.interpolation.inverse(theta) * around_one(theta) ** -self.integrators)
+        relative = np.interp(theta, angles, radius)
+        absolute = np.interp(theta, angles, radius * size) * own
+        after = np.clip(np.searchsorted(angles, theta), 1, len(angles) - 1)
+        return np.asarray(np.where(used[after] & used[after - 1], relative, absolute))
+
+    @cached_property
+    def bounded(self) -> bool:
+        """Whether something was measured at least nearly up to half the sampling rate, if only noise: then the
+        response is known not to exceed it."""
+        theta = 2.0 * np.pi * self.response.frequency[self._doubted] * self.period
+        return bool(np.any(theta >= CONTINUED * np.pi))
+
+    def relative_error(self, theta: Floats) -> Floats:
+        """How far the true response may be from the interpolated one at angles (...), over the latter.
+
+        Between frequencies twice what interpolation is expected to leave; beyond the last as much more as the
+        response changed over as long a way before. 0 where no error is known.
+        """
+        if self.error_nodes is None:
             return np.zeros(np.shape(theta))
-        return np.asarray(np.interp(theta, self.angles, self.errors) * np.abs(self.h(theta)))
+        angles, theta = self.error_nodes[0], np.asarray(theta)
+        error = self._node_error(theta) + BETWEEN * self.interpolation.relative_error(theta)
+        past = np.maximum(theta - angles[-1], 0.0)
+        if np.pi - angles[-1] > 1e-9 and np.any(past > 0.0):
+            P = 1.0 / self.interpolation.inverse(np.array([max(2.0 * angles[-1] - np.pi, angles[0]), angles[-1]]))
+            changed = np.abs(np.log(np.abs(P[1] / P[0]))) + np.abs(np.angle(P[1] / P[0]))
+            error = error + changed * past / (np.pi - angles[-1])
+        return np.asarray(error)
+
+    def error_below(self, theta: Floats) -> Floats:
+        """How far the true h may be from the interpolated one at angles (...) below the data [N/m].
+
+        Of what is fitted to the lowest frequencies, with all its terms: whether there is a weak spring or a weak
+        dashpot to the ground is a part of it. Where nothing fits, as much as h at the lowest frequency.
+        """
+        theta = np.asarray(theta)
+        if self.error_nodes is None:
+            return np.zeros(theta.shape)
+        first = np.abs(self.h(self.angles[:1]))
+        if not self.low_frequencies.fits:
+            return np.broadcast_to(first * (1.0 + self.error_nodes[1][0]), theta.shape)
+        f = theta / (2.0 * np.pi * self.period)
+        often = np.sqrt(2.0 * np.log(len(self.angles) / (1.0 - CONFIDENCE)))
+        fitted = np.abs(self.low_frequencies.inverse(f, 0) - self.low_frequencies.inverse(f, self.integrators))
+        floor = (self.error_nodes[1][0] + self.interpolation.relative_error(theta)) * np.abs(
+            self.low_frequencies.inverse(f, self.integrators)
+        )
+        return np.asarray(often * self.low_frequencies.deviation(f) + fitted + floor)
+
+
+def _lowest_unsure(response: Response) -> Flags:
+    """The lowest frequencies (n,) up to the first whose error is small; none where no error is known or small."""
+    radius = joint_radius(response)
+    unsure = np.zeros(len(response.frequency), dtype=bool)
+    if radius is not None and np.any(radius <= UNSURE_BELOW):
+        unsure[: np.flatnonzero(radius <= UNSURE_BELOW)[0]] = True
+    return unsure

@@ -28,6 +28,7 @@ class ResponseInterpolation:
     """Cubic pieces of G, 1/G and log G over ascending nodes theta, and which of them each interval uses.
 
     values, slopes  (3, n) at the nodes;   kind (n - 1,) 0, 1 or 2
+    straight        (n - 1,) where G is taken straight from node to node instead
     error           (n - 1,) relative error of P to be expected there: a 64th of what the cubic through four
                     neighbours misses a node by, which is the fourth derivative's part in both on even spacing
     closed          whether the response reaches half the sampling rate
@@ -37,6 +38,7 @@ class ResponseInterpolation:
     values: Complexes
     slopes: Complexes
     kind: NDArray[np.int64]
+    straight: NDArray[np.bool_]
     error: Floats
     integrators: int
     delay: int
@@ -55,6 +57,7 @@ class ResponseInterpolation:
         u = 1.0 - t
         value = u * u * ((1.0 + 2.0 * t) * self.values[kind, i] + t * step * self.slopes[kind, i])
         value += t * t * ((1.0 + 2.0 * u) * self.values[kind, i + 1] - u * step * self.slopes[kind, i + 1])
+        value = np.where(self.straight[i], u * self.values[0, i] + t * self.values[0, i + 1], value)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             inverse = np.where(kind == 0, 1.0 / value, np.where(kind == 1, value, 0.0))
         inverse = np.where(kind == 2, np.exp(-np.where(kind == 2, value, 0.0)), inverse)
@@ -80,13 +83,20 @@ def smooth_part(theta: Floats, P: Complexes, integrators: int) -> tuple[Complexe
 
 
 def interpolate_response(
-    theta: Floats, P: Complexes, integrators: int, *, closed: bool, measured_to_half_rate: bool = True
+    theta: Floats,
+    P: Complexes,
+    integrators: int,
+    *,
+    closed: bool,
+    measured_to_half_rate: bool = True,
+    straight: NDArray[np.bool_] | None = None,
 ) -> ResponseInterpolation:
     """The interpolation through a response P (n,) at ascending angles (n,) in (0, pi].
 
     closed                 whether the last angle is near enough to pi for its mirror image to be the next point
     measured_to_half_rate  False: nothing was measured in the last stretch up to pi, so that no pole is read into
                            it: noise of the last points alone would say that there is one
+    straight               (n - 1,) between which angles G is taken straight: curves through noise run away
     """
     if len(theta) < FEWEST:
         raise ResponseError(
@@ -120,7 +130,11 @@ def interpolate_response(
         missed[1, MIRRORED + len(theta) - 1] = np.inf
     kind = np.argmin(missed, axis=0)
     slopes, error = np.array([_slopes(x, v) for v in kinds]), np.min(missed, axis=0) / 64.0
-    return ResponseInterpolation(x, kinds, slopes, kind, error, integrators, delay, closed)
+    lines = np.zeros(len(x) - 1, dtype=bool)
+    if straight is not None:
+        lines[MIRRORED : MIRRORED + len(straight)] = straight
+    kind, error = np.where(lines, 0, kind), np.where(lines, 0.0, error)
+    return ResponseInterpolation(x, kinds, slopes, kind, lines, error, integrators, delay, closed)
 
 
 def _windows(n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

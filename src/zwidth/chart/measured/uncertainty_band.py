@@ -1,11 +1,8 @@
-"""Which walls the error of a measurement leaves in doubt."""
+"""The band along the stable walls' edge that the error of a measurement leaves in doubt."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -21,6 +18,7 @@ Whole = NDArray[np.int64]
 
 CORNERS = 24  # of a polygon round an ellipse
 MOST_ELLIPSES = 600
+LARGEST_DRAWN = 0.9  # relative error of the response whose ellipse is drawn at most
 
 
 @dataclass(frozen=True)
@@ -28,8 +26,8 @@ class Band:
     """The doubtful walls along the stable set's edge.
 
     regions         rings (k, 2) of [stiffness, damping] that cover them
-    stiffness_low   the largest stiffness (K > 0, B >= 0) that is stable beyond doubt [N/m]; nan: none
-    stiffness_high  the largest that may be stable [N/m]
+    stiffness_low   the largest stiffness (K > 0, B >= 0) that is stable for certain [N/m]; nan: none
+    stiffness_high  the largest that may be stable [N/m]; nan: none, inf: nothing limits it
     meaning         what the band covers, in words
     """
 
@@ -48,26 +46,16 @@ class Band:
         }
 
 
-def uncertainty_band(loop: MeasuredLoop, cells: StableRegions) -> Band | None:
-    """The band along the stable set's edge; None where no error is known.
+def band_rings(loop: MeasuredLoop, cells: StableRegions) -> tuple[Floats, ...]:
+    """Rings that cover the walls in doubt along the stable set's edge.
 
-    With an error of radius r in h, a wall is in doubt where |K + B w - h| <= r: an ellipse round each point of the
-    curve. The band is the ellipses along the edge, neighbours joined.
+    With an error of radius r in P, over |P|, a wall is in doubt where |K + B w - h| <= r |K + B w|: an ellipse beside
+    each point of the curve. The band is the ellipses along the edge, neighbours joined.
     """
-    if loop.errors is None:
-        return None
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
     covered = _doubtful_walls(loop, cells, scale)
-    stable = shapely.union_all([shapely.transform(cell, lambda xy: xy / scale) for cell in cells.polygons])
     parts = [part for part in shapely.get_parts(covered) if isinstance(part, shapely.Polygon)]
-    return Band(
-        regions=tuple(np.array(piece.exterior.coords) * scale for part in parts for piece in cut_at_holes(part)),
-        stiffness_low=_largest(stable.difference(covered), scale),
-        stiffness_high=_largest(stable.union(covered), scale),
-        meaning="the farthest of the repeated sweeps"
-        if loop.response.sweeps is not None
-        else "95 % confidence, from coherence",
-    )
+    return tuple(np.array(piece.exterior.coords) * scale for part in parts for piece in cut_at_holes(part))
 
 
 def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> shapely.Geometry:
@@ -83,37 +71,38 @@ def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> 
     K0, K1, B0, B1 = cells.box
     curve = curve[np.all((high >= (K0, B0)) & (low <= (K1, B1)), axis=1)]
     flags = has_stable_inner_side(edge, curve, scale)
-    covered = shapely.union_all(list(_ellipses(loop, cells, scale, curve[flags])))
+    covered = _ellipses(loop, cells, scale, curve[flags])
     starts = edge.segments[curve, :2] / scale
     beyond = flags | shapely.contains_xy(covered, starts[:, 0], starts[:, 1])
-    return shapely.union_all(list(_ellipses(loop, cells, scale, curve[beyond])))
+    return _ellipses(loop, cells, scale, curve[beyond])
 
 
-def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Whole) -> Iterator[shapely.Geometry]:
-    """Convex hulls of each two neighbouring ellipses along these chords."""
+def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Whole) -> shapely.Geometry:
+    """The union of convex hulls of each two neighbouring ellipses along these chords."""
     edge = cells.edge
     every = max(1, len(curve) // MOST_ELLIPSES)
+    hulls: list[shapely.Geometry] = []
     for run in np.split(curve, np.flatnonzero(np.diff(curve) > 1) + 1) if len(curve) else []:
         at = edge.angle_index[run]
         at = np.unique(np.concatenate([at[::every], at[-1:], at[-1:] + 1]))
         outlines = _outlines(loop, edge.angles[at], edge.walls[at]) / scale
-        for one, next_one in pairwise(outlines):
-            yield shapely.MultiPoint(np.vstack([one, next_one])).convex_hull
+        points = np.concatenate([outlines[:-1], outlines[1:]], axis=1)
+        number = np.repeat(np.arange(len(points)), 2 * CORNERS)
+        hulls.extend(shapely.convex_hull(shapely.multipoints(points.reshape(-1, 2), indices=number)))
+    return shapely.union_all(hulls)
 
 
 def _outlines(loop: MeasuredLoop, theta: Floats, walls: Floats) -> Floats:
-    """Points (n, CORNERS, 2) round the ellipses |dK + dB w| = r at walls (n, 2) of the curve."""
-    w, r = loop.w(theta), loop.error(theta) / np.cos(np.pi / CORNERS)
-    disk = r[:, None] * np.exp(2j * np.pi * np.arange(CORNERS) / CORNERS)
-    dB = disk.imag / w.imag[:, None]
-    dK = disk.real - dB * w.real[:, None]
+    """Points (n, CORNERS, 2) round the ellipses of doubt at walls (n, 2) of the curve.
+
+    |c - h| <= r |c| is a disk round h / (1 - r^2) of radius r |h| / (1 - r^2). Where the error is as large as the
+    response no ellipse is left, and the largest that is drawn stands for it.
+    """
+    w, h = loop.w(theta), loop.h(theta)
+    r = np.minimum(loop.relative_error(theta), LARGEST_DRAWN)
+    size = (r * np.abs(h) + loop.error_below(theta) * (theta < loop.angles[0])) / (1.0 - r * r)
+    circle = np.exp(2j * np.pi * np.arange(CORNERS) / CORNERS) / np.cos(np.pi / CORNERS)
+    offset = (r * r / (1.0 - r * r) * h)[:, None] + size[:, None] * circle
+    dB = offset.imag / w.imag[:, None]
+    dK = offset.real - dB * w.real[:, None]
     return np.asarray(walls[:, None, :] + np.stack([dK, dB], axis=2))
-
-
-def _largest(area: shapely.Geometry, scale: Floats) -> float:
-    """The largest K of an area within K > 0, B >= 0; nan where there is none."""
-    _, _, high_K, high_B = area.bounds
-    if not (high_K > 0.0 and high_B > 0.0):
-        return nan
-    high = float(shapely.intersection(area, shapely.box(0.0, 0.0, 2.0 * high_K, 2.0 * high_B)).bounds[2])
-    return high * float(scale[0]) if high > 0.0 else nan

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.measured.response_interpolation import ResponseInterpolation, around_one
-from zwidth.model.response import Response
+from zwidth.model.response import LEAST_COHERENCE, Response
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
 LARGEST_PHASE: Final = np.radians(30.0)  # at the lowest frequency, beyond that of the integrators
 COARSEST: Final = 0.02  # relative error of P that interpolation may be expected to leave
 WIDEST_GAP: Final = 4.0  # times the spacing around it, and
@@ -40,14 +39,6 @@ class UnusableRange:
     def document(self) -> dict[str, Any]:
         """The stretch as numbers and words."""
         return {"low_Hz": self.low, "high_Hz": self.high, "reason": self.reason, "on_edge": self.on_edge}
-
-
-def is_usable(response: Response) -> Flags:
-    """Which frequencies (n,) are used: finite, not zero, coherent enough."""
-    good = np.isfinite(response.value) & (response.value != 0.0)
-    if response.coherence is not None:
-        good &= response.coherence >= LEAST_COHERENCE
-    return np.asarray(good)
 
 
 def reaches_half_rate(theta: Floats) -> tuple[bool, bool]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.measured.boundary import Boundary
+from zwidth.chart.measured.doubt import Doubt
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import STABLE, UNDECIDED, UNSTABLE, WallVerdicts
 from zwidth.model.argument_checks import broadcast_walls as broadcast_walls
@@ -54,34 +55,37 @@ class EdgeFrequencies:
 def judge_measured(
     loop: MeasuredLoop,
     edge: Boundary,
+    doubt: Doubt | None,
     wall_stiffness: ArrayLike,
     wall_damping: ArrayLike,
     nearest: EdgeFrequencies | None = None,
 ) -> MeasuredVerdicts:
     """Verdicts on walls K [N/m], B [N s/m] (...) that broadcast.
 
-    A wall is undecided where, at any measured frequency, K + B w lies within the disk round h that the
-    measurement's error leaves: there the device may have a root on the circle for it. So is one of many walls
-    that is not finite; a single one raises ValueError.
+    A wall that the measurement's error leaves in doubt at some frequency is not called stable. It is called
+    unstable if it has more roots outside than the two that each stretch of such frequencies can add; else it is
+    undecided. So is one of many walls that is not finite; a single one raises ValueError.
+
+    doubt  None where no error is known
     """
     K, B = broadcast_walls(wall_stiffness, wall_damping)
     walls = np.column_stack([K.ravel(), B.ravel()])
     finite = np.all(np.isfinite(walls), axis=1)
     safe = np.where(finite[:, None], walls, 0.0)
     outside = edge.outside(safe)
+    none = np.zeros(len(safe), dtype=np.int64)
+    stretches, hiding = doubt.stretches(safe) if doubt else (none, none)
+    stable, unstable = (outside == 0) & (stretches == 0), outside > 2 * hiding
+    frequency = nearest.frequency(safe) if nearest else _nearest_frequency(loop, safe)
+    frequency[~finite] = np.nan
+    verdict = np.where(finite & stable, STABLE, np.where(finite & unstable, UNSTABLE, UNDECIDED)).astype(np.int8)
+    return MeasuredVerdicts(K, B, verdict.reshape(K.shape), frequency.reshape(K.shape), outside.reshape(K.shape))
+
+
+def _nearest_frequency(loop: MeasuredLoop, walls: Floats) -> Floats:
+    """The measured frequency (n,) of the least |1 + L| at each wall (n, 2)."""
     theta = loop.angles_below_pi
     h, w = loop.h(theta), loop.w(theta)
-    error = loop.error(theta)
-    doubtful = ~finite
-    frequency = np.full(len(walls), np.nan)
-    for start in range(0, len(walls), 500):
-        part = slice(start, start + 500)
-        away = np.abs(safe[part, :1] + safe[part, 1:] * w - h)
-        doubtful[part] |= np.any(away < error, axis=1)
-        if nearest is None:
-            frequency[part] = theta[np.argmin(away / np.abs(h), axis=1)] / (2.0 * np.pi * loop.period)
-        else:
-            frequency[part] = nearest.frequency(safe[part])
-    frequency[~finite] = np.nan
-    verdict = np.where(doubtful, UNDECIDED, np.where(outside == 0, STABLE, UNSTABLE)).astype(np.int8)
-    return MeasuredVerdicts(K, B, verdict.reshape(K.shape), frequency.reshape(K.shape), outside.reshape(K.shape))
+    parts = [walls[i : i + 500] for i in range(0, len(walls), 500)]
+    nearest = [np.argmin(np.abs(part[:, :1] + part[:, 1:] * w - h) / np.abs(h), axis=1) for part in parts]
+    return np.asarray(theta[np.concatenate([*nearest, np.empty(0, dtype=int)])] / (2.0 * np.pi * loop.period))

@@ -1,0 +1,148 @@
+"""At which frequencies the error of a measured response leaves a wall in doubt.
+
+With P known to a radius R, some response within it has a root on the circle at that frequency if and only if
+
+    |1 + P c| <= R |c|,      c = K + B w,
+
+for one of them is -1 / c. This holds for large errors as well: where P is not known at all but smaller than R,
+walls with |c| < 1 / R are not in doubt. Below the data the error rho is that of h = -1/P, and |c - h| <= rho.
+
+A wall that is at no frequency in doubt has as many roots outside as by the response as it was measured, since none
+can cross the circle between that response and the true one, each within the radius of the other. A stretch of
+frequencies in doubt can hide a pair of roots, or that a pair is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.measured.boundary import real_root
+from zwidth.chart.measured.loop import MeasuredLoop
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+Whole = NDArray[np.int64]
+
+CHUNK = 4_000_000  # walls times frequencies that are judged at once
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Angles (k,) and what is in doubt there: |scale + response c| <= hypot(radius |c|, rest), c = K + B velocity.
+
+    angles    ascending, 0 and pi where real roots can cross
+    scale     1 / |P|, 0 for an integrator at z = 1; 1 where P is taken to be none
+    response  P scale: of size 1, or 0 where P is
+    velocity  w
+    radius    of P, scaled alike;  rest  of h [N/m]
+    joined    (k - 1,) whether what lies between an angle and the next is on the way between both
+    """
+
+    angles: Floats
+    scale: Floats
+    response: Complexes
+    velocity: Complexes
+    radius: Floats
+    rest: Floats
+    joined: Flags
+
+    @cached_property
+    def unknown(self) -> Flags:
+        """Where (k,) the response may be any, as long as it is small enough: its error is as large as it is."""
+        return np.asarray(self.radius >= np.abs(self.response))
+
+    def clearance(self, walls: Floats) -> Floats:
+        """Distance from doubt (n, k) at walls (n, 2) of K, B: below 0 in doubt."""
+        c = walls[:, :1] + walls[:, 1:] * self.velocity
+        reach = np.sqrt((self.radius * np.abs(c)) ** 2 + self.rest**2)
+        return np.asarray(np.abs(self.scale + self.response * c) - reach)
+
+    def stretches(self, walls: Floats) -> tuple[Whole, Whole]:
+        """Numbers (n,) of separate stretches of frequency that leave walls (n, 2) in doubt, and of those among them
+        that can hide that a wall is stable."""
+        step = max(1, CHUNK // len(self.angles))
+        parts = [self._stretches(walls[i : i + step]) for i in range(0, len(walls), step)]
+        none = np.empty(0, dtype=np.int64)
+        return (
+            np.concatenate([*(part[0] for part in parts), none]),
+            np.concatenate([*(part[1] for part in parts), none]),
+        )
+
+    def _stretches(self, walls: Floats) -> tuple[Whole, Whole]:
+        c = walls[:, :1] + walls[:, 1:] * self.velocity
+        F = self.scale + self.response * c
+        reach = np.sqrt((self.radius * np.abs(c)) ** 2 + self.rest**2)
+        # between two angles F passes 0 on a chord
+        a, along = F[:, :-1], np.diff(F, axis=1)
+        length = np.maximum(np.abs(along) ** 2, 1e-300)
+        share = np.clip(-(a.real * along.real + a.imag * along.imag) / length, 0.0, 1.0)
+        flags = np.zeros((len(walls), 2 * len(self.angles) + 1), dtype=bool)
+        flags[:, 1::2] = np.abs(F) <= reach
+        flags[:, 2:-1:2] = self.joined & (np.abs(a + share * along) <= np.maximum(reach[:, :-1], reach[:, 1:]))
+        edges = np.diff(flags.astype(np.int8), axis=1)
+        wall, first = np.nonzero(edges == 1)
+        _, last = np.nonzero(edges == -1)
+        hides = self._may_hide(F, wall, first // 2, (last - 1) // 2)
+        numbers = np.bincount(wall, minlength=len(walls)), np.bincount(wall[hides], minlength=len(walls))
+        return numbers[0].astype(np.int64), numbers[1].astype(np.int64)
+
+    def _may_hide(self, F: Complexes, wall: Whole, first: Whole, last: Whole) -> Flags:
+        """Which stretches (s,), from angle `first` to `last` of a wall, can hide that it is stable.
+
+        All of F turns by -pi for each root outside. Where F passes 0 clockwise, it may in truth pass on the other
+        side, and there are two roots less; where it passes counter-clockwise, two more. Frequencies whose response
+        may be any do not count: what was not measured is not taken to steady a device.
+        """
+        turned = np.cumsum(np.angle(F[:, 1:] * np.conj(F[:, :-1])), axis=1)
+        turned = np.concatenate([np.zeros((len(F), 1)), turned], axis=1)
+        before, after = np.maximum(first - 1, 0), np.minimum(last + 1, len(self.angles) - 1)
+        clockwise = turned[wall, after] < turned[wall, before]
+        at_end = (first == 0) | (last == len(self.angles) - 1)
+        known = np.concatenate([[0], np.cumsum(~self.unknown)])
+        return np.asarray((clockwise | at_end) & (known[last + 1] > known[first]))
+
+
+def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
+    """What the error of a measured loop leaves in doubt; None where no error is known.
+
+    angles  (k,) on the curve, ascending, in (0, pi)
+    """
+    if loop.error_nodes is None:
+        return None
+    theta = np.unique(np.concatenate([angles, loop.angles_below_pi]))
+    h, w = loop.h(theta), loop.w(theta)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = np.abs(h)
+        response = -scale / h
+    below = theta < loop.angles[0]
+    radius, rest = loop.relative_error(theta), loop.error_below(theta)
+    parts = [
+        _real_root(loop, -1),
+        (theta, scale, response, w, np.where(below, 0.0, radius), np.where(below, rest, 0.0)),
+    ]
+    if loop.interpolation.closed:
+        parts.append(_real_root(loop, -2))
+    columns = [np.concatenate([np.atleast_1d(part[i]) for part in parts]) for i in range(6)]
+    good = np.isfinite(columns[1]) & np.isfinite(columns[2])
+    angles, scale, response, w, radius, rest = (column[good] for column in columns)
+    curve = (angles > 0.0) & (angles < np.pi)
+    joined = curve[1:] & curve[:-1] & (np.sign(w.imag[1:]) == np.sign(w.imag[:-1]))
+    return Doubt(angles, scale.real, response, w, radius.real, rest.real, joined)
+
+
+def _real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float, complex, complex, float, float]:
+    """The doubt about a root at z = 1 (kind -1) or z = -1 (kind -2): angle, scale, response, w, radius, rest."""
+    h, w = real_root(loop, kind)
+    if kind == -1:
+        rest = float(loop.error_below(np.zeros(1))[0])
+        return 0.0, abs(h), complex(-np.sign(h) or -1.0), complex(w), 0.0, rest
+    radius = float(loop.relative_error(np.array([np.pi]))[0])
+    if not np.isfinite(h):
+        last = loop.angles_below_pi[-1:]
+        return np.pi, 1.0, 0j, complex(w), radius / float(np.abs(loop.h(last))[0]), 0.0
+    return np.pi, abs(h), complex(-np.sign(h) or -1.0), complex(w), radius, 0.0

@@ -1,0 +1,195 @@
+"""A frequency response from the spectra of one record, by polynomials over windows as wide as the response allows.
+
+The transform of what was read is, up to noise, Y = G U + C: the response G to the transform U of what was sent, and
+C, what the state at both ends of the record adds. Both G and C change slowly from one frequency of the transform to
+the next, so that over a window of neighbours each is a polynomial, fitted by least squares (local polynomial method:
+Pintelon and Schoukens, System Identification, 2nd ed., ch. 7, known at second hand). Unlike a tapered spectrum it
+has no leakage, and what the fit leaves tells the noise.
+
+A wide window averages more noise, a narrow one follows a sharper resonance. The narrowest windows tile the whole
+spectrum; two neighbours are merged into one twice as wide as long as it predicts what both of them see, within
+their own error. A difference that only chance may have made does not keep windows from being merged further: what
+is a bias grows, and the error falls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Whole = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+ORDER = 2  # of the polynomials
+TERMS = 2 * (ORDER + 1)  # coefficients of both
+NARROWEST = 6  # half a window, in spacings of the transform: 13 values, 7 more than coefficients
+MOST_TILES = 8000  # at the narrowest
+FEWEST_TILES = 6  # that a spectrum is divided into, however smooth the response
+WIDEST_SHARE = 0.5  # half a window over its middle frequency, at most
+AGREED = 4.0  # squared difference between a wide and a narrow window that is taken, over the narrow one's variance
+APART = 12.0  # the same from which a wide window, and every wider one, is given up
+UNSEEN = 3.0  # variance of a merged window, over that of its noise, for what this does not tell apart
+TOLERANCE = 1e-3  # relative difference that is always allowed
+CHUNK = 2_000_000  # numbers of the equations that are solved at once
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Polynomials over the windows of one width: tile number i covers `width` spacings from 1 + i width.
+
+    With r = (k - middle) / width, -1/2 to 1/2 within a tile (the window is twice as wide as the tile):
+
+    coefficients  (n, 3) of G in r
+    factor        (n, 3, 3) covariance of these for noise of variance 1
+    cubic         (n, 4) coefficients of G in r where both polynomials have one more term; (n, 0): not computed
+    noise         (n,) variance of the noise at one frequency of the transform
+    excited       (n,) mean squared |U| in the window
+    """
+
+    width: int
+    coefficients: Complexes
+    factor: Complexes
+    cubic: Complexes
+    noise: Floats
+    excited: Floats
+
+    @property
+    def freedom(self) -> int:
+        """Values of a window beyond the coefficients, from which the noise is known."""
+        return 2 * self.width + 1 - TERMS
+
+    def at(self, tile: Whole, r: Floats) -> tuple[Complexes, Floats]:
+        """G (n,) and its variance (n,) for noise of variance 1, at places r (n,) of tiles (n,)."""
+        powers = r[:, None] ** np.arange(ORDER + 1)
+        value = np.sum(self.coefficients[tile] * powers, axis=1)
+        spread = np.einsum("ni,nij,nj->n", powers, self.factor[tile], powers).real
+        return value, np.maximum(spread, 0.0)
+
+    def curvature(self, tile: Whole, r: Floats) -> Floats:
+        """Squared difference (n,) that one more term makes at places r (n,) of tiles (n,): what the order misses."""
+        value, _ = self.at(tile, r)
+        longer = np.sum(self.cubic[tile] * r[:, None] ** np.arange(self.cubic.shape[1]), axis=1)
+        return np.asarray(np.abs(longer - value) ** 2)
+
+
+def fit_tiles(U: Complexes, Y: Complexes, width: int, *, cubic: bool) -> Fits:
+    """Polynomials over all tiles of `width` spacings from the second value of both transforms on."""
+    middles = np.arange(1 + width // 2, len(U) - 1 + width // 2, width)
+    size = 2 * width + 1
+    chunk = max(1, CHUNK // (size * TERMS))
+    parts = [_fit_windows(U, Y, middles[i : i + chunk], width, cubic) for i in range(0, len(middles), chunk)]
+    return Fits(width, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _fit_windows(
+    U: Complexes, Y: Complexes, middles: Whole, width: int, cubic: bool
+) -> tuple[Complexes, Complexes, Complexes, Floats, Floats]:
+    """Coefficients, their covariance, those with one more term, variance of the noise and mean |U|^2."""
+    starts = np.clip(middles - width, 1, len(U) - 1 - 2 * width)
+    index = starts[:, None] + np.arange(2 * width + 1)
+    r = (index - middles[:, None]) / width
+    u, y = U[index], Y[index]
+    excited = np.mean(np.abs(u) ** 2, axis=1)
+    scale = np.sqrt(np.where(excited > 0.0, excited, 1.0))[:, None]
+    coefficients, rows, left = _least_squares(u / scale, y, r, ORDER)
+    longer = _least_squares(u / scale, y, r, ORDER + 1)[0] if cubic else np.empty((len(u), 0), complex)
+    rows = rows / scale[:, :, None]
+    return (
+        coefficients / scale,
+        rows @ np.conj(np.swapaxes(rows, 1, 2)),
+        longer / scale,
+        np.sum(np.abs(left) ** 2, axis=1) / (2 * width + 1 - TERMS),
+        excited,
+    )
+
+
+def _least_squares(u: Complexes, y: Complexes, r: Floats, order: int) -> tuple[Complexes, Complexes, Complexes]:
+    """Coefficients (n, order + 1) of G in y = G u + C, their rows of the inverse equations, and what is left."""
+    powers = r[:, :, None] ** np.arange(order + 1)
+    Q, R = np.linalg.qr(np.concatenate([u[:, :, None] * powers, powers.astype(complex)], axis=2))
+    projected = np.einsum("nki,nk->ni", Q.conj(), y)
+    left = y - np.einsum("nki,ni->nk", Q, projected)
+    # a window without force, or with one that cannot be told from the record's ends, has a vast error
+    at = np.arange(R.shape[1])
+    least = 1e-9 * np.max(np.abs(R[:, at, at]), axis=1)[:, None] + 1e-300
+    R[:, at, at] = np.where(np.abs(R[:, at, at]) < least, least, R[:, at, at])
+    rows = np.linalg.inv(R)[:, : order + 1]
+    return np.einsum("nij,nj->ni", rows, projected), rows, left
+
+
+@dataclass(frozen=True)
+class LocalResponse:
+    """A response at some frequencies of a transform.
+
+    value     (n,) G;  variance (n,) of its complex error
+    freedom   (n,) values from which the variance is known, beyond the coefficients
+    excited   (n,) mean squared |U| in the narrowest window there
+    """
+
+    value: Complexes
+    variance: Floats
+    freedom: Floats
+    excited: Floats
+
+
+def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, narrowest: int) -> LocalResponse:
+    """The response Y / U at places (n,), in spacings of the transforms, and its error.
+
+    U, Y       (k,) transforms of what was sent and what was read, at 0 and whole spacings
+    floor      (k,) least variance of the noise in Y
+    narrowest  half the narrowest window, in spacings; even
+    """
+    last = len(U) - 1
+    widths = [narrowest]
+    while last / (2 * widths[-1]) >= FEWEST_TILES and 4 * widths[-1] <= last:
+        widths.append(2 * widths[-1])
+    levels = [_with_floor(fit_tiles(U, Y, width, cubic=width == narrowest), floor) for width in widths]
+    count = len(levels[0].noise)
+    level = np.zeros(count, dtype=np.int64)  # of the window that each of the narrowest tiles goes with
+    whole = np.ones(count, dtype=bool)
+    for n in range(1, len(levels)):
+        apart = _apart(levels[n - 1], levels[n])
+        halves = np.append(whole, True)[: 2 * len(apart)]  # the last may have one half only
+        whole = (apart < APART) & halves[::2] & np.resize(halves[1::2], len(apart))
+        level[np.repeat(whole & (apart < AGREED), 2**n)[:count]] = n
+    tile = np.clip(((places - 1.0) / narrowest).astype(int), 0, count - 1)
+    result = LocalResponse(np.empty(len(places), complex), *np.empty((3, len(places))))
+    for n, fits in enumerate(levels):
+        at = np.flatnonzero(level[tile] == n)
+        numbers = np.minimum(tile[at] // 2**n, len(fits.noise) - 1)
+        r = (places[at] - (1 + fits.width * numbers + fits.width // 2)) / fits.width
+        value, spread = fits.at(numbers, r)
+        # a merged window may be off by what would just not have kept its halves apart
+        noise = spread * fits.noise[numbers]
+        error = UNSEEN * noise if n else noise + fits.curvature(numbers, r)
+        result.value[at], result.variance[at] = value, error + (TOLERANCE * np.abs(value)) ** 2
+        result.freedom[at], result.excited[at] = fits.freedom, levels[0].excited[tile[at]]
+    return result
+
+
+def _with_floor(fits: Fits, floor: Floats) -> Fits:
+    """The fits with a noise of at least `floor`."""
+    middles = np.minimum(1 + fits.width * np.arange(len(fits.noise)) + fits.width // 2, len(floor) - 1)
+    return replace(fits, noise=np.maximum(fits.noise, floor[middles]))
+
+
+def _apart(narrow: Fits, wide: Fits) -> Floats:
+    """How far (n,) wide tiles are from the two narrow ones within each: the largest squared difference over the
+    latter's variance; inf where a window is wide against its frequency."""
+    count = len(wide.noise)
+    middles = 1 + wide.width * np.arange(count) + wide.width // 2
+    apart = np.where(wide.width <= WIDEST_SHARE * middles, 0.0, np.inf)
+    halves = np.minimum(2 * np.arange(count)[:, None] + [0, 1], len(narrow.noise) - 1)
+    noise = np.mean(narrow.noise[halves], axis=1)
+    for own in halves.T:
+        for r in (-0.25, 0.25):
+            value, spread = narrow.at(own, np.full(count, r))
+            k = 1 + narrow.width * own + narrow.width // 2 + r * narrow.width
+            predicted, _ = wide.at(np.arange(count), (k - middles) / wide.width)
+            allowed = spread * noise + (TOLERANCE * np.abs(value)) ** 2 / AGREED
+            apart = np.maximum(apart, np.abs(predicted - value) ** 2 / np.maximum(allowed, 1e-300))
+    return np.asarray(apart)
