@@ -127,12 +127,13 @@ class LocalResponse:
 
     value     (n,) G;  variance (n,) of its complex error
     freedom   (n,) values from which the variance is known, beyond the coefficients
-    excited   (n,) mean squared |U| in the narrowest window there
+    noise     (n,) variance of the noise in Y there, and excited (n,) mean squared |U|, in the narrowest window
     """
 
     value: Complexes
     variance: Floats
     freedom: Floats
+    noise: Floats
     excited: Floats
 
 
@@ -157,7 +158,7 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
         whole = (apart < APART) & halves[::2] & np.resize(halves[1::2], len(apart))
         level[np.repeat(whole & (apart < AGREED), 2**n)[:count]] = n
     tile = np.clip(((places - 1.0) / narrowest).astype(int), 0, count - 1)
-    result = LocalResponse(np.empty(len(places), complex), *np.empty((3, len(places))))
+    result = LocalResponse(np.empty(len(places), complex), *np.empty((4, len(places))))
     for n, fits in enumerate(levels):
         at = np.flatnonzero(level[tile] == n)
         numbers = np.minimum(tile[at] // 2**n, len(fits.noise) - 1)
@@ -167,7 +168,8 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
         noise = spread * fits.noise[numbers]
         error = UNSEEN * noise if n else noise + fits.curvature(numbers, r)
         result.value[at], result.variance[at] = value, error + (TOLERANCE * np.abs(value)) ** 2
-        result.freedom[at], result.excited[at] = fits.freedom, levels[0].excited[tile[at]]
+        result.freedom[at] = fits.freedom
+        result.noise[at], result.excited[at] = levels[0].noise[tile[at]], levels[0].excited[tile[at]]
     return result
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.local_polynomials import MOST_TILES, NARROWEST, local_response
+from zwidth.model.local_polynomials import MOST_TILES, NARROWEST, LocalResponse, local_response
 from zwidth.model.response import Response, ResponseError
 
 Floats = NDArray[np.float64]
@@ -16,6 +16,9 @@ FEWEST_SAMPLES = 2 * SHORTEST_SEGMENT
 EXCITED = 1e-7  # power of the force, over its largest, below which a frequency was not excited
 LEFT_AT_END = 0.1  # the same over that at frequencies from half of it on: there an excitation ends
 AVERAGES = 8.0  # in a spectrum of which the coherence that is given leaves the same error
+SLOW = 4.0  # times lower a frequency is that of motion which does not blur an encoder's steps
+LARGEST_IN_DEVIATIONS = 3.0  # what is a bound is taken as so many standard deviations
+PIECE, MOST_PIECES = 64, 2000  # samples in which the frequencies of a force at one time are counted
 CLOSEST = 3.0  # spacing of the response's frequencies, in those of the record's transform
 RATIO = 0.01  # the same in shares of the frequency
 BELOW_ALL_STEPS = 1e-9  # of the largest reading: what is closer is no step of an encoder, but rounding
@@ -61,13 +64,15 @@ def sweep_response(
     differences = np.diff(position, n=m)
     count = len(differences)
     U, Y = rfft(force[:count]), rfft(differences)
-    one = np.abs(2.0 * np.sin(np.pi * np.arange(len(U)) / count)) ** (2 * m)
-    floor = count * encoder_step(position) ** 2 / 12.0 * one
+    step = encoder_step(position)
+    floor = count * step**2 / 12.0 * np.abs(2.0 * np.sin(np.pi * np.arange(len(U)) / count)) ** (2 * m)
     narrowest = max(NARROWEST, 2 * (count // (4 * segment)) if segment else 2 * (len(U) // (2 * MOST_TILES)))
     places = _places(len(force)) * count
     local = local_response(U, Y, places, floor, min(narrowest, 2 * ((len(U) - 2) // 4)))
+    one = np.abs(2.0 * np.sin(np.pi * places / count)) ** m
+    hidden = _hidden_by_steps(force, step, places / count, local, one)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = local.variance / np.abs(local.value) ** 2
+        relative = (local.variance + (hidden * one) ** 2) / np.abs(local.value) ** 2
         coherence = 1.0 / (1.0 + AVERAGES * relative)
         value = local.value / (np.exp(2j * np.pi * places / count) - 1.0) ** m
     excited = _excited(places, local.excited) & np.isfinite(coherence) & np.isfinite(value)
@@ -80,6 +85,42 @@ def sweep_response(
         freedom=local.freedom,
         note=f"from {len(force)} samples by local polynomials",
     )
+
+
+def _hidden_by_steps(force: Floats, step: float, f: Floats, local: LocalResponse, one: Floats) -> Floats:
+    """Error of P (n,) [m/N], as a deviation, that the encoder's steps make and no scatter shows.
+
+    A sine of amplitude A is read with an error that follows it: where it is smaller than a step it is not read at
+    all, or as a square wave of 2 q / pi; where it is larger the error falls like q (q / A)^(1/2). Any other motion
+    s meanwhile blurs the steps, by exp(-2 pi^2 s^2 / q^2) (dither). As such counts what was read and does not
+    follow the force, and under noise the motion at other frequencies; slow motion, slower than 1/4 of the
+    frequency, does not, nor what the steps themselves may make, q^2 / 4.
+
+    force  (n,);  step q [m];  f (n,) frequencies in those of sampling
+    local  the response of the differenced position, and one (n,) = |z - 1|^m
+    """
+    if step == 0.0:
+        return np.zeros(len(f))
+    own = (np.abs(local.value) / one) ** 2 * local.excited * _is_broad(force)
+    spectrum = 2.0 * (local.noise / one**2 + own) / len(force)
+    widths = np.gradient(f)
+    above = np.cumsum((spectrum * widths)[::-1])[::-1]
+    slower = np.searchsorted(f, f / SLOW)
+    other = np.maximum(above[slower] - step**2 / 4.0, 0.0)
+    amplitude = np.sqrt(2.0 * np.mean((force - np.mean(force)) ** 2))
+    steps = np.abs(local.value) / one * amplitude / step
+    largest = 2.0 / np.pi * np.minimum(1.0, 0.7 / np.sqrt(np.maximum(steps, 1e-9))) * step / amplitude
+    return np.asarray(largest * np.exp(-2.0 * np.pi**2 * other / step**2) / LARGEST_IN_DEVIATIONS)
+
+
+def _is_broad(force: Floats) -> bool:
+    """Whether the force holds many frequencies at a time, as noise does and a sweep does not."""
+    pieces = force[: len(force) // PIECE * PIECE].reshape(-1, PIECE)
+    pieces = pieces[:: max(1, len(pieces) // MOST_PIECES)]
+    power = np.abs(np.fft.rfft(pieces * np.hanning(PIECE), axis=1)) ** 2
+    total = np.sum(power, axis=1)
+    taking_part = total**2 / np.maximum(np.sum(power**2, axis=1), 1e-300)
+    return bool(np.sum(total * taking_part) > 0.25 * PIECE / 2.0 * np.sum(total))
 
 
 def _excited(places: Floats, power: Floats) -> Flags:

@@ -275,7 +275,7 @@ def _with_reference(loop: MeasuredLoop, curve: Boundary) -> Boundary:
     B = np.quantile(h / w, shares)[:, None] * sizes
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
     # all walls at some angles, and the clear ones at every angle: between few a resonance may turn 1 + L
-    _, clear = nyquist_count(loop, curve.angles[:: max(1, len(curve.angles) // 4000)], walls)
+    _, clear = nyquist_count(loop, curve.angles[:: max(1, len(curve.angles) // 1500)], walls)
     order, size = np.argsort(-clear), np.max(walls / np.min(walls, axis=0), axis=1)
     small = np.argsort(np.where(clear > CLEAR, size, np.inf), kind="stable")
     chosen = np.union1d(order[:LIKELY], small[:SURE])

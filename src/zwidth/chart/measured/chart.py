@@ -212,11 +212,15 @@ def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[f
     assert sweeps is not None and radius is not None
     variance = radius**2 * len(sweeps) / np.log(len(radius) / (1.0 - CONFIDENCE))
     for sweep in sweeps:
-        alone = replace(response, value=sweep, sweeps=None, coherence=1.0 / (1.0 + variance), averages=1.0)
+        alone = replace(
+            response, value=sweep, sweeps=None, coherence=1.0 / (1.0 + variance), averages=1.0, freedom=None
+        )
         try:
-            yield measured_chart(alone, controller).stiffness_max_nominal
+            loop = MeasuredLoop(alone, controller)
+            cells, closed = _stable_regions(loop)
         except ResponseError:
-            yield nan
+            cells, closed = None, True
+        yield refine_peak(loop, cells)[0][0] if cells is not None and closed else nan
 
 
 def _credible_cells(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:

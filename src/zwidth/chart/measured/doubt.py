@@ -28,6 +28,7 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Whole = NDArray[np.int64]
 
+HARDLY_KNOWN = 0.5  # error over the response
 CHUNK = 4_000_000  # walls times frequencies that are judged at once
 
 
@@ -53,8 +54,8 @@ class Doubt:
 
     @cached_property
     def unknown(self) -> Flags:
-        """Where (k,) the response may be any, as long as it is small enough: its error is as large as it is."""
-        return np.asarray(self.radius >= np.abs(self.response))
+        """Where (k,) hardly more is known of the response than that it is small."""
+        return np.asarray(self.radius >= HARDLY_KNOWN * np.abs(self.response))
 
     def clearance(self, walls: Floats) -> Floats:
         """Distance from doubt (n, k) at walls (n, 2) of K, B: below 0 in doubt."""
@@ -96,7 +97,7 @@ class Doubt:
 
         All of F turns by -pi for each root outside. Where F passes 0 clockwise, it may in truth pass on the other
         side, and there are two roots less; where it passes counter-clockwise, two more. Frequencies whose response
-        may be any do not count: what was not measured is not taken to steady a device.
+        is hardly known do not count: what was not measured is not taken to steady a device.
         """
         turned = np.cumsum(np.angle(F[:, 1:] * np.conj(F[:, :-1])), axis=1)
         turned = np.concatenate([np.zeros((len(F), 1)), turned], axis=1)

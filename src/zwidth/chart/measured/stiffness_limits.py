@@ -29,9 +29,9 @@ LINES = 120  # of one damping each, evenly spaced up to the largest
 LOW_LINES = 24  # more of them in logarithm below the first of these
 ZOOMS, ZOOMED_LINES = 4, 20  # between the neighbours of the best line
 BINDING = 1e-3  # clearance of a frequency that binds, over |c| there
-EXCESSES = np.append(0.0, np.geomspace(1e-3, 30.0, 25))  # of stiffness over the nominal, that are tried
-POSSIBLE_LINES = 40  # of one damping each, evenly spaced
-AROUND = np.linspace(-0.3, 0.3, 13)  # more of them, in shares of the damping of the stiffest nominal wall
+EXCESSES = np.append(0.0, np.geomspace(1e-3, 30.0, 17))  # of stiffness over the nominal, that are tried
+POSSIBLE_LINES = 24  # of one damping each, evenly spaced
+AROUND = np.linspace(-0.3, 0.3, 7)  # more of them, in shares of the damping of the stiffest nominal wall
 HALVINGS = 12  # between a stiffness that may be stable and the next that is not
 
 
@@ -146,7 +146,7 @@ def _crossings(edge: Boundary, doubt: Doubt, B: float) -> Floats:
     near = np.clip(np.searchsorted(doubt.angles, theta), 0, len(doubt.angles) - 1)
     size = np.abs(K + B * doubt.velocity[near])
     # on lines of real roots, and where the error is as large as the response, the angles themselves tell
-    reach = np.where((number >= 0) & ~doubt.unknown[near], doubt.radius[near] * size + doubt.rest[near], 0.0)
+    reach = np.where((number >= 0) & (doubt.radius[near] < 1.0), doubt.radius[near] * size + doubt.rest[near], 0.0)
     return np.column_stack([K - reach, K + reach])
 
 
