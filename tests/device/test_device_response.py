@@ -83,7 +83,7 @@ def test_a_raw_sweep_becomes_a_response(write):
     lines = [RECORD, *rows(np.arange(6000) * T, force, encoder_readings(loop, force))]
     response = load(write(lines, 'file = "sweep.csv"\nintegrators = 2\nsegment_samples = 512')).response
     assert response.coherence is not None
-    assert response.note == "from 6000 samples by 22 Hann segments of 512"
+    assert response.note == "from 6000 samples by local polynomials"
 
 
 def broken(lines, number, text):

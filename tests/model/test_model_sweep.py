@@ -29,7 +29,7 @@ def test_a_sweep_gives_back_the_response(plant, integrators):
     assert np.quantile(apart, 0.9) < 0.01
     assert np.median(found.coherence) > 0.9999
     assert found.frequency[-1] == pytest.approx(0.5 / T)
-    assert "120000 samples by 57 Hann segments of 4096" in found.note
+    assert found.note == "from 120000 samples by local polynomials"
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -42,8 +42,8 @@ def test_a_chirp_through_an_encoder_gives_the_chart_within_its_band(seed):
     response = sweep_response(force, position, T, 2, segment=2048)
     exact = stability_chart(loop, decay=False)
     chart = measured_chart(response, Controller(T, velocity_filter=controller.velocity_filter))
-    assert chart.stiffness_max == pytest.approx(exact.stiffness_max, rel=0.1)
-    assert chart.band.stiffness_low <= exact.stiffness_max <= chart.band.stiffness_high
+    assert chart.stiffness_max_nominal == pytest.approx(exact.stiffness_max, rel=0.1)
+    assert 0.9 * exact.stiffness_max < chart.stiffness_max <= exact.stiffness_max <= chart.band.stiffness_high
 
 
 def test_the_coherence_tells_noise_and_what_was_not_excited():

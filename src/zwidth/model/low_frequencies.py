@@ -58,13 +58,18 @@ class LowFrequencies:
         return np.asarray(np.sqrt(np.maximum(squares[0] + squares[1], 0.0)))
 
     @property
-    def integrators(self) -> int | None:
-        """Poles of P at z = 1: the number of the first term that is seen at the lowest frequency; None: unclear."""
-        size = self.terms * (2.0 * np.pi * self.lowest) ** np.arange(TERMS)
-        error = np.sqrt(np.diag(self.covariance)) * (2.0 * np.pi * self.lowest) ** np.arange(TERMS)
+    def first_seen(self) -> tuple[int, float] | None:
+        """Number of the first term that is seen at the lowest frequency, and its sign; None: nothing fits."""
+        scale = (2.0 * np.pi * self.lowest) ** np.arange(TERMS)
+        size, error = self.terms * scale, np.sqrt(np.diag(self.covariance)) * scale
         seen = np.abs(size) > np.maximum(SEEN_SHARE * np.max(np.abs(size[:3])), SEEN_DEVIATIONS * error)
         first = np.flatnonzero(seen[:3])
-        return int(first[0]) if self.fits and len(first) and size[first[0]] > 0.0 else None
+        return (int(first[0]), float(np.sign(size[first[0]]))) if self.fits and len(first) else None
+
+    @property
+    def integrators(self) -> int | None:
+        """Poles of P at z = 1: the number of the first term that is seen, if it is positive; None: unclear."""
+        return self.first_seen[0] if self.first_seen and self.first_seen[1] > 0.0 else None
 
 
 def fit_low_frequencies(frequency: Floats, value: Complexes, deviation: Floats | None) -> LowFrequencies:

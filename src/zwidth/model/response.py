@@ -174,6 +174,8 @@ def integrators_of(response: Response, period: float) -> int:
     clear, settled = abs(phases[nearest]) < CLEAR, abs(phases[nearest]) < SETTLED
     unlike = abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5
     fit = low_frequencies(response) if unlike or not settled or response.integrators == 1 else None
+    if fit is not None and fit.first_seen and fit.first_seen[1] < 0.0 and fit.terms[2] < 0.0:
+        raise ResponseError(f"{where}: the position moves against the force; is the sign of one of them turned?")
     if clear and unlike and not (fit and fit.integrators is not None):
         raise ResponseError(
             f"{where}, but the magnitude falls like f^-{fall:.1f} there, which goes with "

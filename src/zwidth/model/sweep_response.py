@@ -20,7 +20,7 @@ SLOW = 4.0  # times lower a frequency is that of motion which does not blur an e
 LARGEST_IN_DEVIATIONS = 3.0  # what is a bound is taken as so many standard deviations
 PIECE, MOST_PIECES = 64, 2000  # samples in which the frequencies of a force at one time are counted
 CLOSEST = 3.0  # spacing of the response's frequencies, in those of the record's transform
-RATIO = 0.01  # the same in shares of the frequency
+RATIO = 0.01  # the same in shares of the frequency, from where that is wider
 BELOW_ALL_STEPS = 1e-9  # of the largest reading: what is closer is no step of an encoder, but rounding
 
 
@@ -36,10 +36,10 @@ def sweep_response(
 
     force, position  (n,) [N], [m], one sample per period; position[j] is read when force[j] is sent
     integrators      poles at z = 1: 0, 1 or 2; None: not known
-    segment          samples that resolve what must be told apart: no window is narrower than one spacing of a
-                     transform of so many; None: 13 spacings of that of the whole record
-    Returns          frequencies 1 % apart, the lowest at three periods in the record; `coherence` is what would
-                     leave the same error in a spectrum of `averages` averages
+    segment          samples whose transform resolves what must be told apart: frequencies are no closer than its
+                     spacing, the lowest at twice that, and windows no narrower; None: three periods in the record
+    Returns          frequencies 1 % apart, but no closer than that; `coherence` is what would leave the same error
+                     in a spectrum of `averages` averages
     Raises           ResponseError  where the record is shorter than two segments, or the force is constant
 
     >>> rng = np.random.default_rng(1)
@@ -67,7 +67,7 @@ def sweep_response(
     step = encoder_step(position)
     floor = count * step**2 / 12.0 * np.abs(2.0 * np.sin(np.pi * np.arange(len(U)) / count)) ** (2 * m)
     narrowest = max(NARROWEST, 2 * (count // (4 * segment)) if segment else 2 * (len(U) // (2 * MOST_TILES)))
-    places = _places(len(force)) * count
+    places = _places(len(force), segment) * count
     local = local_response(U, Y, places, floor, min(narrowest, 2 * ((len(U) - 2) // 4)))
     one = np.abs(2.0 * np.sin(np.pi * places / count)) ** m
     hidden = _hidden_by_steps(force, step, places / count, local, one)
@@ -130,14 +130,15 @@ def _excited(places: Floats, power: Floats) -> Flags:
     return np.asarray((power > EXCITED * np.max(power)) & (np.arange(len(places)) <= enough[-1]))
 
 
-def _places(samples: int) -> Floats:
+def _places(samples: int, segment: int | None) -> Floats:
     """Frequencies of the response, in those of sampling, (n,) up to 1/2: for all records of about one length."""
     whole = 2 ** int(np.log2(samples))
-    first = np.arange(CLOSEST, CLOSEST / RATIO, CLOSEST)
-    first = first[first < 0.5 * whole]
-    steps = np.ceil(np.log(0.5 * whole / first[-1]) / RATIO)
-    above = first[-1] * np.exp(np.log(0.5 * whole / first[-1]) * np.arange(1, steps + 1) / max(steps, 1.0))
-    return np.minimum(np.concatenate([first, above]) / whole, 0.5)
+    spacing = 1.0 / segment if segment else CLOSEST / whole
+    first = np.arange(2.0 if segment else 1.0, 1.0 / RATIO) * spacing
+    first = first[first < 0.5]
+    steps = np.ceil(np.log(0.5 / first[-1]) / RATIO)
+    above = first[-1] * np.exp(np.log(0.5 / first[-1]) * np.arange(1, steps + 1) / max(steps, 1.0))
+    return np.minimum(np.concatenate([first, above]), 0.5)
 
 
 def encoder_step(position: Floats) -> float:

@@ -32,7 +32,13 @@ from zwidth.chart.measured.stable_regions import (
     regions_within,
     window_of_regions,
 )
-from zwidth.chart.measured.stiffness_limits import CertainWall, certain_wall, largest_possible
+from zwidth.chart.measured.stiffness_limits import (
+    LINES,
+    CertainWall,
+    certain_wall,
+    damping_lines,
+    largest_possible,
+)
 from zwidth.chart.measured.uncertainty_band import Band, band_rings
 from zwidth.chart.measured.usable_frequencies import UnusableRange
 from zwidth.chart.measured.verdict import EdgeFrequencies, MeasuredVerdicts, judge_measured
@@ -48,6 +54,7 @@ Floats = NDArray[np.float64]
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it
 FEWEST_ON_EDGE = 3  # measured frequencies that a cell's edge needs to be credible
+CLOSE = 1e-3  # share of the nominal stiffness, within which the certain one is looked for again round its wall
 GRID = 7  # walls along K and along B that are tried in a cell
 DOUBT_CHORD = 1e-3  # distance of chords between angles of doubt from the curve, as a share of the window
 MOST_DOUBTED = 1000  # angles of the edge among these
@@ -100,7 +107,7 @@ class MeasuredChart(DrawnChart):
         return self.loop.integrators
 
     @cached_property
-    def doubt(self) -> Doubt | None:
+    def in_doubt(self) -> Doubt | None:
         """What the measurement's error leaves in doubt; None where no error is known."""
         return doubt_along(self.loop, self.edge, self.window)
 
@@ -122,7 +129,7 @@ class MeasuredChart(DrawnChart):
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast, by the count of their roots."""
         return judge_measured(
-            self.loop, self.edge, self.doubt, wall_stiffness, wall_damping, edge_frequencies(self)
+            self.loop, self.edge, self.in_doubt, wall_stiffness, wall_damping, edge_frequencies(self)
         )
 
     def document(self) -> dict[str, Any]:
@@ -322,7 +329,7 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
     at_peak = np.array([a for a in angles if 0.0 < a < np.pi])
     h, w = loop.h(at_peak), loop.w(at_peak)
     errors = loop.interpolation.relative_error(at_peak) * np.abs(h * w / w.imag)
-    certain, band = _within_error(loop, cells, CertainWall(*peak, tuple(angles)), opened)
+    certain, band = _within_error(loop, cells, zoomed, CertainWall(*peak, tuple(angles)), opened)
     return MeasuredChart(
         loop=loop,
         edge=cells.edge,
@@ -349,11 +356,13 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
 
 
 def _within_error(
-    loop: MeasuredLoop, cells: StableRegions, nominal: CertainWall, opened: bool
+    loop: MeasuredLoop, cells: StableRegions, zoomed: StableRegions, nominal: CertainWall, opened: bool
 ) -> tuple[CertainWall, Band | None]:
     """The stiffest wall that is stable for certain, and the band of the error.
 
     The nominal one and None where no error is known; none and None where the edge is open.
+
+    zoomed  the cells round the stiffest nominal wall
     """
     doubt = doubt_along(loop, cells.edge, cells.box)
     if doubt is None:
@@ -361,7 +370,11 @@ def _within_error(
     if opened:
         return CertainWall(), None
     most_damping = max(cells.box[3], 0.0)
-    certain = certain_wall(cells.edge, doubt, most_damping)
+    certain = certain_wall(cells.edge, doubt, damping_lines(most_damping))
+    if certain.stiffness > (1.0 - CLOSE) * nominal.stiffness:
+        low, high = max(zoomed.box[2], 0.0), zoomed.box[3]
+        closer = certain_wall(zoomed.edge, doubt, np.linspace(low, high, LINES))
+        certain = certain if closer.stiffness < certain.stiffness else closer
     if nominal.stiffness < certain.stiffness:  # it is found with finer chords
         certain = nominal
     return certain, Band(

@@ -57,11 +57,29 @@ class Doubt:
         """Where (k,) hardly more is known of the response than that it is small."""
         return np.asarray(self.radius >= HARDLY_KNOWN * np.abs(self.response))
 
-    def clearance(self, walls: Floats) -> Floats:
-        """Distance from doubt (n, k) at walls (n, 2) of K, B: below 0 in doubt."""
+    def clearance(self, wall_stiffness: float, wall_damping: float) -> tuple[Floats, Floats]:
+        """Distance of a wall from doubt, over |c|, below 0 in doubt, and at which angle: (2 k - 1,) each, at the angles
+        and on the way from each to the next, nearest to 0 there."""
+        c = wall_stiffness + wall_damping * self.velocity
+        F, reach, share, away = self._way(np.array([[wall_stiffness, wall_damping]]))
+        size = np.maximum(np.abs(c), 1e-300)
+        near, theta = np.empty((2, 2 * len(self.angles) - 1))
+        near[::2], theta[::2] = (np.abs(F) - reach)[0] / size, self.angles
+        between = (away - np.maximum(reach[:, :-1], reach[:, 1:]))[0] / np.maximum(size[1:], size[:-1])
+        near[1::2] = np.where(self.joined, between, np.inf)
+        theta[1::2] = self.angles[:-1] + share[0] * np.diff(self.angles)
+        return near, theta
+
+    def _way(self, walls: Floats) -> tuple[Complexes, Floats, Floats, Floats]:
+        """At walls (n, 2): F = scale + response c (n, k) and how far from 0 it must be; then where on the way between
+        two angles, as a share, it is nearest to 0 (n, k - 1), and how near."""
         c = walls[:, :1] + walls[:, 1:] * self.velocity
+        F = self.scale + self.response * c
         reach = np.sqrt((self.radius * np.abs(c)) ** 2 + self.rest**2)
-        return np.asarray(np.abs(self.scale + self.response * c) - reach)
+        a, along = F[:, :-1], np.diff(F, axis=1)
+        length = np.maximum(along.real**2 + along.imag**2, 1e-300)
+        share = np.clip(-(a.real * along.real + a.imag * along.imag) / length, 0.0, 1.0)
+        return F, reach, share, np.abs(a + share * along)
 
     def stretches(self, walls: Floats) -> tuple[Whole, Whole]:
         """Numbers (n,) of separate stretches of frequency that leave walls (n, 2) in doubt, and of those among them
@@ -75,16 +93,10 @@ class Doubt:
         )
 
     def _stretches(self, walls: Floats) -> tuple[Whole, Whole]:
-        c = walls[:, :1] + walls[:, 1:] * self.velocity
-        F = self.scale + self.response * c
-        reach = np.sqrt((self.radius * np.abs(c)) ** 2 + self.rest**2)
-        # between two angles F passes 0 on a chord
-        a, along = F[:, :-1], np.diff(F, axis=1)
-        length = np.maximum(np.abs(along) ** 2, 1e-300)
-        share = np.clip(-(a.real * along.real + a.imag * along.imag) / length, 0.0, 1.0)
+        F, reach, _, away = self._way(walls)
         flags = np.zeros((len(walls), 2 * len(self.angles) + 1), dtype=bool)
         flags[:, 1::2] = np.abs(F) <= reach
-        flags[:, 2:-1:2] = self.joined & (np.abs(a + share * along) <= np.maximum(reach[:, :-1], reach[:, 1:]))
+        flags[:, 2:-1:2] = self.joined & (away <= np.maximum(reach[:, :-1], reach[:, 1:]))
         edges = np.diff(flags.astype(np.int8), axis=1)
         wall, first = np.nonzero(edges == 1)
         _, last = np.nonzero(edges == -1)

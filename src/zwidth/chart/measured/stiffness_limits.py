@@ -44,14 +44,18 @@ class CertainWall:
     angles: tuple[float, ...] = ()
 
 
-def certain_wall(edge: Boundary, doubt: Doubt, most_damping: float) -> CertainWall:
+def damping_lines(most_damping: float) -> Floats:
+    """Dampings (n,) at which the stiffest wall is looked for first, up to the largest [N s/m]."""
+    even = np.linspace(0.0, most_damping, LINES)
+    return np.union1d(even, np.geomspace(1e-4 * most_damping, even[1], LOW_LINES))
+
+
+def certain_wall(edge: Boundary, doubt: Doubt, lines: Floats) -> CertainWall:
     """The stiffest wall with K > 0 and B >= 0 that is stable for certain; nan if there is none.
 
-    edge          the boundary, close enough to the curve where walls are stable
-    most_damping  the largest damping that is searched [N s/m]
+    edge   the boundary, close enough to the curve where walls are stable
+    lines  dampings (n,) at which to look first, ascending [N s/m]
     """
-    lines = np.linspace(0.0, most_damping, LINES)
-    lines = np.union1d(lines, np.geomspace(1e-4 * most_damping, lines[1], LOW_LINES))
     values = _certain(edge, doubt, lines)
     for _ in range(ZOOMS):
         if np.all(np.isnan(values)):
@@ -166,11 +170,8 @@ def _middles(gaps: Floats) -> Floats:
 
 def _binding_angles(doubt: Doubt, K: float, B: float) -> tuple[float, ...]:
     """The angles at which a wall is at the edge of doubt: one, or two at a corner."""
-    c = np.abs(K + B * doubt.velocity)
-    near = doubt.clearance(np.array([[K, B]]))[0] / np.maximum(c, 1e-300)
-    at = np.flatnonzero(near < BINDING)
-    if not len(at):
-        at = np.array([np.argmin(near)])
+    near, theta = doubt.clearance(K, B)
+    at = np.flatnonzero(near < max(BINDING, 2.0 * float(np.min(near))))
     runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
     closest = sorted((run[np.argmin(near[run])] for run in runs), key=lambda k: near[k])[:2]
-    return tuple(sorted(float(doubt.angles[k]) for k in closest))
+    return tuple(sorted(float(theta[k]) for k in closest))

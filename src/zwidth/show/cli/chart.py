@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -28,6 +29,11 @@ MOST_UNMEASURED: Final = 0.1  # of the frequencies up to half the sampling rate,
 OPEN_EDGE: Final = (
     "the measured edge does not close round the stable walls: frequencies are missing; measure up to half the "
     "sampling rate"
+)
+
+NO_CERTAIN_WALL: Final = (
+    "the data leave no wall certain: within their error, none with K > 0 and B >= 0 is stable whatever the device is; "
+    "record longer, with more force, or repeat the sweep"
 )
 
 Window = tuple[float, float, float, float]
@@ -95,7 +101,9 @@ class ChartCommand(Command):
             return f"this is undecided: {doubt}"
         if result.stiffness_max == result.stiffness_max:
             return None
-        return OPEN_EDGE if getattr(result, "open", False) else NO_WALL
+        if getattr(result, "open", False):
+            return OPEN_EDGE
+        return NO_CERTAIN_WALL if getattr(result, "band", None) is not None else NO_WALL
 
     def pages(self, case: CommandLine, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
         if document.get("warning"):
@@ -192,9 +200,14 @@ def unmeasured_warning(chart: MeasuredChart) -> str | None:
 
 def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
     """Rows for people on a chart by a frequency response, below those of every chart."""
-    if chart.band is not None:
-        low, high = amount(chart.band.stiffness_low, "N/m"), amount(chart.band.stiffness_high, "N/m")
-        yield "largest stiffness from", f"{low} to {high} ({chart.band.meaning})"
+    if chart.band is None:
+        if not chart.open:
+            yield "error", "not known: neither coherence nor repeated sweeps are given; these are nominal numbers"
+    else:
+        yield "of the mean response", _nominal(chart)
+        high = chart.band.stiffness_high
+        limit = "not limited by the data" if high == inf else f"at most {amount(high, 'N/m')}"
+        yield "error", f"{chart.band.meaning}; the largest stiffness is {limit}; area and regions are nominal"
     if chart.stiffness_max_of_sweeps:
         yield "in the single sweeps", ", ".join(amount(K, "N/m") for K in chart.stiffness_max_of_sweeps)
     response = chart.loop.response
@@ -205,6 +218,15 @@ def measured_rows(chart: MeasuredChart) -> Iterator[tuple[str, str]]:
         yield "unreliable", stretch_text(stretch)
     if len(chart.unusable) > SHOWN_STRETCHES:
         yield "", f"and {len(chart.unusable) - SHOWN_STRETCHES} more ranges; --json lists all"
+
+
+def _nominal(chart: MeasuredChart) -> str:
+    """The largest stiffness of the response as it was measured."""
+    if chart.stiffness_max_nominal != chart.stiffness_max_nominal:
+        return "none"
+    frequencies = " and ".join(amount(f, "Hz") for f in chart.frequencies_at_stiffness_max_nominal)
+    stiffness, damping = chart.stiffness_max_nominal, chart.damping_at_stiffness_max_nominal
+    return f"{amount(stiffness, 'N/m')} at {amount(damping, 'Ns/m')} of damping, limited at {frequencies}"
 
 
 def stretch_text(stretch: UnusableRange) -> str:

@@ -18,6 +18,8 @@ LONGEST_LIST = 3  # stretches named in the legend
 def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = None) -> None:
     """The stable walls filled, the interpolated edge, the measured points on it, and the band of the error.
 
+    Walls, edge and points are nominal; marked are the stiffest wall that is stable for certain and the nominal one.
+
     window  what to show; left out: the regions' box and 5 %
     """
     for n, ring in enumerate(chart.regions):
@@ -50,6 +52,16 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
     _unusable(ax, chart)
     if chart.stiffness_max == chart.stiffness_max:
         mark_stiffest(ax, chart)
+    if chart.band is not None and chart.stiffness_max_nominal == chart.stiffness_max_nominal:
+        ax.plot(
+            [chart.stiffness_max_nominal],
+            [chart.damping_at_stiffness_max_nominal],
+            color=BLACK,
+            marker="x",
+            linestyle="none",
+            zorder=4.9,
+            label=f"stiffest as measured: {quantity(chart.stiffness_max_nominal, 'N/m')}",
+        )
     frame(ax, window or chart.box, empty=not chart.regions)
     legend_above(ax)
 
