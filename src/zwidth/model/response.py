@@ -173,7 +173,7 @@ def integrators_of(response: Response, period: float) -> int:
     nearest = int(np.argmin(np.abs(phases)))
     clear, settled = abs(phases[nearest]) < CLEAR, abs(phases[nearest]) < SETTLED
     unlike = abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5
-    fit = low_frequencies(response) if unlike or not settled or response.integrators == 1 else None
+    fit = low_frequencies(response) if unlike or not settled else None
     if fit is not None and fit.first_seen and fit.first_seen[1] < 0.0 and fit.terms[2] < 0.0:
         raise ResponseError(f"{where}: the position moves against the force; is the sign of one of them turned?")
     if clear and unlike and not (fit and fit.integrators is not None):
@@ -183,9 +183,9 @@ def integrators_of(response: Response, period: float) -> int:
         )
     if response.integrators is not None:
         m = response.integrators
-        # the corner of a mass and a dashpot may lie below the data: there it is a free mass
-        hidden = m == 1 and fit is not None and fit.integrators in (1, 2)
-        if abs(phases[m]) > CONTRADICTED and not hidden:
+        # the corner of a mass and a dashpot may lie below the data: there it lags as a free mass does
+        free = m == 1 and nearest == 2 and clear
+        if abs(phases[m]) > CONTRADICTED and not free:
             raise ResponseError(
                 f"integrators = {m} does not fit: {where}, where {-90 * m} is expected; give 0 for a device on a "
                 "spring, 1 for one with a dashpot to the ground, 2 for a free one, or measure lower"
