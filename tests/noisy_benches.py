@@ -76,13 +76,15 @@ def random_device(rng, kind):
 
 
 def excitation(rng, kind, count, period):
-    """Force (n,) of size 1: "noise", "chirp" up, "double" up and down, in logarithm from 0.2 % of half the rate."""
+    """Force (n,) of size 1: "noise", or from 0.2 % of half the rate up a "chirp", "double" with the way back, or
+    "linear"."""
     if kind == "noise":
         return rng.normal(size=count)
     half = 0.5 / period
     length = -(-count // 2) if kind == "double" else count
     t = np.arange(length) * period
-    up = scipy.signal.chirp(t, 0.002 * half, t[-1], half, method="logarithmic")
+    method = "linear" if kind == "linear" else "logarithmic"
+    up = scipy.signal.chirp(t, 0.002 * half, t[-1], half, method=method)
     return np.concatenate([up, up[::-1]])[:count] if kind == "double" else up
 
 
@@ -96,7 +98,7 @@ def random_bench(seed, stiffest):
     loop = random_device(rng, kind)
     count = int(rng.integers(8_000, 24_000))
     sweeps = int(rng.choice([1, 1, 2, 3]))
-    shape = str(rng.choice(["noise", "chirp", "double"]))
+    shape = str(rng.choice(["noise", "chirp", "double", "linear"]))
     size = 1.0 / stiffest(loop)
     step = size * 10.0 ** rng.uniform(-3.0, -1.0) if rng.random() < 0.7 else 0.0
     sensor = size * 10.0 ** rng.uniform(-3.5, -1.3) if rng.random() < 0.6 else 0.0

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.response import Response
+if TYPE_CHECKING:
+    from zwidth.model.response import Response
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ def joint_radius(response: Response) -> Floats | None:
 
     Returns  None where neither coherence nor repetitions are known; inf where the coherence is 0
 
+    >>> from zwidth.model.response import Response
     >>> exact = Response(np.arange(1.0, 11.0), np.ones(10, complex), coherence=np.full(10, 0.99), averages=16.0)
     >>> joint_radius(exact).round(4).tolist()[:2]
     [0.0653, 0.0653]

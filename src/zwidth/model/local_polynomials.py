@@ -32,7 +32,7 @@ FEWEST_TILES = 6  # that a spectrum is divided into, however smooth the response
 WIDEST_SHARE = 0.5  # half a window over its middle frequency, at most
 AGREED = 4.0  # squared difference between a wide and a narrow window that is taken, over the narrow one's variance
 APART = 12.0  # the same from which a wide window, and every wider one, is given up
-UNSEEN = 3.0  # variance of a merged window, over that of its noise, for what this does not tell apart
+UNSEEN = 2.0  # variance of a merged window, over that of its noise, for what this does not tell apart
 TOLERANCE = 1e-3  # relative difference that is always allowed
 CHUNK = 2_000_000  # numbers of the equations that are solved at once
 
@@ -45,7 +45,7 @@ class Fits:
 
     coefficients  (n, 3) of G in r
     factor        (n, 3, 3) covariance of these for noise of variance 1
-    cubic         (n, 4) coefficients of G in r where both polynomials have one more term; (n, 0): not computed
+    cubic         (n, 4) coefficients of G in r where both polynomials have one more term
     noise         (n,) variance of the noise at one frequency of the transform
     excited       (n,) mean squared |U| in the window
     """
@@ -76,17 +76,17 @@ class Fits:
         return np.asarray(np.abs(longer - value) ** 2)
 
 
-def fit_tiles(U: Complexes, Y: Complexes, width: int, *, cubic: bool) -> Fits:
+def fit_tiles(U: Complexes, Y: Complexes, width: int) -> Fits:
     """Polynomials over all tiles of `width` spacings from the second value of both transforms on."""
     middles = np.arange(1 + width // 2, len(U) - 1 + width // 2, width)
     size = 2 * width + 1
     chunk = max(1, CHUNK // (size * TERMS))
-    parts = [_fit_windows(U, Y, middles[i : i + chunk], width, cubic) for i in range(0, len(middles), chunk)]
+    parts = [_fit_windows(U, Y, middles[i : i + chunk], width) for i in range(0, len(middles), chunk)]
     return Fits(width, *(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _fit_windows(
-    U: Complexes, Y: Complexes, middles: Whole, width: int, cubic: bool
+    U: Complexes, Y: Complexes, middles: Whole, width: int
 ) -> tuple[Complexes, Complexes, Complexes, Floats, Floats]:
     """Coefficients, their covariance, those with one more term, variance of the noise and mean |U|^2."""
     starts = np.clip(middles - width, 1, len(U) - 1 - 2 * width)
@@ -96,7 +96,7 @@ def _fit_windows(
     excited = np.mean(np.abs(u) ** 2, axis=1)
     scale = np.sqrt(np.where(excited > 0.0, excited, 1.0))[:, None]
     coefficients, rows, left = _least_squares(u / scale, y, r, ORDER)
-    longer = _least_squares(u / scale, y, r, ORDER + 1)[0] if cubic else np.empty((len(u), 0), complex)
+    longer = _least_squares(u / scale, y, r, ORDER + 1)[0]
     rows = rows / scale[:, :, None]
     return (
         coefficients / scale,
@@ -148,7 +148,7 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
     widths = [narrowest]
     while last / (2 * widths[-1]) >= FEWEST_TILES and 4 * widths[-1] <= last:
         widths.append(2 * widths[-1])
-    levels = [_with_floor(fit_tiles(U, Y, width, cubic=width == narrowest), floor) for width in widths]
+    levels = [_with_floor(fit_tiles(U, Y, width), floor) for width in widths]
     count = len(levels[0].noise)
     level = np.zeros(count, dtype=np.int64)  # of the window that each of the narrowest tiles goes with
     whole = np.ones(count, dtype=bool)
@@ -166,7 +166,7 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
         value, spread = fits.at(numbers, r)
         # a merged window may be off by what would just not have kept its halves apart
         noise = spread * fits.noise[numbers]
-        error = UNSEEN * noise if n else noise + fits.curvature(numbers, r)
+        error = (UNSEEN if n else 1.0) * noise + fits.curvature(numbers, r)
         result.value[at], result.variance[at] = value, error + (TOLERANCE * np.abs(value)) ** 2
         result.freedom[at] = fits.freedom
         result.noise[at], result.excited[at] = levels[0].noise[tile[at]], levels[0].excited[tile[at]]

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.joint_confidence import joint_radius
 from zwidth.model.low_frequencies import LowFrequencies, fit_low_frequencies
 
 Floats = NDArray[np.float64]
@@ -15,6 +16,7 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
+UNSURE: Final = 0.5  # relative error of the response, up to which the lowest frequencies are left out
 
 # Phase of P (z - 1)^m at the lowest frequency, beyond which m is not believed [rad]
 CLEAR, CONTRADICTED = np.radians(30.0), np.radians(75.0)
@@ -135,10 +137,17 @@ def relative_error(coherence: Floats, averages: float) -> Floats:
 
 
 def usable_frequencies(response: Response) -> Flags:
-    """Which frequencies (n,) a chart is made of: the response finite, not zero, and coherent enough."""
+    """Which frequencies (n,) a chart is made of: the response finite, not zero, and coherent enough.
+
+    Of the lowest, those before the first whose error is small are left out: there a device is as simple as what is
+    fitted to it (`low_frequencies`), and that is surer.
+    """
     good = np.isfinite(response.value) & (response.value != 0.0)
     if response.coherence is not None:
         good &= response.coherence >= LEAST_COHERENCE
+    radius = joint_radius(response)
+    if radius is not None and np.any(sure := good & (radius <= UNSURE)):
+        good[: np.flatnonzero(sure)[0]] = False
     return np.asarray(good)
 
 

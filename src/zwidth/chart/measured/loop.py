@@ -36,7 +36,6 @@ Flags = NDArray[np.bool_]
 BETWEEN = 2.0  # times the error that interpolation is expected to leave: what is allowed for between frequencies
 SETTLED = np.radians(3.0)  # phase at the lowest frequency, below which nothing is fitted to what lies below
 UNSURE_ACROSS = 0.1  # relative error from which the response is taken straight across what is not used
-UNSURE_BELOW = 0.5  # the same from which the lowest frequencies are left to what is fitted to them
 ENDING = 7  # last frequencies from which the response is continued to half the sampling rate, and steps of that
 HALVINGS = 12  # of the lowest frequency, at which what is fitted continues the response, at most
 
@@ -71,7 +70,7 @@ class MeasuredLoop:
                 f"has frequencies up to {f[-1]:.6g} Hz, above half the sampling rate, {half:.6g} Hz; leave them "
                 "out, or correct sampling_period_s"
             )
-        good = usable_frequencies(self.response) & ~_lowest_unsure(self.response)
+        good = usable_frequencies(self.response)
         if np.count_nonzero(good) < FEWEST:
             raise ResponseError(
                 f"has {np.count_nonzero(good)} usable frequencies of {len(f)}; at least {FEWEST} are needed, "
@@ -280,12 +279,3 @@ class MeasuredLoop:
             self.low_frequencies.inverse(f, self.integrators)
         )
         return np.asarray(often * self.low_frequencies.deviation(f) + fitted + floor)
-
-
-def _lowest_unsure(response: Response) -> Flags:
-    """The lowest frequencies (n,) up to the first whose error is small; none where no error is known or small."""
-    radius = joint_radius(response)
-    unsure = np.zeros(len(response.frequency), dtype=bool)
-    if radius is not None and np.any(radius <= UNSURE_BELOW):
-        unsure[: np.flatnonzero(radius <= UNSURE_BELOW)[0]] = True
-    return unsure
