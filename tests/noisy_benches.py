@@ -109,5 +109,7 @@ def random_bench(seed, stiffest):
         moved = readings(loop, force + pushed * rng.normal(size=count)) + sensor * rng.normal(size=count)
         forces.append(force)
         positions.append(np.round(moved / step) * step if step else moved)
-    label = f"{kind} {shape} x{sweeps} N={count} step={step / size:.4f} noise={sensor / size:.4f} push={pushed:.3f}"
+    label = (
+        f"{kind} {shape} x{sweeps} N={count} step={step / size:.4f} noise={sensor / size:.4f} push={pushed:.3f}"
+    )
     return Bench(loop, label, np.array(forces), np.array(positions))

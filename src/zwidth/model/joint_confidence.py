@@ -25,9 +25,9 @@ def joint_radius(response: Response) -> Floats | None:
 
         r^2 = nu v ((n / 0.05)^(1 / nu) - 1),      for known v:  v ln(n / 0.05)
 
-    From coherence v = (1 - g^2) / (a g^2) of a averages, a - 1 degrees unless they are given; known, if a is 1. From k sweeps, their mean
-    squared distance from their mean over k - 1 and over k, with that of their neighbours: 7 (k - 1) degrees. Of
-    both, where there are both, the larger. Known error of the mean of k sweeps: v / k.
+    From coherence v = (1 - g^2) / (a g^2) of a averages, and over k of the mean of k sweeps; a - 1 degrees unless
+    they are given; known, if a is 1. From the scatter of k sweeps, their squared distance from their mean summed
+    over k (k - 1), with that of their neighbours: 7 (k - 1) degrees. Of both, where there are both, the larger.
 
     Returns  None where neither coherence nor repetitions are known; inf where the coherence is 0
 

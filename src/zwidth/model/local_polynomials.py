@@ -1,10 +1,10 @@
 """A frequency response from the spectra of one record, by polynomials over windows as wide as the response allows.
 
-The transform of what was read is, up to noise, Y = G U + C: the response G to the transform U of what was sent, and
-C, what the state at both ends of the record adds. Both G and C change slowly from one frequency of the transform to
-the next, so that over a window of neighbours each is a polynomial, fitted by least squares (local polynomial method:
-Pintelon and Schoukens, System Identification, 2nd ed., ch. 7, known at second hand). Unlike a tapered spectrum it
-has no leakage, and what the fit leaves tells the noise.
+The transform of what was read is, up to noise, Y = G U + C: the response G to the transform U of what was sent,
+and C, what the state at both ends of the record adds. Both G and C change slowly from one frequency of the
+transform to the next, so that over a window of neighbours each is a polynomial, fitted by least squares (local
+polynomial method: Pintelon and Schoukens, System Identification, 2nd ed., ch. 7, known at second hand). Unlike a
+tapered spectrum it has no leakage, and what the fit leaves tells the noise.
 
 A wide window averages more noise, a narrow one follows a sharper resonance. The narrowest windows tile the whole
 spectrum; two neighbours are merged into one twice as wide as long as it predicts what both of them see, within
@@ -70,7 +70,7 @@ class Fits:
         return value, np.maximum(spread, 0.0)
 
     def curvature(self, tile: Whole, r: Floats) -> Floats:
-        """Squared difference (n,) that one more term makes at places r (n,) of tiles (n,): what the order misses."""
+        """Squared difference (n,) that one more term makes at places r (n,) of tiles (n,)."""
         value, _ = self.at(tile, r)
         longer = np.sum(self.cubic[tile] * r[:, None] ** np.arange(self.cubic.shape[1]), axis=1)
         return np.asarray(np.abs(longer - value) ** 2)

@@ -5,8 +5,8 @@ However many modes and whatever delay a device has, near frequency 0
     1 / P = k + b s + m s^2 + j s^3 + ...,   s = 2 pi i f,   all of them real,
 
 as long as P has no zero near there: k is the stiffness to the ground, b the damping with what a delay adds to it,
-m the mass with the same. A free device has k = b = 0, and P has two poles at z = 1; one with a dashpot to the ground
-k = 0, and one pole; one on a spring none.
+m the mass with the same. A free device has k = b = 0, and P has two poles at z = 1; one with a dashpot to the
+ground k = 0, and one pole; one on a spring none.
 """
 
 from __future__ import annotations
@@ -21,7 +21,16 @@ Complexes = NDArray[np.complex128]
 
 TERMS = 4
 FEWEST = 5  # frequencies that are fitted
-REACHES = (50.0, 25.0, 12.0, 6.0, 4.0, 2.5, 1.7)  # of the fit, over the lowest frequency: the farthest that fits
+REACHES = (
+    50.0,
+    25.0,
+    12.0,
+    6.0,
+    4.0,
+    2.5,
+    1.7,
+    1.4,
+)  # of the fit, over the lowest frequency: the farthest that fits
 MISFIT = 0.02  # relative error of the fit that is always allowed
 MISFIT_IN_DEVIATIONS = 4.0
 NEIGHBOURS = 2.0  # variance of what is fitted to so many frequencies with errors alike, over that of others

@@ -138,7 +138,7 @@ def _places(samples: int, segment: int | None) -> Floats:
     first = first[first < 0.5]
     steps = np.ceil(np.log(0.5 / first[-1]) / RATIO)
     above = first[-1] * np.exp(np.log(0.5 / first[-1]) * np.arange(1, steps + 1) / max(steps, 1.0))
-    return np.minimum(np.concatenate([first, above]), 0.5)
+    return np.asarray(np.minimum(np.concatenate([first, above]), 0.5))
 
 
 def encoder_step(position: Floats) -> float:

@@ -40,7 +40,7 @@ def largest_root(loop, stiffness, damping):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one bench: what holds of its chart, and the headline over the truth (nan: the data leave no wall certain)."""
+    """Of one bench: what holds of its chart, and the headline over the truth (nan: no wall is certain)."""
 
     band: bool
     verdicts: bool

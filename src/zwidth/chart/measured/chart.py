@@ -64,9 +64,9 @@ MOST_DOUBTED = 1000  # angles of the edge among these
 class MeasuredChart(DrawnChart):
     """The stable walls of a measured device.
 
-    `stiffness_max`, its damping and its frequencies are those of the stiffest wall that is stable for certain: whatever
-    the true response within the measurement's error. `regions`, `boundary`, `damping_max` and `stable_area` are
-    nominal, of the response as it was measured. Where no error is known, both are the same.
+    `stiffness_max`, its damping and its frequencies are those of the stiffest wall that is stable for certain:
+    whatever the true response within the measurement's error. `regions`, `boundary`, `damping_max` and
+    `stable_area` are nominal, of the response as it was measured. Where no error is known, both are the same.
 
     stiffness_max_nominal, damping_at_stiffness_max_nominal, frequencies_at_stiffness_max_nominal
                           of the response as it was measured [N/m], [N s/m], [Hz]; nan, () if no wall is stable
@@ -216,7 +216,8 @@ def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[f
     Each is as far from the truth as their mean times the square root of their number.
     """
     radius, sweeps = joint_radius(response), response.sweeps
-    assert sweeps is not None and radius is not None
+    assert sweeps is not None
+    assert radius is not None
     variance = radius**2 * len(sweeps) / np.log(len(radius) / (1.0 - CONFIDENCE))
     for sweep in sweeps:
         alone = replace(
@@ -415,8 +416,8 @@ def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
         if loop.errors is None:
             yield BoundaryArc(K, B, given)
         else:
-            low, high = _stiffness_in_doubt(loop, theta)
-            yield BoundaryArc(K, B, given, stiffness_low=low, stiffness_high=high)
+            least, most = _stiffness_in_doubt(loop, theta)
+            yield BoundaryArc(K, B, given, stiffness_low=least, stiffness_high=most)
     lines = [(-1, 0.0), (-2, half)] if loop.interpolation.closed else [(-1, 0.0)]
     for kind, frequency in lines:
         static, turned = real_root(loop, kind)
@@ -429,7 +430,7 @@ def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
 
 
 def _stiffness_in_doubt(loop: MeasuredLoop, theta: Floats) -> tuple[Floats, Floats]:
-    """The least and the largest K (n,) [N/m] that each angle leaves in doubt, at any B; infinite where it is all."""
+    """The least and the largest K (n,) [N/m] that each angle leaves in doubt, at any B; infinite: all."""
     h, w, r = loop.h(theta), loop.w(theta), loop.relative_error(theta)
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = h / (1.0 - r * r)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +59,10 @@ class Doubt:
         return np.asarray(self.radius >= HARDLY_KNOWN * np.abs(self.response))
 
     def clearance(self, wall_stiffness: float, wall_damping: float) -> tuple[Floats, Floats]:
-        """Distance of a wall from doubt, over |c|, below 0 in doubt, and at which angle: (2 k - 1,) each, at the angles
-        and on the way from each to the next, nearest to 0 there."""
+        """Distance of a wall from doubt, over |c|, below 0 in doubt, and at which angle: (2 k - 1,) each.
+
+        At the angles, and where on the way from each to the next it is least.
+        """
         c = wall_stiffness + wall_damping * self.velocity
         F, reach, share, away = self._way(np.array([[wall_stiffness, wall_damping]]))
         size = np.maximum(np.abs(c), 1e-300)
@@ -71,8 +74,8 @@ class Doubt:
         return near, theta
 
     def _way(self, walls: Floats) -> tuple[Complexes, Floats, Floats, Floats]:
-        """At walls (n, 2): F = scale + response c (n, k) and how far from 0 it must be; then where on the way between
-        two angles, as a share, it is nearest to 0 (n, k - 1), and how near."""
+        """At walls (n, 2): F = scale + response c (n, k) and how far from 0 it must be; then where on the way
+        between two angles, as a share, it is nearest to 0 (n, k - 1), and how near."""
         c = walls[:, :1] + walls[:, 1:] * self.velocity
         F = self.scale + self.response * c
         reach = np.sqrt((self.radius * np.abs(c)) ** 2 + self.rest**2)
@@ -82,8 +85,8 @@ class Doubt:
         return F, reach, share, np.abs(a + share * along)
 
     def stretches(self, walls: Floats) -> tuple[Whole, Whole]:
-        """Numbers (n,) of separate stretches of frequency that leave walls (n, 2) in doubt, and of those among them
-        that can hide that a wall is stable."""
+        """Numbers (n,) of separate stretches of frequency that leave walls (n, 2) in doubt, and of those among
+        them that can hide that a wall is stable."""
         step = max(1, CHUNK // len(self.angles))
         parts = [self._stretches(walls[i : i + step]) for i in range(0, len(walls), step)]
         none = np.empty(0, dtype=np.int64)
@@ -134,7 +137,7 @@ def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
         response = -scale / h
     below = theta < loop.angles[0]
     radius, rest = loop.relative_error(theta), loop.error_below(theta)
-    parts = [
+    parts: list[tuple[Any, ...]] = [
         _real_root(loop, -1),
         (theta, scale, response, w, np.where(below, 0.0, radius), np.where(below, rest, 0.0)),
     ]

@@ -118,7 +118,7 @@ class MeasuredLoop:
 
     @property
     def _across_noise(self) -> Flags:
-        """Between which of `angles` (n - 1,) noise was measured, and the response is not sure at the ends either."""
+        """Between which of `angles` (n - 1,) noise was measured, with ends that are not sure either."""
         if self.errors is None:
             return np.zeros(len(self.angles) - 1, dtype=bool)
         left_out = np.diff(np.flatnonzero(self.usable)) > 1
@@ -145,8 +145,8 @@ class MeasuredLoop:
         return self.angles[0] * shares, fitted * np.abs(ratio) * np.exp(1j * shares * np.angle(ratio))
 
     def _continued_up(self) -> tuple[Floats, Complexes]:
-        """Angles above the last usable one, and P there: P (z - 1)^m as large as it was, its phase turned evenly to
-        that of a real number."""
+        """Angles above the last usable one, and P there: P (z - 1)^m as large as it was, its phase turned evenly
+        to that of a real number."""
         P, m, last = self.response.value[self.usable], self.integrators, self.angles[-1]
         G, delay = smooth_part(self.angles, P, m)
         near = slice(-ENDING, None)
@@ -224,7 +224,8 @@ class MeasuredLoop:
         return np.concatenate([self.angles, theta])[order], np.concatenate([self.errors, radius])[order]
 
     def _node_error(self, theta: Floats) -> Floats:
-        """The error of `error_nodes` at angles (...): relative between used frequencies, else that of P (z - 1)^m."""
+        """The error of `error_nodes` at angles (...), over |P|: between used frequencies it is interpolated as such,
+        else as the error of P (z - 1)^m, since there the response itself is not known."""
         assert self.error_nodes is not None
         angles, radius = self.error_nodes
         used = np.isin(angles, self.angles)

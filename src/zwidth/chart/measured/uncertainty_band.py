@@ -49,8 +49,8 @@ class Band:
 def band_rings(loop: MeasuredLoop, cells: StableRegions) -> tuple[Floats, ...]:
     """Rings that cover the walls in doubt along the stable set's edge.
 
-    With an error of radius r in P, over |P|, a wall is in doubt where |K + B w - h| <= r |K + B w|: an ellipse beside
-    each point of the curve. The band is the ellipses along the edge, neighbours joined.
+    With an error of radius r in P, over |P|, a wall is in doubt where |K + B w - h| <= r |K + B w|: an ellipse
+    beside each point of the curve. The band is the ellipses along the edge, neighbours joined.
     """
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
     covered = _doubtful_walls(loop, cells, scale)

@@ -27,7 +27,7 @@ class ResponseSection(Section):
         "independent averages behind a coherence column; omitted: 1, the widest band", "1", ge=1, default=None
     )
     segment_samples: WholeNumber | None = documented_key(
-        "samples in a segment of a raw sweep; omitted: such that about 15 are averaged",
+        "samples whose spectrum resolves a raw sweep closely enough; omitted: as closely as the record allows",
         "1",
         ge=64,
         default=None,

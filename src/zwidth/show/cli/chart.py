@@ -32,8 +32,8 @@ OPEN_EDGE: Final = (
 )
 
 NO_CERTAIN_WALL: Final = (
-    "the data leave no wall certain: within their error, none with K > 0 and B >= 0 is stable whatever the device is; "
-    "record longer, with more force, or repeat the sweep"
+    "the data leave no wall certain: within their error, none with K > 0 and B >= 0 is stable for every device "
+    "that they may be of; record longer, with more force, or repeat the sweep"
 )
 
 Window = tuple[float, float, float, float]

@@ -18,7 +18,7 @@ LONGEST_LIST = 3  # stretches named in the legend
 def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = None) -> None:
     """The stable walls filled, the interpolated edge, the measured points on it, and the band of the error.
 
-    Walls, edge and points are nominal; marked are the stiffest wall that is stable for certain and the nominal one.
+    Walls, edge and points are nominal. Marked are the stiffest wall that is certain, and the nominal one.
 
     window  what to show; left out: the regions' box and 5 %
     """
