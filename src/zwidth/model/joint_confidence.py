@@ -34,7 +34,7 @@ def joint_radius(response: Response) -> Floats | None:
     >>> from zwidth.model.response import Response
     >>> exact = Response(np.arange(1.0, 11.0), np.ones(10, complex), coherence=np.full(10, 0.99), averages=16.0)
     >>> joint_radius(exact).round(4).tolist()[:2]
-    [0.0653, 0.0653]
+    [0.0633, 0.0633]
     """
     count = len(response.frequency)
     radii = []

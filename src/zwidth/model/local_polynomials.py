@@ -95,30 +95,44 @@ def _fit_windows(
     u, y = U[index], Y[index]
     excited = np.mean(np.abs(u) ** 2, axis=1)
     scale = np.sqrt(np.where(excited > 0.0, excited, 1.0))[:, None]
-    coefficients, rows, left = _least_squares(u / scale, y, r, ORDER)
-    longer = _least_squares(u / scale, y, r, ORDER + 1)[0]
+    R = _triangle(u / scale, y, r)
+    coefficients, rows = _solution(R, ORDER)
+    cubic, _ = _solution(R, ORDER + 1)
     rows = rows / scale[:, :, None]
+    left = np.sum(np.abs(R[:, TERMS:, -1]) ** 2, axis=1)
     return (
         coefficients / scale,
         rows @ np.conj(np.swapaxes(rows, 1, 2)),
-        longer / scale,
-        np.sum(np.abs(left) ** 2, axis=1) / (2 * width + 1 - TERMS),
+        cubic / scale,
+        left / (2 * width + 1 - TERMS),
         excited,
     )
 
 
-def _least_squares(u: Complexes, y: Complexes, r: Floats, order: int) -> tuple[Complexes, Complexes, Complexes]:
-    """Coefficients (n, order + 1) of G in y = G u + C, their rows of the inverse equations, and what is left."""
-    powers = r[:, :, None] ** np.arange(order + 1)
-    Q, R = np.linalg.qr(np.concatenate([u[:, :, None] * powers, powers.astype(complex)], axis=2))
-    projected = np.einsum("nki,nk->ni", Q.conj(), y)
-    left = y - np.einsum("nki,ni->nk", Q, projected)
+def _triangle(u: Complexes, y: Complexes, r: Floats) -> Complexes:
+    """R (n, 9, 9) of the QR decomposition of the columns u r^p, r^p for p = 0 to 3, and y, in this order.
+
+    Least squares with fewer terms are those of its leading block, and what they leave are the last column's rows
+    below that.
+    """
+    columns = np.empty((*u.shape, 2 * ORDER + 5), dtype=complex)
+    power = np.ones_like(r)
+    for order in range(ORDER + 2):
+        columns[..., 2 * order], columns[..., 2 * order + 1] = u * power, power
+        power = power * r
+    columns[..., -1] = y
+    return np.asarray(np.linalg.qr(columns, mode="r"))
+
+
+def _solution(R: Complexes, order: int) -> tuple[Complexes, Complexes]:
+    """Coefficients (n, order + 1) of G, and their rows of the inverse equations, from `_triangle`."""
+    count = 2 * (order + 1)
+    block, at = R[:, :count, :count].copy(), np.arange(count)
     # a window without force, or with one that cannot be told from the record's ends, has a vast error
-    at = np.arange(R.shape[1])
-    least = 1e-9 * np.max(np.abs(R[:, at, at]), axis=1)[:, None] + 1e-300
-    R[:, at, at] = np.where(np.abs(R[:, at, at]) < least, least, R[:, at, at])
-    rows = np.linalg.inv(R)[:, : order + 1]
-    return np.einsum("nij,nj->ni", rows, projected), rows, left
+    least = 1e-9 * np.max(np.abs(block[:, at, at]), axis=1)[:, None] + 1e-300
+    block[:, at, at] = np.where(np.abs(block[:, at, at]) < least, least, block[:, at, at])
+    rows = np.linalg.inv(block)[:, ::2]
+    return np.einsum("nij,nj->ni", rows, R[:, :count, -1]), rows
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is an
 UNSURE: Final = 0.5  # relative error of the response, up to which the lowest frequencies are left out
 
 # Phase of P (z - 1)^m at the lowest frequency, beyond which m is not believed [rad]
-CLEAR, CONTRADICTED = np.radians(30.0), np.radians(75.0)
+CLEAR, CONTRADICTED = np.radians(44.0), np.radians(75.0)
 SETTLED = np.radians(5.0)  # the same phase, below which nothing else is asked
 UNLIKE = 0.75  # by which the exponent of |P| may differ from the one that its phase tells
 
