@@ -33,8 +33,10 @@ REACHES = (
 )  # of the fit, over the lowest frequency: the farthest that fits
 MISFIT = 0.02  # relative error of the fit that is always allowed
 MISFIT_IN_DEVIATIONS = 4.0
-NEIGHBOURS = 2.0  # variance of what is fitted to so many frequencies with errors alike, over that of others
-SEEN_SHARE, SEEN_DEVIATIONS = 0.1, 4.0  # what a term is at the lowest frequency, of the largest, if it counts
+ROUGHEST = 0.3  # relative error with which the fit to the lowest frequencies still tells something
+MOST_OF_LAST = 0.3  # what the last term is at most, of the largest: more of it fits whatever there is
+NEIGHBOURS = 2.0  # times the variance by independent errors that is taken where no error is known
+SEEN_SHARE, SEEN_DEVIATIONS = 0.1, 3.0  # what a term is at the lowest frequency, of the largest, if it counts
 
 
 @dataclass(frozen=True)
@@ -44,13 +46,15 @@ class LowFrequencies:
     lowest      that frequency [Hz]
     terms       (4,) k [N/m], b [N s/m], m [kg], j [kg s]
     covariance  (4, 4) of these
-    fits        whether P is so to within its error
+    fits        whether P is so at least roughly; how roughly is in the covariance
+    closely     whether to within its error
     """
 
     lowest: float
     terms: Floats
     covariance: Floats
     fits: bool
+    closely: bool
 
     def inverse(self, frequency: Floats, integrators: int) -> Complexes:
         """1 / P (...) at frequencies [Hz] with this number of poles at z = 1: terms below are none."""
@@ -99,9 +103,14 @@ def fit_low_frequencies(frequency: Floats, value: Complexes, deviation: Floats |
         count = max(FEWEST, int(np.searchsorted(frequency, reach * frequency[0], side="right")))
         terms, covariance, misfit = _fit(frequency[:count], value[:count], error[:count])
         allowed = np.maximum(MISFIT, MISFIT_IN_DEVIATIONS * error[:count])
-        if fits := bool(np.all(misfit <= allowed)):
+        closely = bool(np.all(misfit <= allowed))
+        if closely:
             break
-    return LowFrequencies(float(frequency[0]), terms, covariance, fits)
+    # errors of neighbours may all be one: no number of them makes the fit surer
+    together = NEIGHBOURS if deviation is None else float(count)
+    size = np.abs(terms) * (2.0 * np.pi * frequency[0]) ** np.arange(TERMS)
+    fits = np.max(misfit) < ROUGHEST and size[3] < MOST_OF_LAST * np.max(size[:3])
+    return LowFrequencies(float(frequency[0]), terms, together * covariance, bool(fits), closely)
 
 
 def _fit(f: Floats, P: Complexes, error: Floats) -> tuple[Floats, Floats, Floats]:
@@ -116,5 +125,5 @@ def _fit(f: Floats, P: Complexes, error: Floats) -> tuple[Floats, Floats, Floats
     misfit = np.abs(equations @ terms - 1.0)
     spread = max(1.0, float(np.sum((misfit / error) ** 2)) / max(2 * len(f) - TERMS, 1))
     # errors are complex, of this deviation: half of its square in each part
-    covariance = NEIGHBOURS * spread * 0.5 * (inverse @ inverse.T)
+    covariance = spread * 0.5 * (inverse @ inverse.T)
     return terms / scale, covariance / np.outer(scale, scale), misfit

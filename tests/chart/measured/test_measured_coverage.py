@@ -77,7 +77,7 @@ def outcome(seed):
     )
 
 
-@pytest.mark.parametrize("seed", [0, 1, 17])
+@pytest.mark.parametrize("seed", [0, 1, 2])
 def test_what_is_certain_on_a_noisy_bench_is_true(seed):
     found = outcome(seed)
     assert found.band

@@ -265,14 +265,15 @@ class MeasuredLoop:
         """How far the true h may be from the interpolated one at angles (...) below the data [N/m].
 
         Of what is fitted to the lowest frequencies, with all its terms: whether there is a weak spring or a weak
-        dashpot to the ground is a part of it. Where nothing fits, as much as h at the lowest frequency.
+        dashpot to the ground is a part of it. Where nothing fits, as much as h at the lowest frequencies.
         """
         theta = np.asarray(theta)
         if self.error_nodes is None:
             return np.zeros(theta.shape)
-        first = np.abs(self.h(self.angles[:1]))
         if not self.low_frequencies.fits:
-            return np.broadcast_to(first * (1.0 + self.error_nodes[1][0]), theta.shape)
+            lowest = self.angles[self.angles <= 2.0 * self.angles[0]]
+            largest = np.max(np.abs(self.h(lowest)) * (1.0 + self.error_nodes[1][0]))
+            return np.broadcast_to(largest, theta.shape)
         f = theta / (2.0 * np.pi * self.period)
         often = np.sqrt(2.0 * np.log(len(self.angles) / (1.0 - CONFIDENCE)))
         fitted = np.abs(self.low_frequencies.inverse(f, 0) - self.low_frequencies.inverse(f, self.integrators))
