@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from zwidth.model.response import Response
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 CONFIDENCE: Final = 0.95
 POOLED: Final = 7  # neighbouring frequencies whose scatter is taken together
@@ -25,9 +26,11 @@ def joint_radius(response: Response) -> Floats | None:
 
         r^2 = nu v ((n / 0.05)^(1 / nu) - 1),      for known v:  v ln(n / 0.05)
 
-    From coherence v = (1 - g^2) / (a g^2) of a averages, and over k of the mean of k sweeps; a - 1 degrees unless
-    they are given; known, if a is 1. From the scatter of k sweeps, their squared distance from their mean summed
-    over k (k - 1), with that of their neighbours: 7 (k - 1) degrees. Of both, where there are both, the larger.
+    From coherence v = (1 - g^2) / (a g^2) of a averages, a - 1 degrees unless they are given; known, if a is 1.
+    From the scatter of k sweeps, v = u, their squared distance from their mean summed over k (k - 1), with that of
+    their neighbours: 7 (k - 1) degrees. Of both, where there are both, the larger; but of what coherence tells,
+    only the part k u that differs from sweep to sweep is averaged, v - (k - 1) u, at least v / k: an error that
+    repeats itself, as that of an encoder's steps under the same force, is in the mean as well.
 
     Returns  None where neither coherence nor repetitions are known; inf where the coherence is 0
 
@@ -38,22 +41,29 @@ def joint_radius(response: Response) -> Floats | None:
     """
     count = len(response.frequency)
     radii = []
+    scatter = None if response.sweeps is None else _scatter(response.sweeps, response.value)
+    repeated = 1 if response.sweeps is None else len(response.sweeps)
     with np.errstate(divide="ignore", invalid="ignore"):
+        if scatter is not None:
+            radii.append(_radius(scatter, np.full(count, POOLED * (repeated - 1.0)), count))
         if response.coherence is not None:
-            repeated = 1 if response.sweeps is None else len(response.sweeps)
             averages, freedom = response.averages, response.freedom
             if freedom is None:
                 freedom = np.full(count, averages - 1.0 if averages > 1.0 else np.inf)
-            variance = (1.0 - response.coherence) / (averages * response.coherence) / repeated
+            variance = (1.0 - response.coherence) / (averages * response.coherence)
+            if scatter is not None:
+                variance = np.maximum(variance - (repeated - 1.0) * scatter, variance / repeated)
             radii.append(_radius(variance, freedom, count))
-        if response.sweeps is not None:
-            repeated = len(response.sweeps)
-            apart = np.abs(response.sweeps / response.value - 1.0) ** 2
-            own = np.sum(apart, axis=0) / ((repeated - 1) * repeated)
-            padded = np.pad(np.where(np.isfinite(own), own, 0.0), POOLED // 2, mode="reflect")
-            pooled = np.convolve(padded, np.full(POOLED, 1.0 / POOLED), mode="valid")
-            radii.append(_radius(np.fmax(own, pooled), np.full(count, POOLED * (repeated - 1.0)), count))
     return np.asarray(np.max(radii, axis=0)) if radii else None
+
+
+def _scatter(sweeps: Complexes, mean: Complexes) -> Floats:
+    """Variance (n,) of the mean of sweeps (k, n), over |mean|^2, by their scatter and that of their neighbours."""
+    repeated = len(sweeps)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.sum(np.abs(sweeps / mean - 1.0) ** 2, axis=0) / ((repeated - 1) * repeated)
+    padded = np.pad(np.where(np.isfinite(own), own, 0.0), POOLED // 2, mode="reflect")
+    return np.asarray(np.fmax(own, np.convolve(padded, np.full(POOLED, 1.0 / POOLED), mode="valid")))
 
 
 def _radius(variance: Floats, freedom: Floats, count: int) -> Floats:

@@ -15,8 +15,9 @@ from zwidth.chart.measured.chart import measured_chart
 from zwidth.chart.verdict import eigenvalues
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
+from zwidth.model.joint_confidence import joint_radius
 from zwidth.model.plant import Plant
-from zwidth.model.response import integrators_of
+from zwidth.model.response import ResponseError, integrators_of
 from zwidth.model.sweep_response import sweep_response
 
 CLAIMED = 0.95
@@ -77,6 +78,14 @@ def outcome(seed):
     )
 
 
+def outcome_or_refusal(seed):
+    """None where the response is refused."""
+    try:
+        return outcome(seed)
+    except ResponseError:
+        return None
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_what_is_certain_on_a_noisy_bench_is_true(seed):
     found = outcome(seed)
@@ -91,11 +100,12 @@ def test_what_is_certain_on_a_noisy_bench_is_true(seed):
 @pytest.mark.parametrize("batch", range(20))
 def test_charts_of_a_thousand_noisy_benches_are_as_right_as_they_claim(batch):
     """And the headline costs little: the median over the truth is above 0.95."""
-    found = [outcome(seed) for seed in range(BATCH * batch, BATCH * (batch + 1))]
+    found = [one for seed in range(BATCH * batch, BATCH * (batch + 1)) if (one := outcome_or_refusal(seed))]
+    assert len(found) >= CLAIMED * BATCH
     for what in ("band", "verdicts", "headline"):
         assert np.mean([getattr(one, what) for one in found]) >= CLAIMED, what
     assert np.nanmedian([one.share for one in found]) > 0.95
-    assert np.mean([np.isnan(one.share) for one in found]) < 0.2
+    assert np.mean([np.isnan(one.share) for one in found]) < 0.35
 
 
 # --- two sweeps of 20 s through an encoder of 5 um -------------------------------------------------------
@@ -153,3 +163,11 @@ def test_steps_that_hide_the_motion_make_no_wall_certain_that_is_not():
         walls = np.random.default_rng(1).uniform([0.0, 0.0], [1.5 * chart.box[1], 1.5 * chart.box[3]], (200, 2))
         verdict, inside = chart.check(*walls.T).verdict, 1.0 - largest_root(loop, *walls.T)
         assert np.all((verdict == 0) | (verdict == np.sign(inside)))
+
+
+def test_an_error_that_repeats_itself_is_not_averaged():
+    """The same force and no noise: the same readings, and two of them say no more than one."""
+    loop, forces, _ = damped_bench(2)
+    reading = 5e-6 * np.round(readings(loop, forces[0]) / 5e-6)
+    alone = joint_radius(response_of(forces[:1], [reading], loop.period))
+    assert np.allclose(joint_radius(response_of(forces, [reading, reading], loop.period)), alone, equal_nan=True)

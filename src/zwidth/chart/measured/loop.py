@@ -224,8 +224,8 @@ class MeasuredLoop:
         return np.concatenate([self.angles, theta])[order], np.concatenate([self.errors, radius])[order]
 
     def _node_error(self, theta: Floats) -> Floats:
-        """The error of `error_nodes` at angles (...), over |P|: between used frequencies interpolated as such, else
-        as the error of P (z - 1)^m, since there the response itself is not known."""
+        """The error of `error_nodes` at angles (...), over |P|: between used frequencies interpolated as such,
+        else as the error of P (z - 1)^m, since there the response itself is not known."""
         assert self.error_nodes is not None
         angles, radius = self.error_nodes
         used = np.isin(angles, self.angles)
