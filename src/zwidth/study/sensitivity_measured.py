@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.chart.measured.chart import measured_chart
+from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.peak import Peak
 from zwidth.device import address, build
 from zwidth.device.device import Device
@@ -54,16 +54,17 @@ def measured_sensitivities(
     response, operator = point.measured, point.operator
     port = command_port(response, point.controller.sampling_period) if operator is None else point.measured_port
     chart = point.chart()
+    assert isinstance(chart, MeasuredChart)
     left_out = {DEVICE_ITSELF: LEFT_OUT}
-    if not isfinite(chart.stiffness_max):
+    if not isfinite(chart.stiffness_max_nominal):
         return Sensitivities(None, None, (), (), left_out, nan)
     turn = 2.0 * np.pi * port.period
-    angles = tuple(turn * f for f in chart.frequencies_at_stiffness_max)
-    peak = Peak(chart.stiffness_max, chart.damping_at_stiffness_max, angles)
+    angles = tuple(turn * f for f in chart.frequencies_at_stiffness_max_nominal)
+    peak = Peak(chart.stiffness_max_nominal, chart.damping_at_stiffness_max_nominal, angles)
     numbers = []
     varied = list(_numbers(device))
     for steps, value in varied:
-        numbers.append(_sensitivity(device, response, port, operator, steps, value, chart.stiffness_max))
+        numbers.append(_sensitivity(device, response, port, operator, steps, value, chart.stiffness_max_nominal))
         if progress is not None:
             progress("numbers", len(numbers), len(varied))
     for steps, _ in address.numbers(device.document):
@@ -134,7 +135,7 @@ def _sensitivity(
 
 
 def _largest(response: Response, port: MeasuredPort, controller: Controller, operator: Operator | None) -> float:
-    """Largest stable stiffness [N/m] of a changed port."""
+    """Largest stiffness [N/m] of a changed port, nominal: what is certain moves with the error as well."""
     below = port.theta <= np.pi * (1.0 + 1e-9)
     whole = replace(
         response, frequency=port.theta / (2.0 * np.pi * port.period), value=port.sampled["sa"], sweeps=None
@@ -147,9 +148,10 @@ def _largest(response: Response, port: MeasuredPort, controller: Controller, ope
         frequency=held.frequency[good],
         value=held.value[good],
         coherence=None if own is None else own[good],
+        freedom=None if held.freedom is None else held.freedom[good],
         handle=None,
     )
-    return measured_chart(changed, controller).stiffness_max
+    return measured_chart(changed, controller).stiffness_max_nominal
 
 
 def _built(

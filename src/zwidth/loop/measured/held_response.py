@@ -85,6 +85,7 @@ def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Res
         # an arm's spring or damper takes poles at z = 1 away, below the data or within: read off anew
         integrators=response.integrators if not (operator.arm_stiffness or operator.arm_damping) else None,
         coherence=None if coherence is None else coherence[kept],
+        freedom=None if response.freedom is None else response.freedom[kept],
         sweeps=None if sweeps is None else sweeps[:, kept],
         note=_note(response, port, np.abs(beyond / held), kept),
         handle=None,
