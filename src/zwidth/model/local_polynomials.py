@@ -131,8 +131,8 @@ def _solution(R: Complexes, order: int) -> tuple[Complexes, Complexes]:
     # a window without force, or with one that cannot be told from the record's ends, has a vast error
     least = 1e-9 * np.max(np.abs(block[:, at, at]), axis=1)[:, None] + 1e-300
     block[:, at, at] = np.where(np.abs(block[:, at, at]) < least, least, block[:, at, at])
-    rows = np.linalg.inv(block)[:, ::2]
-    return np.einsum("nij,nj->ni", rows, R[:, :count, -1]), rows
+    rows: Complexes = np.asarray(np.linalg.inv(block)[:, ::2], dtype=np.complex128)
+    return np.asarray(np.einsum("nij,nj->ni", rows, R[:, :count, -1])), rows
 
 
 @dataclass(frozen=True)
