@@ -48,6 +48,7 @@ KINDS: Final[dict[str, Kind]] = {
     "friction": Kind("friction"),
     "mass": Kind("mass"),
     "response": Kind("response"),
+    "modes": Kind("modes", takes_point=True),
     "impedance": Kind("impedance", takes_point=True),
     "boundary": Kind("boundary", takes_point=True),
     "arm": Kind("arm", takes_point=True),

@@ -13,7 +13,11 @@ Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
 
 LEVEL: Final = 0.95
-MOST_STEPS: Final = 40  # towards one end of an interval
+MOST_STEPS: Final = 20  # towards one end of an interval
+MOST_TRIALS: Final = 8  # steps of the other parameters at each of them
+MOST_DAMPED: Final = 5  # shorter ones, where one does not gain
+ENOUGH: Final = 1e-3  # of the rise at an end: what a step must gain
+SHORT, SHORTEST = 1e-3, 1e-6  # step of a derivative, in standard deviations, or in shares of the parameter
 CLOSE: Final = 1e-3  # share of the half width to which an end is found
 FARTHEST: Final = 1e3  # half widths by curvature, beyond which the data set no bound
 
@@ -107,7 +111,7 @@ def fit_least_squares(
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
     if profiled and scale > 0.0:
         rise = (quantile * scale) ** 2 / thinned
-        search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high, diff_step)
+        search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high, covariance, diff_step)
         for i in range(len(x)):
             for side in (0, 1):
                 ends[side, i] = search.end(i, ends[side, i])
@@ -136,6 +140,7 @@ class _EndSearch:
     rise: float
     lower: Floats
     upper: Floats
+    covariance: Floats
     diff_step: float | None
 
     def end(self, i: int, guess: float) -> float:
@@ -147,11 +152,16 @@ class _EndSearch:
         bound = self.upper[i] if towards > 0 else self.lower[i]
         width = abs(guess - self.best[i])
         inner, outer = 0.0, np.nan  # steps with a rise below and above the wanted one
-        step, rest = width, self.best.copy()
+        step, rest, before = width, self.best.copy(), 0.0
         rises = {0.0: 0.0}
+        along = np.nan_to_num(
+            self.covariance[i] / self.covariance[i, i], posinf=0.0, neginf=0.0
+        )  # how the others move with this one, to first order
         for _ in range(MOST_STEPS):
             step = min(step, abs(bound - self.best[i]))
+            rest = np.clip(rest + towards * (step - before) * along, self.lower, self.upper)
             risen, rest = self._risen(i, self.best[i] + towards * step, rest)
+            before = step
             rises[step] = root = float(np.sqrt(max(risen, 0.0) / self.rise))
             if root < 1.0:
                 inner = step
@@ -173,8 +183,6 @@ class _EndSearch:
 
     def _risen(self, i: int, fixed: float, start: Floats) -> tuple[float, Floats]:
         """By how much the least sum of squares with parameter i held exceeds the least of all, and its place."""
-        from scipy.optimize import least_squares
-
         others = np.arange(len(self.best)) != i
 
         def held(some: Floats) -> Floats:
@@ -184,10 +192,45 @@ class _EndSearch:
 
         if not others.any():
             return float(np.sum(held(np.zeros(0)) ** 2)) - self.least, self.best.copy()
-        bounds = (self.lower[others], self.upper[others])
-        solved = least_squares(
-            held, start[others], bounds=bounds, x_scale="jac", diff_step=self.diff_step, xtol=1e-8, ftol=1e-10
+        sigma = np.sqrt(np.diag(self.covariance)[others])
+        size = np.maximum(np.abs(self.best[others]), SHORTEST)
+        step = np.where(np.isfinite(sigma), SHORT * sigma, SHORTEST * size)
+        step = np.maximum(step, (self.diff_step or 0.0) * size)
+        rest, least = _descended(
+            held, start[others], step, self.lower[others], self.upper[others], ENOUGH * self.rise
         )
         place = np.empty(len(self.best))
-        place[others], place[i] = solved.x, fixed
-        return 2.0 * float(solved.cost) - self.least, place
+        place[others], place[i] = rest, fixed
+        return least - self.least, place
+
+
+def _descended(
+    residuals: Residuals, x: Floats, step: Floats, low: Floats, high: Floats, enough: float
+) -> tuple[Floats, float]:
+    """The least sum of squares near x, and its place, by damped Gauss-Newton steps within bounds.
+
+    step    (p,) by which derivatives are taken
+    enough  what a step must gain for another one to be made: an end needs no more digits than its rise
+    """
+    r = residuals(x)
+    least, damping = float(np.sum(r**2)), 0.0
+    for _ in range(MOST_TRIALS):
+        side = np.where(x + step <= high, step, -step)
+        jacobian = np.column_stack(
+            [(residuals(x + np.eye(len(x))[k] * side[k]) - r) / side[k] for k in range(len(x))]
+        )
+        size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        gained = 0.0
+        for _ in range(MOST_DAMPED):
+            rows = np.vstack([jacobian / size, damping * np.eye(len(x))])
+            move = np.linalg.lstsq(rows, np.append(-r, np.zeros(len(x))), rcond=1e-12)[0] / size
+            tried = np.clip(x + move, low, high)
+            left = residuals(tried)
+            gained = least - float(np.sum(left**2))
+            if gained > 0.0:
+                x, r, least, damping = tried, left, least - gained, 0.1 * damping
+                break
+            damping = max(10.0 * damping, 1e-3)
+        if not gained > enough:
+            break
+    return x, least

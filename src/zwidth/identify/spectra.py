@@ -50,22 +50,23 @@ class Spectra:
 
     def of(self, a: str, b: str) -> Complexes:
         """S_ab (n,), mean of X_a conj(X_b)."""
-        return self.matrix[:, self.channels.index(a), self.channels.index(b)]
+        return np.asarray(self.matrix[:, self.channels.index(a), self.channels.index(b)])
 
     def power(self, a: str) -> Floats:
         """S_aa (n,)."""
-        return self.of(a, a).real
+        return np.asarray(self.of(a, a).real, dtype=np.float64)
 
     @cached_property
     def z(self) -> Complexes:
         """exp(2 pi i f T) (n,)."""
-        return np.exp(2j * np.pi * self.frequency * self.period)
+        return np.asarray(np.exp(2j * np.pi * self.frequency * self.period))
 
     def coherence(self, a: str, b: str) -> Floats:
         """|S_ab|^2 / (S_aa S_bb) (n,), 0 where a channel has no power."""
         product = self.power(a) * self.power(b)
         square = np.abs(self.of(a, b)) ** 2
-        return np.clip(np.divide(square, product, out=np.zeros_like(square), where=product > 0.0), 0.0, 1.0)
+        share = np.divide(square, product, out=np.zeros_like(square), where=product > 0.0)
+        return np.asarray(np.clip(share, 0.0, 1.0))
 
     def response(self, into: str, out: str, estimator: str = "H1", reference: str = "") -> Complexes:
         """The response (n,) from channel `into` to channel `out`, differences undone.
@@ -78,11 +79,12 @@ class Spectra:
         """
         u, y = self.power(into), self.power(out)
         cross = self.of(out, into)
+        value: Complexes
         with np.errstate(divide="ignore", invalid="ignore"):
             if estimator == "H1":
                 value = cross / u
             elif estimator == "H2":
-                value = y / np.conj(cross)
+                value = np.asarray(y / np.conj(cross))
             elif estimator == "Hv":
                 value = np.sqrt(y / u) * cross / np.abs(cross)
             elif estimator == "joint":
@@ -94,11 +96,11 @@ class Spectra:
 
 
 def segment_length(samples: int, segment: int | None = None) -> int:
-    """The length of segments for a run of so many samples: the power of two that makes 15 of them, which overlap by
-    half, or what is given."""
+    """The length of segments for a run of so many samples: the power of two that makes 15 of them, which overlap
+    by half, or what is given."""
     if segment is not None:
         return max(min(segment, samples), 2)
-    return max(2 ** int(np.log2(max(2.0 * samples / (FEWEST_SEGMENTS + 1), 1.0))), min(SHORTEST, samples))
+    return max(1 << int(np.log2(max(2.0 * samples / (FEWEST_SEGMENTS + 1), 1.0))), min(SHORTEST, samples))
 
 
 def averaged_spectra(
@@ -125,7 +127,8 @@ def averaged_spectra(
     usable = slice(2, None)
     n = max(sums.count, 1)
     frequency = np.arange(length // 2 + 1) / (length * period)
-    return Spectra(frequency[usable], sums.matrix[usable] / n, names, period, length, sums.count, order)
+    matrix: Complexes = np.asarray(sums.matrix[usable] / n, dtype=np.complex128)
+    return Spectra(frequency[usable], matrix, names, period, length, sums.count, order)
 
 
 def merged(several: Sequence[Spectra]) -> Spectra:
@@ -139,7 +142,7 @@ class _Sums:
     """Running sums of the spectra of segments."""
 
     def __init__(self, channels: int, length: int) -> None:
-        self.matrix = np.zeros((length // 2 + 1, channels, channels), dtype=complex)
+        self.matrix: Complexes = np.zeros((length // 2 + 1, channels, channels), dtype=np.complex128)
         self.count, self.length = 0, length
         self._window = np.hanning(length + 1)[:-1]
 
