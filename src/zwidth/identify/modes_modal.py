@@ -24,7 +24,7 @@ POINTS: Final = 100  # frequencies among which it is
 FIRST_DELAYS: Final = (0.0, 1.0, 2.0)  # samples
 MOST_MODES: Final = 6
 PROFILED: Final = 3  # modes at most whose intervals follow the likelihood; of more, its curvature
-UNEXPLAINED, HELPFUL = 2.0, 0.7  # misfit beyond which a mode must lower the sum of squares to such a share
+UNEXPLAINED, HELPFUL = 2.0, 0.7  # misfit beyond which a third mode must lower the sum of squares to such a share
 SLOWEST: Final = 2.0  # lowest angles, below which no mode is looked for
 STRONG: Final = 10.0  # by which the information criterion must fall for a further mode (Kass and Raftery 1995)
 LEAST_DELAY, MOST_DELAY = -3.0, 20.0  # samples; below 0 where columns are shifted
@@ -143,7 +143,7 @@ def fit_modes(
         longer = _refined(data, min(tried, key=lambda fit: fit.chi_squared))
         if longer.criterion > best.criterion - STRONG:
             break
-        if best.misfit > UNEXPLAINED and longer.chi_squared > HELPFUL * best.chi_squared:
+        if best.count > 1 and best.misfit > UNEXPLAINED and longer.chi_squared > HELPFUL * best.chi_squared:
             break  # what is left is no mode
         best = longer
     others = [
