@@ -202,6 +202,7 @@ def test_five_numbers_of_the_hand():
     assert missed <= 2
 
 
+@pytest.mark.slow
 def test_one_number_of_the_hand():
     first = {path: true for path, (true, _) in HAND.items()} | {"operator.grasp_stiffness_N_per_m": 8000.0}
     own = two_mass_device([0.26, 0.1], 10.0, 1e5, T, 1.0, **first)
@@ -253,6 +254,7 @@ def test_a_loss_factor_is_told_from_a_damper():
     assert found.details["period_samples"] == period
 
 
+@pytest.mark.slow
 def test_odd_lines_show_what_coherence_does_not():
     period = 1024
     lines = np.array([k for k in range(5, 400, 2) if (k // 2) % 4])
@@ -274,6 +276,7 @@ def test_odd_lines_show_what_coherence_does_not():
     assert any("coherence does not show" in remark for remark in found.remarks)
 
 
+@pytest.mark.slow
 def test_friction_shows_by_two_amplitudes():
     """One mass with 0.1 N of Coulomb friction under two sine sweeps, in forty steps a sample."""
     count, parts = 4000, 20
