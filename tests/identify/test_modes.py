@@ -248,7 +248,7 @@ def test_a_loss_factor_is_told_from_a_damper():
     spectrum[lines] *= sampled_response(Loop(lossy, Controller(T, 1.0)), 2 * np.pi * lines / period)
     position = np.tile(np.fft.irfft(spectrum), 4)
     position = quantised(position + STEP * np.random.default_rng(6).normal(size=len(position)), STEP)
-    found = identified(columns(force, position, T), model="modes")
+    found = identified(columns(force, position, T), fitted="modes")
     assert found.details["damping_criterion_difference"] < -10.0
     assert holds(found["loss factor of mode 1"], 0.1)
     assert found.details["period_samples"] == period

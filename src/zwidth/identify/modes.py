@@ -74,7 +74,7 @@ def identify_modes(
     *,
     point: OperatingPoint | None = None,
     paths: Sequence[str] = (),
-    model: Fitted = "device",
+    fitted: Fitted = "device",
     estimator: Estimator | None = None,
     segment: int | None = None,
     progress: Progress | None = None,
@@ -88,15 +88,15 @@ def identify_modes(
                identified, and the device's are held
     paths      of the numbers to identify; (): masses, springs, dampers and delay of a [plant], stiffness of the
                drives, damping ratio and delay of a mechanism, the five numbers of a hand
-    model      "device": its numbers, and the modes; "modes": the modes alone
+    fitted     "device": its numbers, and the modes; "modes": the modes alone
     estimator  of the response that is drawn: H1, H2, Hv, or joint with a reference; None: H1, or joint
     segment    samples in a segment of the averaged spectra; None: 15 segments, or the period of the force
     Returns    what each check saw; the numbers with their intervals where none refuses
     Raises     DeviceError  for columns or options that do not go together, cells that are no numbers
     """
     point = device.at() if point is None else point
-    _check_options(device, records, model, estimator, segment)
-    numbers = model_of(device, point, paths) if model == "device" else None
+    _check_options(device, records, fitted, estimator, segment)
+    numbers = model_of(device, point, paths) if fitted == "device" else None
     sources, checks = _sources(device, point, records)
     if result := refused("modes", device.label, checks):
         return result
@@ -122,12 +122,12 @@ def identify_modes(
 
 
 def _check_options(
-    device: Device, records: Sequence[Record], model: str, estimator: str | None, segment: int | None
+    device: Device, records: Sequence[Record], fitted: str, estimator: str | None, segment: int | None
 ) -> None:
     if not records:
         raise fail(device.label, "records", "are none; give at least one")
-    if model not in get_args(Fitted):
-        raise fail(device.label, "model", f"must be device or modes, got {model!r}")
+    if fitted not in get_args(Fitted):
+        raise fail(device.label, "fitted", f"must be device or modes, got {fitted!r}")
     if estimator is not None and estimator not in get_args(Estimator):
         raise fail(device.label, "estimator", f"must be H1, H2, Hv or joint, got {estimator!r}")
     if segment is not None and segment < 64:

@@ -29,6 +29,13 @@ if TYPE_CHECKING:
 
     from zwidth.identify.identification import Estimate, Identification
 
+
+def _refuse_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    for value in values:
+        refuse_empty(ctx, param, value)
+    return values
+
+
 device_option = click.option(
     "--device", metavar="DEVICE", required=True, callback=refuse_empty, help="The device that was measured."
 )
@@ -40,17 +47,19 @@ joint_option = click.option(
 )
 
 
+parameter_option = click.option(
+    "--parameter",
+    "paths",
+    metavar="PATH",
+    multiple=True,
+    callback=_refuse_empty_items,
+    help="Number of the device file to be fitted, as --set takes it; repeatable.",
+)
 spring_option = click.option(
     "--spring/--no-spring",
     default=None,
     help="Whether a spring holds the joint. Default: where the data show one.",
 )
-
-
-def _refuse_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
-    for value in values:
-        refuse_empty(ctx, param, value)
-    return values
 
 
 class IdentifyCommand(Command):
@@ -264,14 +273,7 @@ class BoundaryCommand(IdentifyCommand):
         "zwidth identify boundary edge.csv --device my-device.toml --damping-model all --output boundary.svg",
     )
     options = (
-        click.option(
-            "--parameter",
-            "paths",
-            metavar="PATH",
-            multiple=True,
-            callback=_refuse_empty_items,
-            help="Number of the device file to be fitted, as --set takes it; repeatable.",
-        ),
+        parameter_option,
         click.option(
             "--damping-model",
             "damping_models",
@@ -361,6 +363,46 @@ class ArmCommand(IdentifyCommand):
     takes_point = True
 
 
+class ModesCommand(IdentifyCommand):
+    """Find natural frequencies, damping and DEVICE's own numbers from force and position.
+
+    FILE has columns time_s, force_N or torque_Nm, position_m or angle_rad, every sample of the loop: noise, a
+    chirp, a multisine or steps. reference_N (reference_Nm) is what was added to the command of a spring that
+    centres the device.
+    """
+
+    name = "modes"
+    summary = "Natural frequencies, damping, masses and springs, from force and position."
+    examples = (
+        "zwidth identify modes soft.csv hard.csv --device my-device.toml",
+        "zwidth identify modes held.csv --device my-device.toml --operator firm-grasp",
+    )
+    options = (
+        parameter_option,
+        click.option(
+            "--fit",
+            "fitted",
+            type=click.Choice(["device", "modes"]),
+            default="device",
+            show_default=True,
+            help="Fit the file's numbers and the modes, or the modes alone.",
+        ),
+        click.option(
+            "--estimator",
+            type=click.Choice(["H1", "H2", "Hv", "joint"]),
+            help="Estimator of the response that is drawn. Default: H1, joint with a reference.",
+        ),
+        click.option(
+            "--segment",
+            metavar="SAMPLES",
+            type=click.IntRange(64),
+            help="Samples of a segment of the averaged spectra. Default: 15 in a record.",
+        ),
+    )
+    kind_options = ("paths", "fitted", "estimator", "segment")
+    takes_point = True
+
+
 class ResponseCommand(IdentifyCommand):
     """Find the response of DEVICE from raw sweeps, as a [response] reads it, and the chart that follows.
 
@@ -394,6 +436,7 @@ KINDS: tuple[Callable[[], IdentifyCommand], ...] = (
     StiffnessCommand,
     FrictionCommand,
     MassCommand,
+    ModesCommand,
     ResponseCommand,
     ImpedanceCommand,
     BoundaryCommand,
