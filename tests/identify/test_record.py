@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 import scipy.io
 import xarray as xr
 
 from zwidth.device.faults import DeviceError
+from zwidth.identify import table_copy
 from zwidth.identify.averaged_rows import averaged_rows
 from zwidth.identify.columns import Columns
 from zwidth.identify.record import read_record, record_of
@@ -122,3 +125,45 @@ def test_a_long_record_is_averaged_to_the_wanted_length():
     kept = np.delete(np.arange(10_007.0), 5)[: 625 * 16].reshape(-1, 16).mean(axis=1)
     np.testing.assert_allclose(rows.columns["force_N"], kept, rtol=1e-13)
     assert averaged_rows(record, most=20_000).together == 1
+
+
+LONG = "time_s,force_N,joint\n" + "".join(f"{0.1 * i!r},{'' if i == 70 else i}, {'ab'[i % 2]} \n" for i in range(400))
+
+
+@pytest.mark.parametrize("in_memory", [0, 10**6])
+def test_a_file_is_read_as_text_once(tmp_path, monkeypatch, in_memory):
+    monkeypatch.setattr(table_copy, "IN_MEMORY", in_memory)
+    path = written(tmp_path, LONG)
+    record = read_record(path, WANTED)
+    before = record.columns()
+    path.unlink()
+    together = list(zip(record.pieces(rows=90), record.pieces(rows=90), strict=True))  # two passes in turn
+    assert [len(piece["time_s"]) for piece, _ in together] == [90] * 4 + [40]
+    for which in (0, 1):
+        for name, values in before.items():
+            read = np.concatenate([pair[which][name] for pair in together])
+            np.testing.assert_array_equal(read, values)
+            assert read.dtype == values.dtype
+
+
+def test_a_pass_that_ends_early_leaves_the_file_to_the_next(tmp_path):
+    record = read_record(written(tmp_path, LONG), WANTED)
+    next(record.pieces(rows=90))
+    assert len(record.columns()["time_s"]) == 400
+
+
+@pytest.mark.parametrize(("name", "value"), [("MOST_WORDS", 1), ("SpooledTemporaryFile", None)])
+def test_what_cannot_be_kept_is_read_again(tmp_path, monkeypatch, name, value):
+    class FullDisk(io.BytesIO):
+        def __init__(self, **options: object) -> None:
+            super().__init__()
+
+        def write(self, data: object) -> int:
+            raise OSError("no space left on device")
+
+    monkeypatch.setattr(table_copy, name, value or FullDisk)
+    record = read_record(written(tmp_path, LONG), WANTED)
+    first, second = record.columns(), record.columns()
+    for column, values in first.items():
+        np.testing.assert_array_equal(second[column], values)
+    assert record._copy is None

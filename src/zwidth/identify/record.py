@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.device.faults import DeviceError, Fault, comma_list, fail, plural
 from zwidth.device.text_file import UnreadableFileError, decode, read_head
 from zwidth.identify.columns import Columns
+from zwidth.identify.table_copy import TableCopy, TableWriter
 
 Floats = NDArray[np.float64]
 Piece = dict[str, NDArray[Any]]  # columns of numbers, and those of words
@@ -82,16 +83,32 @@ class ArrayRecord(Record):
 
 
 class CsvRecord(Record):
-    """A record in a CSV file, which is read again each time that its pieces are asked for."""
+    """A record in a CSV file.
+
+    Text takes long to read as numbers: what the first pass over the whole file reads is kept as numbers in a
+    temporary file, from which all later passes read. A file that changes in between is not read again.
+    """
 
     def __init__(self, path: Path, header: Sequence[str], names: Sequence[str], text: Sequence[str]) -> None:
         self.label, self.names, self._path = str(path), tuple(names), path
         # columns that are not read may have no name, or one that is there twice
         self._header = [name if name in names else f"column {number}" for number, name in enumerate(header)]
         self.text = tuple(name for name in names if name in text)
+        self._copy: TableCopy | None = None
 
     def pieces(self, rows: int = ROWS) -> Iterator[Piece]:
-        """Pieces as pandas reads them. Raises DeviceError for cells that are no numbers, with their lines."""
+        """Pieces of the file. Raises DeviceError for cells that are no numbers, with their lines."""
+        if self._copy is not None:
+            yield from self._copy.pieces(rows)
+            return
+        with TableWriter(self.names, self.text) as writer:
+            for piece in self._parsed(rows):
+                writer.add(piece)
+                yield piece
+            self._copy = writer.copy()
+
+    def _parsed(self, rows: int) -> Iterator[Piece]:
+        """Pieces as pandas reads them from the text."""
         import pandas
 
         kinds = {name: str if name in self.text else np.float64 for name in self.names}
@@ -109,9 +126,7 @@ class CsvRecord(Record):
             ) as reader:
                 for piece in reader:
                     yield {
-                        name: np.array([str(value).strip() for value in piece[name]], dtype=str)
-                        if name in self.text
-                        else piece[name].to_numpy()
+                        name: _words(piece[name]) if name in self.text else piece[name].to_numpy()
                         for name in self.names
                     }
         except (ValueError, OSError) as error:
@@ -229,6 +244,14 @@ def _matlab(path: Path, head: bytes, wanted: Columns) -> Record:
 
 def _is_column(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiuU"
+
+
+def _words(column: Any) -> NDArray[Any]:
+    """The words of a column of a pandas table without blanks around them; each distinct one is looked at once."""
+    import pandas
+
+    codes, distinct = pandas.factorize(column, use_na_sentinel=False)
+    return np.array([str(value).strip() for value in distinct], dtype=str)[codes]
 
 
 def _is_number(cell: str) -> bool:
