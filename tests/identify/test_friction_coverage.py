@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from identify.virtual_joint import random_joint, records_of
 
 import zwidth
+from zwidth.identify import joint_identification
 from zwidth.identify.friction import COLUMNS, identify_friction
+from zwidth.identify.friction_fit import fit_joint
 from zwidth.identify.record import record_of
 
 NAMES = ("dry friction", "viscous friction", "effective mass", "level forward", "viscous friction backward")
@@ -47,6 +51,31 @@ def test_intervals_of_a_few_joints_hold_the_true_values():
     held = [hit for one in hits for hit in one.values()]
     assert len(held) >= 32
     assert np.mean(held) > 0.85
+
+
+@pytest.mark.slow
+def test_a_search_along_a_narrow_valley_arrives():
+    """A joint that hardly slides: 40 steps of the search end at a mass half as large again."""
+    joint = random_joint(281)
+    assert all(hits_of(joint, records_of([joint])[0]).values())
+
+
+@pytest.mark.slow
+def test_numbers_that_are_not_the_best_are_no_result():
+    """A joint that creeps one way: no first guess leads to the best numbers, and ten times the noise remains."""
+    joint = random_joint(2692)
+    assert hits_of(joint, records_of([joint])[0]) == {}
+
+
+def test_a_search_that_does_not_end_refuses_the_data(monkeypatch):
+    joint = random_joint(1000, samples=2000)
+    monkeypatch.setattr(
+        joint_identification, "fit_joint", lambda *given: replace(fit_joint(*given), converged=False)
+    )
+    record = record_of(records_of([joint])[0], COLUMNS)
+    result = identify_friction(zwidth.load("hapkit-course"), [record], spring=joint.stiffness > 0.0)
+    assert result.estimates == ()
+    assert "were not found" in result.reason
 
 
 @pytest.mark.slow

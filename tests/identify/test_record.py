@@ -127,7 +127,9 @@ def test_a_long_record_is_averaged_to_the_wanted_length():
     assert averaged_rows(record, most=20_000).together == 1
 
 
-LONG = "time_s,force_N,joint\n" + "".join(f"{0.1 * i!r},{'' if i == 70 else i}, {'ab'[i % 2]} \n" for i in range(400))
+LONG = "time_s,force_N,joint\n" + "".join(
+    f"{0.1 * i!r},{'' if i == 70 else i}, {'ab'[i % 2]} \n" for i in range(400)
+)
 
 
 @pytest.mark.parametrize("in_memory", [0, 10**6])

@@ -299,8 +299,6 @@ def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
         remarks.append(
             f"{joint.mass_name} {agrees} the {joint.mass:.4g} {joint.unit('mass')} of the file, {ratio:.3g} of it"
         )
-    if not fitted.fit.converged:
-        remarks.append("the search for the best numbers did not arrive; take them with care")
     seen = compare_with_command(motion)
     if seen is not None:
         details |= {"command_gain": seen.gain, "command_lag_s": seen.lag, "command_correlation": seen.correlation}

@@ -141,6 +141,9 @@ def fitted_joint(
     forward, backward = directions(windows, motion)
     numbers = _numbers(motion, forward, backward, mass, spring is not False)
     fit, outlying = _fit(windows, motion, numbers, spring)
+    if not fit.converged:
+        checks.append(_no_minimum(fit))
+        return tuple(checks), None
     report("validating", steps - 1, steps)
     unseen = windows.chosen(_unseen(windows))
     starts = first_starts(unseen, fit.numbers.values)
@@ -221,6 +224,17 @@ def _fit(
             )
             fit = fit_joint(fit.windows, plain, fit.starts)
     return fit, tuple(seen.time[bad].tolist())
+
+
+def _no_minimum(fit: JointFit) -> Check:
+    """What failed where the search has not ended: intervals hold about the best numbers only."""
+    count = len(fit.windows.first)
+    return Check(
+        "search",
+        False,
+        f"the numbers that predict {count} windows best were not found, as where the joint hardly slides, or at "
+        "one speed only; record a larger force that changes in size and sign",
+    )
 
 
 def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, records: Sequence[Record]) -> Check:
