@@ -1,0 +1,109 @@
+"""How long an identification takes from a long record, and how much memory, beside a competent peer.
+
+Run `python benchmarks/identify.py`: of each kind an hour at 10 kHz as a CSV file of one to three gigabytes, made
+anew in a temporary folder, one file at a time. `ZWIDTH_RECORD_S=360 python benchmarks/identify.py` makes records
+of so many seconds. Each side is a process of its own, timed as a whole, with its largest resident memory.
+
+A boundary is no long record, and has no row. A kind that is added to BENCHES and to PEERS gets one.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks._cases import Cases, TimedCase, run
+from benchmarks._identify import PEERS, RATE
+from benchmarks._records import BENCHES, columns_of, write_csv
+from benchmarks._timing import machine, print_table, seconds, verdict
+from zwidth.identify.kinds import identify
+
+ROOT = Path(__file__).parents[1]
+HOUR = 3600
+LONGEST_S, LARGEST_MB = 60.0, 1000.0  # of an hour
+OWN_S = 20  # of the records of our own cases
+
+
+class Process(NamedTuple):
+    """What a process took: seconds, megabytes at most, and what it printed."""
+
+    wall: float
+    memory: float
+    printed: str
+
+
+def process_of(kind: str, side: str, file: Path) -> Process:
+    """Identify in a process of its own. Raises CalledProcessError where it fails."""
+    command = [sys.executable, "-m", "benchmarks._identify", kind, side, str(file)]
+    begun = perf_counter()
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        printed = process.stdout.read()
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    unit = 1e6 if sys.platform == "darwin" else 1e3  # of ru_maxrss in a megabyte
+    return Process(perf_counter() - begun, usage.ru_maxrss / unit, printed.strip())
+
+
+def cases() -> Cases:
+    """Each kind on a short record in memory."""
+
+    def case(kind: str) -> TimedCase:
+        def work(given: tuple) -> float:
+            device, columns = given
+            return identify(device, kind, columns, **BENCHES[kind].options).estimates[0].value
+
+        @cache
+        def columns() -> dict:
+            return columns_of(BENCHES[kind], OWN_S)
+
+        return TimedCase(work, fresh=lambda: (BENCHES[kind].device(), columns()))
+
+    return {f"{kind} from {OWN_S} s at {RATE // 1000} kHz": case(kind) for kind in BENCHES}
+
+
+def main() -> int:
+    """Time and print; returns 1 where a target is missed."""
+    length = int(os.environ.get("ZWIDTH_RECORD_S", HOUR))
+    print(machine("numpy", "scipy", "pandas"))
+    print(f"records of {length} s at {RATE} samples per second")
+    rows, missed = [], False
+    for kind, bench in BENCHES.items():
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "record.csv"
+            write_csv(file, bench, length)
+            ours, peer = (process_of(kind, side, file) for side in ("zwidth", "peer"))
+        within = ours.wall <= LONGEST_S and ours.memory <= LARGEST_MB
+        missed |= not within
+        rows.append(
+            (
+                kind,
+                seconds(ours.wall),
+                f"{ours.memory:.0f} MB",
+                seconds(peer.wall),
+                f"{peer.memory:.0f} MB",
+                f"{ours.wall / peer.wall:.2f}",
+                f"{ours.memory / peer.memory:.2f}",
+                verdict(0.0 if within else 1.0, 0.5),
+                PEERS[kind][0],
+            )
+        )
+        print(f"{kind}: {ours.printed}\n  peer: {peer.printed}", flush=True)
+    header = ("kind", "zwidth", "memory", "peer", "memory", "time ratio", "memory ratio", "target", "peer is")
+    print_table(header, rows)
+    print(f"target for an hour: {LONGEST_S:g} s and {LARGEST_MB:g} MB")
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(run(main, cases))
