@@ -141,9 +141,6 @@ def fitted_joint(
     forward, backward = directions(windows, motion)
     numbers = _numbers(motion, forward, backward, mass, spring is not False)
     fit, outlying = _fit(windows, motion, numbers, spring)
-    if not fit.converged:
-        checks.append(_no_minimum(fit))
-        return tuple(checks), None
     report("validating", steps - 1, steps)
     unseen = windows.chosen(_unseen(windows))
     starts = first_starts(unseen, fit.numbers.values)
@@ -157,6 +154,8 @@ def fitted_joint(
         joint, motion, samplings[0], (), fit, unseen, starts, forward, backward, share, outlying, unit_mass
     )
     checks.append(_check_model(fitted, windows, numbers, records))
+    if (checks[-1].passed or checks[-1].warning) and not fit.converged:
+        checks.append(_no_minimum(fit))  # a model that is wrong is the better reason
     fitted = replace(fitted, checks=tuple(checks))
     return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
 
