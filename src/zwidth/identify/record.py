@@ -251,7 +251,8 @@ def _words(column: Any) -> NDArray[Any]:
     import pandas
 
     codes, distinct = pandas.factorize(column, use_na_sentinel=False)
-    return np.array([str(value).strip() for value in distinct], dtype=str)[codes]
+    words: NDArray[Any] = np.array([str(value).strip() for value in distinct], dtype=str)[codes]
+    return words
 
 
 def _is_number(cell: str) -> bool:
