@@ -252,10 +252,30 @@ def test_a_sweep_whose_time_falls_is_told_so(tmp_path):
     assert "the time falls" in refusal_lines("chart", tmp_path / "device.toml")[0]
 
 
-def test_a_response_has_no_numbers_to_vary_for_a_robust_chart(device):
-    ran = run_command("robust", device, "--json")
-    assert (ran.code, ran.document["stiffness_max_N_per_m"]) == (1, None)
-    assert "attach one operator after the other" in ran.document["reason"]
+def test_robust_says_what_can_vary_beside_a_response(device):
+    (line,) = refusal_lines("robust", device)
+    assert "nothing varies; give --range PATH=LOW,HIGH or --operators A,B,C, or repeat the sweep" in line
+    (line,) = refusal_lines("robust", device, "--range", "response.averages=1,2")
+    assert "response.averages: is no number that can vary beside a measured response" in line
+    assert "repeat the sweep to see the device itself vary" in line
+    (line,) = refusal_lines("robust", device, "--operators", "none,course-hand")
+    assert "course-hand cannot be attached to this [response]: it has no path" in line
+
+
+def test_robust_takes_the_sweeps_of_a_response_as_members(tmp_path):
+    response, _ = measured_response(LOOP, np.linspace(1.0, 400.0, 200))
+    for name, factor in (("one.csv", 1.0), ("two.csv", 1.05)):
+        spectrum(tmp_path / name, response.frequency, response.value * factor)
+    (tmp_path / "repeated.toml").write_text(DEVICE.format('files = ["one.csv", "two.csv"]'))
+    ran = run_command("robust", tmp_path / "repeated.toml", "--json")
+    document = ran.document
+    assert (ran.code, document["decided"]) == (0, True)
+    assert [one["sweep"] for one in document["members"]] == ["mean", "1", "2"]
+    softest = 0.5 * stability_chart(LOOP, decay=False).stiffness_max
+    assert softest < document["stiffness_max_N_per_m"]
+    out = run_command("robust", tmp_path / "repeated.toml").out
+    assert "at this limit the" in out
+    assert "3, the whole list" in out
 
 
 @pytest.mark.parametrize("command", [("felt", "--stiffness", 1, "--damping", 1), ("guarantees",)])

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
+from zwidth.chart.robust.common_chart import CommonChart
 from zwidth.chart.robust.members import Member, chart_member
 from zwidth.loop.estimator import NonlinearError
 from zwidth.model.argument_checks import require
@@ -35,6 +36,10 @@ __all__ = ["RobustError", "RobustStudy", "Violation", "robust_study", "sample_wa
 Floats = NDArray[np.float64]
 
 REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
+MEMBERS, UNSEEN = 256, 10_000  # charted, and tried afterwards
+# The same of a measured device, whose charts take seconds
+MEASURED_MEMBERS, MEASURED_UNSEEN = 24, 200
+AT_ENDS: Final = 0.5  # probability of each number of the members searched to lie at an end of its range
 
 
 class RobustError(ValueError):
@@ -55,7 +60,7 @@ class RobustStudy(Result):
                  is stable
     """
 
-    chart: RobustChart
+    chart: CommonChart
     members: tuple[dict[str, Any], ...]
     sampled: int
     rounds: int
@@ -113,22 +118,26 @@ class RobustStudy(Result):
 
 def robust_study(
     family: Family,
-    members: int = 256,
-    unseen: int = 10_000,
+    members: int | None = None,
+    unseen: int | None = None,
     seed: int = 1,
     tolerance: float = 1e-4,
     progress: Progress | None = None,
 ) -> RobustStudy:
     """The robust chart of a family of devices.
 
-    members    largest number of members charted; a list of operators without ranges is charted whole
-    unseen     number of random members tried afterwards (see `Violation`)
+    members    largest number of members charted; a list of operators without ranges is charted whole. Left out:
+               256, of a measured device 24
+    unseen     number of random members tried afterwards (see `Violation`). Left out: 10000, of a measured device
+               200
     seed       seed of all random numbers: equal seeds give equal answers
     tolerance  the search ends with a round that changes the area by a smaller share
     Raises     RangeError      for ranges that cannot be used
                DeviceError     for operators that cannot be read
                RobustError     if no member can be built and charted
                NonlinearError  for a velocity estimate that is not linear
+
+    Of a measured device, see `robust_measured`.
 
     >>> from zwidth.device.load import from_document
     >>> from zwidth.study.robust_family import Family, Range, build_together
@@ -139,9 +148,13 @@ def robust_study(
     (68629.15, 0)
     """
     require("family", family, Family)
+    progress = progress or (lambda stage, done, of: None)
+    if family.operating_point.response is not None:
+        return _measured_study(family, members or MEASURED_MEMBERS, unseen or MEASURED_UNSEEN, seed, progress)
+    members, unseen = members or MEMBERS, unseen or UNSEEN
     if faults := family.faults():
         raise RangeError(faults)
-    charted = _Members(family, progress or (lambda stage, done, of: None))
+    charted = _Members(family, progress)
     points = list(_sample(family, members, seed))
     charted.add(points, "members")
     chart, radii = charted.chart(), MemberRadii(family)
@@ -228,7 +241,55 @@ def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) ->
     return try_unseen_members(charted.family, chart, unseen, seed, charted.progress)
 
 
-def _area_change(before: RobustChart, after: RobustChart) -> float:
+def _measured_study(family: Family, members: int, unseen: int, seed: int, progress: Progress) -> RobustStudy:
+    """The robust chart of a family of a measured device.
+
+    Of ranges, random members join one by one, the one first that runs deepest into the robust walls (see
+    `unseen_measured`), until none of them does; then as many others are tried.
+    """
+    from zwidth.study.robust_measured import MeasuredFamily, MeasuredMember, MeasuredMembers
+    from zwidth.study.unseen_measured import DEPTH, intrusions, random_measured_members, violation_of_measured
+
+    measured = MeasuredFamily(family)
+    measured.check()
+    charted = MeasuredMembers(measured, progress)
+    places = list(_sample(family, max(members // len(measured.sweeps), 1), seed))
+    points = [MeasuredMember(place, sweep) for place in places for sweep in measured.sweeps]
+    charted.add(points)
+    try:
+        chart = charted.chart()
+    except ChartError as error:
+        raise RobustError(str(error)) from None
+    rounds, area_change, settled = 0, 0.0, not family.free
+    tried = list(random_measured_members(measured, unseen, [seed, 2], AT_ENDS)) if family.free else []
+    while not settled and chart.regions:
+        deep = {place: one.depth for place, one in intrusions(measured, chart, tried, progress).items()}
+        tried = [one for place, one in enumerate(tried) if deep.get(place, 0.0) > DEPTH]
+        if not tried:
+            area_change, settled = 0.0, True
+        elif len(charted.points) >= members:
+            break
+        else:
+            rounds += 1
+            kept = [depth for depth in deep.values() if depth > DEPTH]
+            charted.add([tried.pop(int(np.argmax(kept)))])
+            before, chart = chart, charted.chart()
+            area_change = _area_change(before, chart)
+    violation = None
+    if family.free and chart.regions:
+        violation = violation_of_measured(measured, chart, unseen, seed, progress)
+    return RobustStudy(
+        chart=chart,
+        members=tuple(measured.values(point) for point in charted.points),
+        sampled=len(points),
+        rounds=rounds,
+        area_change=area_change,
+        settled=settled,
+        violation=violation,
+    ).about(family.operating_point)
+
+
+def _area_change(before: CommonChart, after: CommonChart) -> float:
     """Share by which the area of the whole set became smaller."""
     areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
     return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0

@@ -147,17 +147,18 @@ class Family:
         return FamilyMember(operator, tuple(shares.tolist()))
 
     @cached_property
-    def _documents(self) -> tuple[dict[str, Any], ...]:
+    def held_documents(self) -> tuple[dict[str, Any], ...]:
+        """The device's file in the hands of each operator."""
         return tuple(document_held_by(self.device.document, name) for name in self.operators or (None,))
 
     @cached_property
     def _groupings(self) -> tuple[DesignGrouping, ...]:
         """How members fall into groups, for each operator; () where each member is to be built alone."""
-        askew = any(ASKEW & set(steps) for steps, _ in self._paths(self._documents[0]))
+        askew = any(ASKEW & set(steps) for steps, _ in self._paths(self.held_documents[0]))
         if askew or self._ungripped_plant is not None:
             return ()
         # what the numbers' sources are changes no loop
-        documents = [{key: part for key, part in one.items() if key != "sources"} for one in self._documents]
+        documents = [{key: part for key, part in one.items() if key != "sources"} for one in self.held_documents]
         return tuple(DesignGrouping(document, self.device.label, {}) for document in documents)
 
     @cached_property
@@ -174,7 +175,7 @@ class Family:
 
     def document(self, point: FamilyMember) -> dict[str, Any]:
         """A member's device file; a number off a matrix's diagonal is set together with its mirror image."""
-        document = self._documents[point.operator]
+        document = self.held_documents[point.operator]
         values = [one.at(share) for one, share in zip(self.ranges, point.shares, strict=True)]
         settings = [(dotted(steps, document), values[k]) for steps, k in self._paths(document)]
         return address.assign_all(document, settings)
@@ -218,8 +219,8 @@ class Family:
             return None
         return replace(self.operating_point, operator=build.operator(section))
 
-    def faults(self) -> list[RangeFault]:
-        """What is wrong with the ranges: each by itself, then at its two ends with the others in their middle."""
+    def path_faults(self) -> list[RangeFault]:
+        """What is wrong with each range by itself."""
         faults = [fault for one in self.ranges if (fault := one.fault()) is not None]
         paths = [one.path for one in self.ranges]
         faults += [
@@ -227,14 +228,19 @@ class Family:
             for path in dict.fromkeys(paths)
             if paths.count(path) > 1
         ]
-        for document in self._documents:
+        for document in self.held_documents:
             for one in self.ranges:
                 faults += _path_faults(document, one)
+        return list(dict.fromkeys(faults))
+
+    def faults(self) -> list[RangeFault]:
+        """What is wrong with the ranges: each by itself, then at its two ends with the others in their middle."""
+        faults = self.path_faults()
         if faults:
-            return list(dict.fromkeys(faults))
+            return faults
         for k in range(len(self.ranges)):
             for end in (0.0, 1.0):
-                for operator in range(len(self._documents)):
+                for operator in range(len(self.held_documents)):
                     shares = tuple(end if j == k else 0.5 for j in range(len(self.ranges)))
                     try:
                         from_document(self.document(FamilyMember(operator, shares)), self.device.label)

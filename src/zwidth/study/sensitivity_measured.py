@@ -22,7 +22,7 @@ from zwidth.device.device import Device
 from zwidth.device.faults import dotted
 from zwidth.device.load import check
 from zwidth.loop.controller import Controller
-from zwidth.loop.measured.held_response import hold_port
+from zwidth.loop.measured.held_response import response_of_port
 from zwidth.loop.measured.measured_port import MeasuredPort, changed_port, command_port
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.operator import Operator
@@ -136,22 +136,7 @@ def _sensitivity(
 
 def _largest(response: Response, port: MeasuredPort, controller: Controller, operator: Operator | None) -> float:
     """Largest stiffness [N/m] of a changed port, nominal: what is certain moves with the error as well."""
-    below = port.theta <= np.pi * (1.0 + 1e-9)
-    whole = replace(
-        response, frequency=port.theta / (2.0 * np.pi * port.period), value=port.sampled["sa"], sweeps=None
-    )
-    held = whole if operator is None else hold_port(whole, port, operator)
-    good = below if operator is None else held.frequency * port.period <= 0.5 * (1.0 + 1e-9)
-    own = held.coherence
-    changed = replace(
-        held,
-        frequency=held.frequency[good],
-        value=held.value[good],
-        coherence=None if own is None else own[good],
-        freedom=None if held.freedom is None else held.freedom[good],
-        handle=None,
-    )
-    return measured_chart(changed, controller).stiffness_max_nominal
+    return measured_chart(response_of_port(response, port, operator), controller).stiffness_max_nominal
 
 
 def _built(

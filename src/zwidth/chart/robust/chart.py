@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 import numpy as np
 import shapely
@@ -12,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.chart.arc_kernels import CHORD
 from zwidth.chart.arcs import ArcPoints
-from zwidth.chart.chart_base import Chart, DrawnChart
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_edge import common_edge
 from zwidth.chart.robust.common_set import Shapes, incompatible_members, intersect_members
 from zwidth.chart.robust.members import Member, chart_members, member_polygons
@@ -26,37 +25,17 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class RobustChart(DrawnChart):
-    """The walls that are stable for every member, each arc of the edge with the member that binds there.
+class RobustChart(CommonChart):
+    """The walls that are stable for every loop of a list, exactly.
 
-    members         index -> loop, of those that could be charted
-    failed          index -> why a member could not be charted; nothing is claimed for these
-    binding         indices of the members that bind anywhere on the edge, ascending; of several on one edge the
-                    one of the smallest set
-    members_at_stiffness_max     the members that bind there, ascending: one, or two at a corner between them
-    best_by_area, best_by_stiffness  members with the largest stable_area, and stiffness_max, if charted alone
-    lost_share      1 - stable_area / that of the best by area
-    lost_stiffness_share  1 - stiffness_max / that of the best by stiffness
-    excluding       members that leave no wall in common (see `common_set.incompatible_members`); () where there is
-                    one
-    outlines        index -> the member's own closed walks (k, 2) of [stiffness, damping]
-    corner_blur     share of the set's size to which its edge is known: 0 for rounding; more where rounding hides
-                    a corner, and 1e-6 where a member cuts off less than chords of the arcs see
+    members  index -> loop, of those that could be charted
     """
 
     members: dict[int, Loop]
-    failed: dict[int, str]
-    binding: tuple[int, ...]
-    members_at_stiffness_max: tuple[int, ...]
-    best_by_area: int
-    best_by_stiffness: int
-    lost_share: float
-    lost_stiffness_share: float
-    excluding: tuple[int, ...]
-    outlines: dict[int, tuple[Floats, ...]]
-    corner_blur: float
 
-    _edge_columns: ClassVar[dict[str, str]] = {"member": "member", **Chart._edge_columns}
+    @property
+    def charted(self) -> Mapping[int, Loop]:
+        return self.members
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -84,23 +63,6 @@ class RobustChart(DrawnChart):
     def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
         """Largest |z| (...) of any member, by eigenvalues, for walls K, B (...) that broadcast."""
         return self.check(wall_stiffness, wall_damping).spectral_radius
-
-    def document(self) -> dict[str, Any]:
-        """The chart as numbers and lists, under the keys of `zwidth robust --json`; nan where there is none."""
-        return super().document() | {
-            "members_at_stiffness_max": list(self.members_at_stiffness_max),
-            "failed": [{"member": index, "reason": reason} for index, reason in self.failed.items()],
-            "binding": list(self.binding),
-            "best_by_area": self.best_by_area,
-            "best_by_stiffness": self.best_by_stiffness,
-            "lost_share": self.lost_share,
-            "lost_stiffness_share": self.lost_stiffness_share,
-            "corner_blur": self.corner_blur,
-            "excluding": list(self.excluding) or None,
-        }
-
-    def _summary(self) -> str:
-        return f"{super()._summary()} for all of {len(self.members)} members, {len(self.binding)} of which bind"
 
 
 def robust_chart(members: Sequence[Loop]) -> RobustChart:
@@ -158,8 +120,8 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
         members_at_stiffness_max=tuple(sorted(set(edge.peak.members))) if edge.peak else (),
         best_by_area=by_area,
         best_by_stiffness=by_stiffness,
-        lost_share=_loss_share(edge.area, largest_area),
-        lost_stiffness_share=_loss_share(_stiffness(edge), _stiffness(charted[by_stiffness].edge)),
+        lost_share=lost_share(edge.area, largest_area),
+        lost_stiffness_share=lost_share(_stiffness(edge), _stiffness(charted[by_stiffness].edge)),
         excluding=() if edge.peak else incompatible_members(charted, shapes, unit),
         outlines={index: tuple(member.edge.outlines) for index, member in charted.items()},
         corner_blur=blur,
@@ -184,11 +146,6 @@ def _has_small_cut(samples: list[ArcPoints], members: list[Member], unit: float)
 def _stiffness(edge: TracedEdge) -> float:
     """Largest stiffness on an edge [N/m]; 0 without a stable wall."""
     return edge.peak.stiffness if edge.peak else 0.0
-
-
-def _loss_share(left: float, whole: float) -> float:
-    """Share lost; nan where there was nothing to lose. Rounding can make a share negative that is 0."""
-    return max(1.0 - left / whole, 0.0) if whole > 0.0 else float("nan")
 
 
 def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, float]:

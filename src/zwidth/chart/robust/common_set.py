@@ -52,20 +52,28 @@ def incompatible_members(members: Mapping[int, Member], shapes: Shapes, unit: fl
     if alone:
         return (alone[0],)
     _, cutters = intersect_members(list(members.values()), shapes, unit)
-    shapes = {member.index: _quadrant(shapes[member.index]) for member in cutters}
-    for place, one in enumerate(cutters):
-        for other in cutters[:place]:
-            if not polygonal(shapely.intersection(shapes[one.index], shapes[other.index])):
-                return tuple(sorted((one.index, other.index)))
-    group = list(shapes)
+    return incompatible_shapes({member.index: shapes[member.index] for member in cutters})
+
+
+def incompatible_shapes(shapes: Mapping[int, shapely.Geometry]) -> tuple[int, ...]:
+    """Indices of a smallest group found among sets that have no wall with K > 0, B >= 0 in common.
+
+    Two that exclude each other, or more of which none can be spared.
+    """
+    quadrants = {index: _quadrant(shape) for index, shape in shapes.items()}
+    for place, one in enumerate(quadrants):
+        for other in list(quadrants)[:place]:
+            if not polygonal(shapely.intersection(quadrants[one], quadrants[other])):
+                return tuple(sorted((one, other)))
+    group = list(quadrants)
     for index in tuple(group):
-        rest = [shapes[other] for other in group if other != index]
+        rest = [quadrants[other] for other in group if other != index]
         if rest and not polygonal(shapely.intersection_all(rest)):
             group.remove(index)
     return tuple(sorted(group))
 
 
-def _quadrant(shape: shapely.MultiPolygon) -> shapely.Geometry:
+def _quadrant(shape: shapely.Geometry) -> shapely.Geometry:
     """The part of a set with K >= 0, B >= 0."""
     right, top = np.maximum(shape.bounds[2:], 0.0)
     return shapely.intersection(shape, shapely.box(0.0, 0.0, right, top))

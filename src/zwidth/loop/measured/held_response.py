@@ -93,6 +93,31 @@ def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Res
     )
 
 
+def response_of_port(response: Response, port: MeasuredPort, operator: Operator | None) -> Response:
+    """The response up to half the sampling rate of a port that was changed, see `measured_port.changed_port`, with
+    or without an operator.
+
+    response  the measured one, of which its coherence stays
+    """
+    whole = replace(
+        response,
+        frequency=port.theta / (2.0 * np.pi * port.period),
+        value=port.sampled["sa"],
+        sweeps=np.array([value for _, value in port.sweeps]) if port.sweeps else None,
+    )
+    held = whole if operator is None else hold_port(whole, port, operator)
+    good = held.frequency * port.period <= 0.5 * (1.0 + 1e-9)
+    coherence, sweeps = held.coherence, held.sweeps
+    return replace(
+        held,
+        frequency=held.frequency[good],
+        value=held.value[good],
+        coherence=None if coherence is None else coherence[good],
+        sweeps=None if sweeps is None else sweeps[:, good],
+        handle=None,
+    )
+
+
 def _require_mass(operator: Operator) -> None:
     """Raise OperatorError for an arm without mass behind an elastic grasp."""
     if not operator.rigid_grasp and not operator.arm_mass > 0.0:

@@ -164,7 +164,12 @@ def command_port(response: Response, period: float) -> MeasuredPort:
     theta = np.minimum(2.0 * np.pi * response.frequency * period, np.pi)
     base = {"sa": response.value - _aliases(model, "sa", theta)}
     deviation = relative_deviation(_paths(bare)["sa"], response.averages) * np.abs(response.value)
-    return MeasuredPort(theta, period, {"sa": response.value}, base, {"sa": deviation}, {"sa": "sa"}, (), model)
+    beyond = response.value - base["sa"]
+    repeated = () if response.sweeps is None else tuple(response.sweeps)
+    sweeps = tuple(({"sa": sweep - beyond}, sweep) for sweep in repeated)
+    return MeasuredPort(
+        theta, period, {"sa": response.value}, base, {"sa": deviation}, {"sa": "sa"}, sweeps, model
+    )
 
 
 def changed_port(port: MeasuredPort, added_delay: float = 0.0, period: float | None = None) -> MeasuredPort:
@@ -180,16 +185,34 @@ def changed_port(port: MeasuredPort, added_delay: float = 0.0, period: float | N
     model = port.model.scaled(ratio, added_delay)
     theta = port.theta * ratio
     change = model.hold(theta) / port.model.hold(port.theta)
-    base = {name: value * change if name[1] == "a" else value for name, value in port.baseband.items()}
-    sampled = {name: base[name] + _aliases(model, port.origin[name], theta) for name in port.sampled}
+
+    def held_anew(base: Mapping[str, Complexes]) -> dict[str, Complexes]:
+        return {name: value * change if name[1] == "a" else value for name, value in base.items()}
+
+    base = held_anew(port.baseband)
+    beyond = {name: _aliases(model, port.origin[name], theta) for name in port.sampled}
+    sweeps = [held_anew(one) for one, _ in port.sweeps]
     return replace(
         port,
         theta=theta,
         period=port.period * ratio,
-        sampled=sampled,
+        sampled={name: base[name] + beyond[name] for name in beyond},
         baseband=base,
-        sweeps=(),
+        sweeps=tuple((one, one["sa"] + beyond["sa"]) for one in sweeps),
         model=model,
+    )
+
+
+def sweep_port(port: MeasuredPort, number: int) -> MeasuredPort:
+    """The device as it was in one of its repeated sweeps, number from 0, the error of which is not known."""
+    base, value = port.sweeps[number]
+    beyond = {name: port.sampled[name] - port.baseband[name] for name in port.sampled}
+    return replace(
+        port,
+        sampled={name: base[name] + beyond[name] for name in beyond} | {"sa": value},
+        baseband=base,
+        deviations={name: np.zeros(len(port.theta)) for name in port.deviations},
+        sweeps=(),
     )
 
 

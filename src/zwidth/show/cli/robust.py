@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -33,11 +34,7 @@ class RobustCommand(Command):
     ranges."""
 
     name = "robust"
-    no_response = (
-        "a measured response has no numbers of its own to vary; attach one operator after the other with "
-        "--operator, repeat the sweep to see the device vary (`zwidth chart` gives the band), or describe the "
-        "device as a [plant]"
-    )
+    takes_responses = True
     summary = "Find the walls that are stable for every operator and number in a range."
     examples = (
         "zwidth robust my-device.toml --range operator.arm_mass_kg=0.3,2 --range loop.delay_samples=0,1",
@@ -67,16 +64,17 @@ class RobustCommand(Command):
         click.option(
             "--members",
             type=click.IntRange(2, MOST),
-            default=256,
+            default=None,
             metavar="N",
-            help="Number of charts (default 256).",
+            help="Number of charts (default 256; of a measured response 24).",
         ),
         click.option(
             "--unseen",
             type=click.IntRange(1, MOST),
-            default=10_000,
+            default=None,
             metavar="N",
-            help="Number of random members that check the answer afterwards (default 10000).",
+            help="Number of random members that check the answer afterwards (default 10000; of a measured "
+            "response 200).",
         ),
         click.option(
             "--seed",
@@ -123,9 +121,11 @@ class RobustCommand(Command):
         from zwidth.study.robust import RobustError, robust_study
         from zwidth.study.robust_family import Family, RangeError
 
-        if not case["ranges"] and not case["operators"]:
+        response = case.point.response
+        if not case["ranges"] and not case["operators"] and (response is None or response.sweeps is None):
+            repeat = "" if response is None else ", or repeat the sweep to see the device itself vary"
             raise BadInput(
-                f"{case.question.name}: nothing varies; give --range PATH=LOW,HIGH or --operators A,B,C"
+                f"{case.question.name}: nothing varies; give --range PATH=LOW,HIGH or --operators A,B,C{repeat}"
             )
         family = Family(case.device, case["ranges"], case["operators"], case.point)
         try:
@@ -249,8 +249,11 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
 def _member(study: RobustStudy, member: int) -> str:
     """A member by its operator, where members differ in nothing else; otherwise by its number."""
     from zwidth.device.operator_choice import NOBODY
+    from zwidth.study.robust_measured import MEAN
 
     values = study.members[member]
+    if list(values) == ["sweep"]:
+        return "the mean of all sweeps" if values["sweep"] == MEAN else f"the device of sweep {values['sweep']}"
     if list(values) != ["operator"]:
         return f"member {member}"
     operator = values["operator"]
@@ -275,7 +278,6 @@ def _violation(violation: Violation) -> str:
     softer = f"with {less} % less of the largest stiffness all are stable"
     if violation.worst_stiffness_share == 0.0:
         softer = "all of these have K <= 0 or B < 0"
-    return (
-        f"{violation.violating} of {violation.unseen} random ones make a wall unstable, with spectral radii up to "
-        f"{radius(violation.worst_spectral_radius)}; {softer}"
-    )
+    largest = violation.worst_spectral_radius  # not known of a measured response
+    up_to = "" if isnan(largest) else f", with spectral radii up to {radius(largest)}"
+    return f"{violation.violating} of {violation.unseen} random ones make a wall unstable{up_to}; {softer}"

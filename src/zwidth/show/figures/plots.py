@@ -271,7 +271,7 @@ def _identification(ax: Axes, result: Any) -> None:
 
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
-    "RobustChart": _robust,
+    "CommonChart": _robust,
     "RobustStudy": _robust_study,
     "ByDirection": _polar,
     "LoadPath": _load_path,

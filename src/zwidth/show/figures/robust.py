@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Polygon
 
-from zwidth.chart.robust.chart import RobustChart
+from zwidth.chart.robust.common_chart import CommonChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import GREY, LINES, STABLE, legend_above
 from zwidth.show.member_text import value_text
@@ -26,7 +26,7 @@ NO_BREAK: Final = "\u00a0"
 
 
 def draw_robust(
-    ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]] = (), window: Window | None = None
+    ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]] = (), window: Window | None = None
 ) -> None:
     """The robust set filled, its edge by binding member; behind it all members' outlines, the best one's dashed.
 
@@ -47,7 +47,7 @@ def draw_robust(
     legend_above(ax)
 
 
-def _draw_edge(ax: Axes, chart: RobustChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:
+def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:
     """The edge's arcs; those who bind most of what is seen are named."""
     K0, K1, B0, B1 = view
     lengths: dict[int, float] = {}
@@ -91,7 +91,7 @@ def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
     return "\n".join(lines)
 
 
-def _box(chart: RobustChart) -> Window:
+def _box(chart: CommonChart) -> Window:
     walls = [outline for outlines in chart.outlines.values() for outline in outlines]
     if isnan(chart.stiffness_max) or not walls:
         return (0.0, 1.0, 0.0, 1.0)
