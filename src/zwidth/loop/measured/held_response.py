@@ -113,6 +113,7 @@ def response_of_port(response: Response, port: MeasuredPort, operator: Operator 
         frequency=held.frequency[good],
         value=held.value[good],
         coherence=None if coherence is None else coherence[good],
+        freedom=None if held.freedom is None else held.freedom[good],
         sweeps=None if sweeps is None else sweeps[:, good],
         handle=None,
     )
