@@ -68,10 +68,16 @@ class EdgeChords:
         return len(self.first)
 
     def thinned(self, count: int) -> EdgeChords:
-        """The edge with one chord in place of up to so many that follow each other on one arc."""
+        """The edge with one chord in place of up to so many that follow each other on one arc.
+
+        Chords are joined only while stiffness and damping both go on rising, or falling: a line that crosses the
+        arc between two turns once crosses the one chord, too, and near a turn no crossing is lost.
+        """
         joined = np.all(self.first[1:] == self.last[:-1], axis=1)
         straight = self.frequency[:, 0] == self.frequency[:, 1]
-        begins = np.append(True, ~joined | (straight[1:] != straight[:-1]))[: len(self)]
+        way = np.sign(self.last - self.first)
+        on = joined & (straight[1:] == straight[:-1]) & np.all(way[1:] == way[:-1], axis=1)
+        begins = np.append(True, ~on)[: len(self)]
         along = np.arange(len(self)) - np.maximum.accumulate(np.where(begins, np.arange(len(self)), 0))
         start = np.flatnonzero(along % count == 0)
         end = np.append(start[1:], len(self)) - 1
@@ -104,22 +110,22 @@ class EdgeChords:
         crossed = ((x0 <= at) & (at < x1)) | ((x1 <= at) & (at < x0))
         if edge is not None:
             crossed &= (x1 > x0) == (edge != "upper")
-        with np.errstate(divide="ignore", invalid="ignore"):
-            y = y0 + (at - x0) * (y1 - y0) / (x1 - x0)
-        distance = np.where(crossed, np.abs(y - np.asarray(near, dtype=float)[:, None]), np.inf)
-        if not len(self):
-            return np.full(len(at), np.nan), np.full(len(at), np.nan)
-        chord = np.argmin(distance, axis=1)
-        row = np.arange(len(at))
-        known = np.isfinite(distance[row, chord])
-        value = np.where(known, y[row, chord], np.nan)
-        share = (at[:, 0] - x0[chord]) / np.where(known, x1[chord] - x0[chord], 1.0)
+        line, chord = np.nonzero(crossed)
+        along = at[line, 0]
+        share = (along - x0[chord]) / (x1[chord] - x0[chord])
         ends = self.frequency[chord]
-        frequency = np.where(known, ends[:, 0] + share * (ends[:, 1] - ends[:, 0]), np.nan)
-        curved = known & (ends[:, 0] != ends[:, 1]) & np.isfinite(ends).all(axis=1)
+        each = y0[chord] + share * (y1[chord] - y0[chord])
+        frequencies = ends[:, 0] + share * (ends[:, 1] - ends[:, 0])
+        curved = (ends[:, 0] != ends[:, 1]) & np.isfinite(ends).all(axis=1)
         if self.curve is not None and curved.any():
-            on_edge = self._on_edge(self.curve, chord[curved], at[curved, 0], across)
-            value[curved], frequency[curved] = on_edge
+            # all of them, before the nearest is chosen: the edge may be far from its chord
+            on_edge = self._on_edge(self.curve, chord[curved], along[curved], across)
+            each[curved], frequencies[curved] = on_edge
+        value, frequency = np.full(len(at), np.nan), np.full(len(at), np.nan)
+        farthest_first = np.argsort(-np.abs(each - np.asarray(near, dtype=float)[line]), kind="stable")
+        # of several values for one line the last, which is the nearest, stays
+        value[line[farthest_first]] = each[farthest_first]
+        frequency[line[farthest_first]] = frequencies[farthest_first]
         return value, frequency
 
     def _on_edge(
