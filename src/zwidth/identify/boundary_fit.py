@@ -23,8 +23,11 @@ ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
 SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
 STARTS: Final = 2  # fits from different vectors, of which the best is kept
 STARTS_OF_SEVERAL: Final = 4  # the same for two numbers and more
+SAME_MINIMUM: Final = 0.01  # relative difference of sums of squares of two fits that have found the same
 CLOSE: Final = 1.0  # mean square in units of the first scatter, below which no other start is tried
 MOST_CROSSED: Final = 2  # numbers whose starts are all combined
+COARSE: Final = 1e-3  # relative change of the sum of squares: a fortieth of a standard deviation and less
+FINE: Final = 1e-8  # the same where intervals are taken
 COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
 
 
@@ -36,14 +39,14 @@ class BoundaryFit:
     fit         vector of the numbers, ends of their intervals, and what remains in units of the scatter
     scatter     standard deviations that remain
     deviations  of the points on the boundary
-    freedom     degrees of freedom by which the scatter is known, of the least known number
+    freedom     (p,) degrees of freedom by which the scatter is known that each number hangs on
     """
 
     parameters: BoundaryParameters
     fit: Fit
     scatter: Scatter
     deviations: Deviations
-    freedom: float
+    freedom: Floats
 
     @property
     def vector(self) -> Floats:
@@ -95,13 +98,15 @@ def fit_boundary(
         x = _best_start(model, parameters, scatter)
     step = COARSE_STEP if model.interpolated(x) else None
     for _ in range(ROUNDS):
-        fit = _fit(model, parameters, scatter, x, step, profiled=False)
+        fit = _fit(model, parameters, scatter, x, step, tolerance=COARSE, profiled=False)
         x, before = fit.values, scatter
         scatter = _scatter(model, fit, scatter, reach)
         if all(abs(a / b - 1.0) < SAME_SCATTER for a, b in zip(scatter, before, strict=True)):
             break
-    freedom = _freedom(model, x, scatter)
-    fit = _fit(model, parameters, scatter, x, step, profiled=profiled, freedom=freedom)
+    freedom, widening = _freedom(model, x, scatter)
+    fit = _fit(
+        model, parameters, scatter, x, step, profiled=profiled, freedom=freedom, widening=widening, tolerance=FINE
+    )
     return BoundaryFit(parameters, fit, scatter, model.deviations(fit.values, scatter), freedom)
 
 
@@ -113,7 +118,9 @@ def _fit(
     step: float | None,
     *,
     profiled: bool,
-    freedom: float | None = None,
+    tolerance: float,
+    freedom: Floats | None = None,
+    widening: Floats | float = 1.0,
 ) -> Fit:
     return fit_least_squares(
         lambda vector: model.residuals(vector, scatter),
@@ -122,7 +129,9 @@ def _fit(
         upper=parameters.upper,
         known_scale=True,
         scale_freedom=freedom,
+        widening=widening,
         diff_step=step,
+        tolerance=tolerance,
         profiled=profiled,
     )
 
@@ -149,9 +158,12 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
     fits = list[Fit]()
     alone = len(begin) == 1  # several numbers have other minima near the points, too
     for k in order[: STARTS if alone else STARTS_OF_SEVERAL]:
-        fits.append(_fit(model, parameters, scatter, tried[k], step, profiled=False))
+        fits.append(_fit(model, parameters, scatter, tried[k], step, tolerance=COARSE, profiled=False))
         if alone and fits[-1].sum_of_squares < CLOSE * len(fits[-1].residuals):
             break
+        sums = sorted(fit.sum_of_squares for fit in fits)
+        if len(sums) > 1 and sums[1] < (1.0 + SAME_MINIMUM) * sums[0]:
+            break  # two starts have led to it
     return min(fits, key=lambda fit: fit.sum_of_squares).values
 
 
@@ -216,17 +228,24 @@ def _freedom_by_kind(model: BoundaryModel, vector: Floats, scatter: Scatter) -> 
     return {name: float(np.sum(part)) - float(np.sum(shares[name])) for name, part in parts.items()}
 
 
-def _freedom(model: BoundaryModel, vector: Floats, scatter: Scatter) -> float:
-    """Degrees of freedom by which the scatter is known (Satterthwaite), of the number that knows it least.
+def _freedom(model: BoundaryModel, vector: Floats, scatter: Scatter) -> tuple[Floats, Floats]:
+    """Degrees of freedom (p,) by which the scatter is known (Satterthwaite), and the factors (p,) by which the
+    intervals are wider since the points' weights were estimated, too.
 
-    The variance of a number is made of the variances of the kinds of points in the shares of their information.
+    The variance of a number is made of the variances of the kinds of points in the shares p_k of their
+    information. With weights from variances of nu_k degrees of freedom it is larger, and what the weights say of
+    it smaller, than with known ones: together 1 + 4 sum p_k (1 - p_k) / (nu_k + 2) to first order (Sinha 1985,
+    known at second hand, for a common mean). Few tips have the weight of the points along damping: one kind.
     """
     shares, by_kind = _shares(model, vector, scatter), _freedom_by_kind(model, vector, scatter)
-    spreads = [
-        sum(float(shares[name][i]) ** 2 / max(nu, 0.5) for name, nu in by_kind.items()) for i in range(len(vector))
-    ]
-    largest = max(spreads)
-    return max(min(sum(by_kind.values()), 1.0 / largest if largest > 0.0 else np.inf), 1.0)
+    nu = {name: max(value, 0.5) for name, value in by_kind.items()}
+    spread = sum(shares[name] ** 2 / nu[name] for name in nu)
+    known = np.divide(1.0, spread, out=np.full(len(vector), np.inf), where=np.asarray(spread) > 0.0)
+    joined = dict(shares)
+    if np.sum(_parts(model)["stiffness"]) < ENOUGH:
+        joined["damping"] = joined["damping"] + joined.pop("stiffness")
+    wider = 1.0 + 4.0 * sum(np.clip(p * (1.0 - p), 0.0, None) / (nu[name] + 2.0) for name, p in joined.items())
+    return np.maximum(np.minimum(sum(by_kind.values()), known), 1.0), np.sqrt(wider)
 
 
 def derivatives(model: BoundaryModel, vector: Floats, scatter: Scatter) -> Floats:

@@ -100,12 +100,7 @@ class BoundaryParameters:
 
     def chart(self, vector: Floats) -> Chart:
         """Exact chart of the device with these numbers. Raises ValueError where there is none."""
-        from zwidth.chart.point_chart import chart_at
-
-        device = self.device_with(vector)
-        if self.damping is not None:
-            return self.damping.chart(device, self._damping_numbers(vector))
-        return chart_at(device.at_point(self.point), decay=False)
+        return self._chart_of(self.device_with(vector), vector)
 
     def edge(self, vector: Floats) -> EdgeChords:
         """The edge of that chart. Raises ValueError where there is none."""
@@ -116,7 +111,14 @@ class BoundaryParameters:
             return self.damping.edge(device, self._damping_numbers(vector), THINNED)
         if device.given_plant is not None and device.given_plant.hysteresis is not None:
             return hysteretic_edge(device.at_point(self.point).loop)
-        return EdgeChords.of(self.chart(vector)).thinned(THINNED)
+        return EdgeChords.of(self._chart_of(device, vector)).thinned(THINNED)
+
+    def _chart_of(self, device: Device, vector: Floats) -> Chart:
+        from zwidth.chart.point_chart import chart_at
+
+        if self.damping is not None:
+            return self.damping.chart(device, self._damping_numbers(vector))
+        return chart_at(device.at_point(self.point), decay=False)
 
     def contact_loop(self, vector: Floats) -> Loop:
         """The loop of a simulated contact with these numbers, without an operator. Raises ValueError."""

@@ -57,9 +57,11 @@ def fit_least_squares(
     lower: ArrayLike = -np.inf,
     upper: ArrayLike = np.inf,
     known_scale: bool = False,
-    scale_freedom: float | None = None,
+    scale_freedom: ArrayLike | None = None,
+    widening: ArrayLike = 1.0,
     effective_count: float | None = None,
     diff_step: float | None = None,
+    tolerance: float = 1e-12,
     level: float = LEVEL,
     profiled: bool = True,
 ) -> Fit:
@@ -74,9 +76,12 @@ def fit_least_squares(
     start            (p,) where the search begins
     lower, upper     (p,) bounds of the parameters
     known_scale      the residuals have the standard deviation 1
-    scale_freedom    degrees of freedom by which that deviation was estimated; None: it is known exactly
+    scale_freedom    degrees of freedom by which that deviation was estimated, of all or of each parameter (p,);
+                     None: it is known exactly
+    widening         factor of the half widths, of all or of each parameter (p,), for weights that were estimated
     effective_count  number of independent residuals where they are fewer than n, as of overlapping segments
     diff_step        relative step of the derivatives, for residuals that are not exact to rounding; None: 1.5e-8
+    tolerance        relative change of the sum of squares at which the search ends
     profiled         False: intervals by the curvature alone, q sigma_i
     Raises           ValueError  for fewer residuals than parameters, or some that are no numbers at the start
     """
@@ -95,7 +100,7 @@ def fit_least_squares(
         x_scale="jac",
         diff_step=diff_step,
         xtol=1e-10,
-        ftol=1e-12,
+        ftol=tolerance,
         gtol=1e-12,
     )
     x, r = np.asarray(solved.x), np.asarray(solved.fun)
@@ -106,13 +111,14 @@ def fit_least_squares(
     covariance = _covariance(np.asarray(solved.jac)) * scale**2 / thinned
     tail = 0.5 + 0.5 * level
     scale_known_by = scale_freedom if known_scale else freedom
-    quantile = float(norm.ppf(tail) if scale_known_by is None else t.ppf(tail, scale_known_by))
+    quantile = norm.ppf(tail) if scale_known_by is None else t.ppf(tail, scale_known_by)
+    quantile = np.broadcast_to(np.asarray(quantile) * widening, x.shape)
     sigma = np.sqrt(np.diag(covariance))
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
     if profiled and scale > 0.0:
-        rise = (quantile * scale) ** 2 / thinned
-        search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high, covariance, diff_step)
         for i in range(len(x)):
+            rise = float(quantile[i] * scale) ** 2 / thinned
+            search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high, covariance, diff_step)
             for side in (0, 1):
                 ends[side, i] = search.end(i, ends[side, i])
     ends = np.where(np.isfinite(ends), ends, np.array([[-np.inf], [np.inf]]))
