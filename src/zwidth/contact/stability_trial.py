@@ -37,6 +37,7 @@ from zwidth.model.operator import attach
 Floats = NDArray[np.float64]
 
 FIRST_SAMPLES: Final = 1024  # samples at first
+LEAST_SAMPLES: Final = 64  # at first, however short the time
 PERIODS, MOST_PERIODS = 4.0, 4096  # of the slowest vibration; samples
 LEAST_SECONDS_HELD: Final = 0.5  # s; arms are slow, whatever the sampling
 LONGER: Final = 4
@@ -70,6 +71,7 @@ class StabilityTrial:
     disturbance  two-sided: the device is displaced by it, undeformed, and let go [m]
     speed        of the handle at the start, towards the inside [m/s]
     visible      amplitude of the handle up to which a vibration that does not die away counts as none [m]
+    watch_time   for so long it is watched, and then judged [s]; None: as long as it takes
     seed         of the noise
     substeps     between samples, where something is nonlinear
     Raises       TrialError  for numbers that cannot be meant
@@ -81,6 +83,7 @@ class StabilityTrial:
     disturbance: float = 1e-3
     speed: float = 0.0
     visible: float = 0.0
+    watch_time: float | None = None
     seed: int = 0
     substeps: int = SUBSTEPS
 
@@ -88,6 +91,8 @@ class StabilityTrial:
         for name, value in (("disturbance", self.disturbance), ("visible", self.visible), ("speed", self.speed)):
             if not isfinite(value) or (name != "speed" and value < 0.0):
                 raise TrialError(name, f"must be finite{' and not negative' * (name != 'speed')}, got {value!r}")
+        if self.watch_time is not None and not (isfinite(self.watch_time) and self.watch_time > 0.0):
+            raise TrialError("watch_time", f"must be positive and finite [s], got {self.watch_time!r}")
         if self.one_sided:
             if not self.hand.push > 0.0:
                 raise TrialError(
@@ -115,7 +120,10 @@ class StabilityTrial:
 
     @cached_property
     def first_samples(self) -> int:
-        """Samples watched at first: four periods of the slowest vibration of the device without a wall."""
+        """Samples watched at first: four periods of the slowest vibration of the device without a wall; of a given
+        time so many that the last look takes all of it."""
+        if self.watch_time is not None:
+            return max(ceil(self.watch_time / self.loop.period / LONGER ** (LEVELS - 1)), LEAST_SAMPLES)
         own = natural_frequencies(self.loop.plant)
         slow = PERIODS / float(own[own > 0.0].min(initial=np.inf)) / self.loop.period
         held = self.one_sided or self.hand.operator is not None

@@ -27,7 +27,7 @@ from zwidth.identify.boundary_fit import BoundaryFit, derivatives, first_scatter
 from zwidth.identify.boundary_model import BoundaryModel
 from zwidth.identify.boundary_parameters import BoundaryParameters
 from zwidth.identify.boundary_points import COLUMNS, BoundaryPoints, read_points
-from zwidth.identify.boundary_trials import TrialPlan, model_by_trials, needs_trials
+from zwidth.identify.boundary_trials import TrialModel, TrialPlan, model_by_trials, needs_trials
 from zwidth.identify.damping_models import models_of
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.record import Record
@@ -69,8 +69,9 @@ def identify_boundary(
                     place of the device's own damping, and they are compared; the estimates are those of the best
     through         "chart", "experiment": what the points are compared with; None: the chart, and trials on the
                     simulated device where it has dry friction or an estimate of velocity that is not linear
-    disturbance     of those trials [m]; None: perturbation_N over the stiffness where the points have it, or 1 mm
-    visible         amplitude up to which a vibration counts as none in those trials [m]; None: three encoder steps
+    disturbance     of those trials [m]; None: each point's own perturbation_N over its stiffness, or 1 mm
+    visible         amplitude up to which a vibration counts as none in those trials [m]; None: each point's own
+                    amplitude_m, or three encoder steps
     progress        called with stage, steps done, and steps
     Raises          DeviceError  for faults of the records and of the arguments, and where the device has no chart
     """
@@ -94,13 +95,14 @@ def identify_boundary(
     checks += check_points(points, count)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    checks += [check_magnitudes(points, _own_edge(choices[0], point)), *check_circumstances(points)]
+    simulated = needs_trials(point, through)
+    checks += [check_magnitudes(points, _own_edge(choices[0], point)), *check_circumstances(points, simulated)]
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    plan = TrialPlan.of(points, point, disturbance, visible) if needs_trials(point, through) else None
+    plan = TrialPlan.of(points, point, disturbance, visible) if simulated else None
     checks.append(_route(point, plan))
     fits = [(_model(points, one, plan, report), one) for one in choices]
-    checks.append(_apart(fits[0][0], fits[0][1]))
+    checks += [*_without_edge(fits, records), _apart(fits[0][0], fits[0][1])]
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     comparison = compare_models(fits, report)
@@ -149,6 +151,27 @@ def _model(
 ) -> BoundaryModel:
     model = BoundaryModel(points, parameters.edge)
     return model if plan is None else model_by_trials(model, parameters, plan, report)
+
+
+def _without_edge(
+    fits: Sequence[tuple[BoundaryModel, BoundaryParameters]], records: Sequence[Record]
+) -> list[Check]:
+    """A warning that names the points at which the trials of a model have no edge, so that they do not count."""
+    checks = list[Check]()
+    for model, parameters in fits:
+        lost = model.lost if isinstance(model, TrialModel) else None
+        if lost is not None and len(lost):
+            places = [
+                f"{records[lost.record[i]].place(int(lost.row[i]))} of {records[lost.record[i]].label}"
+                for i in range(len(lost))
+            ]
+            of = f" with {parameters.damping.title} damping" if parameters.damping is not None else ""
+            text = (
+                f"the simulated device{of} has no edge at {plural(len(lost), 'point')}, left out of the fit: "
+                f"{comma_list(places, MOST_NAMED)}"
+            )
+            checks.append(Check("trials", False, text, warning=True))
+    return checks
 
 
 def _apart(model: BoundaryModel, parameters: BoundaryParameters) -> Check:

@@ -30,7 +30,7 @@ FAR_OFF: Final = 2.0  # powers of ten from the chart, from which on columns may 
 NEAR: Final = 1.0  # powers of ten from the chart, if they are swapped back
 SAME: Final = 1e-9  # relative difference of numbers that are copies
 MOST_NAMED: Final = 3
-UNITS: Final = {"bias_force_N": " N", "perturbation_N": " N", "watch_time_s": " s"}
+UNITS: Final = {"bias_force_N": " N", "perturbation_N": " N", "watch_time_s": " s", "amplitude_m": " m"}
 
 
 def complete_points(points: BoundaryPoints, records: Sequence[Record]) -> tuple[BoundaryPoints, list[Check]]:
@@ -124,15 +124,23 @@ def check_magnitudes(points: BoundaryPoints, edge: EdgeChords) -> Check:
     return Check("units", True, seen)
 
 
-def check_circumstances(points: BoundaryPoints) -> list[Check]:
-    """Whether all points were measured in the same way: a warning for each circumstance that was not."""
+def check_circumstances(points: BoundaryPoints, simulated: bool) -> list[Check]:
+    """Whether all points were measured in the same way: a warning for each circumstance that was not.
+
+    simulated  the points are compared with trials, and each with one of its own force, time and amplitude
+    """
     checks = list[Check]()
-    for name, values in points.circumstances.items():
+    circumstances = points.circumstances | {"amplitude_m": points.visible}
+    circumstances.pop("beyond", None)
+    for name, values in circumstances.items():
         if values.dtype.kind == "U":
             kinds = sorted({str(value) for value in values if value})
         else:
             kinds = [f"{value:g}{UNITS.get(name, '')}" for value in np.unique(values[np.isfinite(values)])]
-        if len(kinds) > 1:
+        if len(kinds) > 1 and simulated and name in UNITS:
+            text = f"differs between the points, and each is simulated with its own: {comma_list(kinds, 6)}"
+            checks.append(Check(name, True, text))
+        elif len(kinds) > 1:
             text = (
                 f"differs between the points: {comma_list(kinds, 6)}; one boundary is fitted to all of them, so "
                 "give the points of each in a file of their own"

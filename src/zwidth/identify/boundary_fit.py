@@ -21,8 +21,7 @@ LEAST_SCATTER: Final = 1e-9  # share of the measured range; less would be the ro
 ENOUGH: Final = 6  # points of a kind from which on their scatter is estimated from them alone
 ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
 SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
-STARTS: Final = 2  # fits from different vectors, of which the best is kept
-STARTS_OF_SEVERAL: Final = 4  # the same for two numbers and more
+STARTS: Final = 4  # fits from different vectors, at most, of which the best is kept
 SAME_MINIMUM: Final = 0.01  # relative difference of sums of squares of two fits that have found the same
 CLOSE: Final = 1.0  # mean square in units of the first scatter, below which no other start is tried
 MOST_CROSSED: Final = 2  # numbers whose starts are all combined
@@ -153,17 +152,19 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
         tried = [begin]
         for i, others in enumerate(values):
             tried += [np.where(np.arange(len(begin)) == i, one, begin) for one in others[1:]]
+    for i in range(len(begin)):
+        tried += [np.where(np.arange(len(begin)) == i, one, begin) for one in parameters.near_starts(i)]
     order = np.argsort([size(one) for one in tried], kind="stable")
     step = COARSE_STEP if model.interpolated(begin) else None
     fits = list[Fit]()
-    alone = len(begin) == 1  # several numbers have other minima near the points, too
-    for k in order[: STARTS if alone else STARTS_OF_SEVERAL]:
+    several = len(begin) > 1  # several numbers have other minima near the points, too
+    for k in order[:STARTS]:
         fits.append(_fit(model, parameters, scatter, tried[k], step, tolerance=COARSE, profiled=False))
-        if alone and fits[-1].sum_of_squares < CLOSE * len(fits[-1].residuals):
-            break
         sums = sorted(fit.sum_of_squares for fit in fits)
-        if len(sums) > 1 and sums[1] < (1.0 + SAME_MINIMUM) * sums[0]:
-            break  # two starts have led to it
+        close = sums[0] < CLOSE * len(fits[0].residuals)
+        twice = len(sums) > 1 and sums[1] < (1.0 + SAME_MINIMUM) * sums[0]
+        if twice if several else close:
+            break
     return min(fits, key=lambda fit: fit.sum_of_squares).values
 
 

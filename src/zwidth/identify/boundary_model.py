@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from zwidth.chart.edge_crossings import EdgeChords, EdgeKind
 from zwidth.identify.boundary_points import EDGE, LOWER, STABLE, TIP, UNSTABLE, UPPER, BoundaryPoints
+from zwidth.identify.boundary_weights import relative_scatter
 
 Floats = NDArray[np.float64]
 EdgeOf = Callable[[Floats], EdgeChords]
@@ -126,9 +128,16 @@ class BoundaryModel:
         return np.concatenate([value, frequency[seen] / scatter.frequency, self._inequalities(vector, scatter)])
 
     def units(self, scatter: Scatter) -> Floats:
-        """The scatter (n,) of each point on the boundary, in the unit of its deviation."""
+        """The scatter (n,) of each point on the boundary, in the unit of its deviation: that of its kind, larger
+        or smaller where its own trials say so."""
         edges = self.points[self.points.on_edge]
-        return np.where(edges.kind == TIP, scatter.stiffness, np.where(edges.kind == EDGE, 1.0, scatter.damping))
+        usual = np.where(edges.kind == TIP, scatter.stiffness, np.where(edges.kind == EDGE, 1.0, scatter.damping))
+        return np.asarray(usual * self.relative)
+
+    @cached_property
+    def relative(self) -> Floats:
+        """See `relative_scatter`, (n,) of the points on the boundary."""
+        return relative_scatter(self.points[self.points.on_edge])
 
     def _inequalities(self, vector: Floats, scatter: Scatter) -> Floats:
         """sqrt(-2 ln Phi(d)) of the walls that were tried."""

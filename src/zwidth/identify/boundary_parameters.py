@@ -31,6 +31,7 @@ WIDEST: Final = np.log(1e6)  # factor either way within which a positive number 
 HALVINGS: Final = 12  # of the way to where a number is no longer allowed
 SMALL: Final = 1e-3  # relative change by which it is tried whether a number can be varied alone
 THINNED: Final = 4  # chords that make one; crossings are moved onto the edge itself in any case
+NEAR: Final = (0.65, 0.8, 0.9, 1.1, 1.25, 1.5)  # at which it looks besides, as minima may be narrow
 FACTORS: Final = (0.003, 0.03, 0.3, 3.0, 30.0, 300.0)  # at which a fit looks for a start
 
 
@@ -141,6 +142,11 @@ class BoundaryParameters:
         else:
             size = self._size(i)
             tried = self.start[i] + size * np.array([-10.0, -3.0, -1.0, 1.0, 3.0, 10.0, 30.0])
+        return np.asarray(tried[(tried > self.lower[i]) & (tried < self.upper[i])])
+
+    def near_starts(self, i: int) -> Floats:
+        """The same close to the file's value, of a positive number; none of another."""
+        tried = self.start[i] + np.log(NEAR if self.positive[i] else ())
         return np.asarray(tried[(tried > self.lower[i]) & (tried < self.upper[i])])
 
     def _size(self, i: int) -> float:

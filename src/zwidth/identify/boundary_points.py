@@ -25,11 +25,20 @@ SPREADS: Final = (
     "stiffness_low_N_per_m",
     "stiffness_high_N_per_m",
 )
-CIRCUMSTANCES: Final = ("approach", "held_by", "criterion", "bias_force_N", "perturbation_N", "watch_time_s")
+CIRCUMSTANCES: Final = (
+    "approach",
+    "held_by",
+    "criterion",
+    "beyond",
+    "bias_force_N",
+    "perturbation_N",
+    "watch_time_s",
+    "amplitude_m",
+)
 COLUMNS: Final = Columns(
     needed=(STIFFNESS, DAMPING),
     optional=(*NUMBERS, *SPREADS),
-    text=("edge", "kind", "verdict", "approach", "held_by", "criterion"),
+    text=("edge", "kind", "verdict", "approach", "held_by", "criterion", "beyond"),
 )
 
 LOWER, UPPER, TIP, EDGE, STABLE, UNSTABLE = "lower", "upper", "tip", "edge", "stable", "unstable"
@@ -101,6 +110,14 @@ class BoundaryPoints:
     def bisected(self) -> Floats:
         """What was bisected (n,): the stiffness of a tip [N/m], else the damping [N s/m]."""
         return np.where(self.kind == TIP, self.stiffness, self.damping)
+
+    @property
+    def visible(self) -> Floats:
+        """Amplitude (n,) up to which a vibration was not seen [m]; nan where not known. In a row that says what
+        happened beyond the edge the column amplitude_m is of that vibration, and not a limit."""
+        amplitude = self.circumstances.get("amplitude_m", np.full(len(self), np.nan))
+        beyond = self.circumstances.get("beyond", np.full(len(self), ""))
+        return np.where(beyond == "", amplitude, np.nan)
 
     @property
     def chosen(self) -> Floats:
