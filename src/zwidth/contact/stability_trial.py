@@ -71,9 +71,9 @@ class StabilityTrial:
     disturbance  two-sided: the device is displaced by it, undeformed, and let go [m]
     speed        of the handle at the start, towards the inside [m/s]
     visible      amplitude of the handle up to which a vibration that does not die away counts as none [m]
-    watch_time   for so long it is watched, and then judged [s]; None: as long as it takes
     seed         of the noise
     substeps     between samples, where something is nonlinear
+    watch_time   for so long it is watched, and then judged [s]; None: as long as it takes
     Raises       TrialError  for numbers that cannot be meant
     """
 
@@ -83,9 +83,9 @@ class StabilityTrial:
     disturbance: float = 1e-3
     speed: float = 0.0
     visible: float = 0.0
-    watch_time: float | None = None
     seed: int = 0
     substeps: int = SUBSTEPS
+    watch_time: float | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("disturbance", self.disturbance), ("visible", self.visible), ("speed", self.speed)):
