@@ -123,7 +123,7 @@ class StabilityTrial:
         """Samples watched at first: four periods of the slowest vibration of the device without a wall; of a given
         time so many that the last look takes all of it."""
         if self.watch_time is not None:
-            return max(ceil(self.watch_time / self.loop.period / LONGER ** (LEVELS - 1)), LEAST_SAMPLES)
+            return max(ceil(self.watch_time / self.loop.period / float(LONGER ** (LEVELS - 1))), LEAST_SAMPLES)
         own = natural_frequencies(self.loop.plant)
         slow = PERIODS / float(own[own > 0.0].min(initial=np.inf)) / self.loop.period
         held = self.one_sided or self.hand.operator is not None
