@@ -46,6 +46,7 @@ OUTLIER: Final = 4.0  # standard deviations
 ROUNDING: Final = 1e-6  # standard deviations, below which nothing is an outlier
 FEWEST_VALIDATED: Final = 6  # points on the boundary
 MOST_NAMED: Final = 3
+MOST_LOST_NAMED: Final = 12  # points without an edge in trials
 
 
 def identify_boundary(
@@ -167,8 +168,8 @@ def _without_edge(
             ]
             of = f" with {parameters.damping.title} damping" if parameters.damping is not None else ""
             text = (
-                f"the simulated device{of} has no edge at {plural(len(lost), 'point')}, left out of the fit: "
-                f"{comma_list(places, MOST_NAMED)}"
+                f"the simulated device{of} has no edge at {plural(len(lost), 'point')}, or loses it as a number "
+                f"moves; left out of the fit: {comma_list(places, MOST_LOST_NAMED)}"
             )
             checks.append(Check("trials", False, text, warning=True))
     return checks
