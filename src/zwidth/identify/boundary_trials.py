@@ -177,6 +177,10 @@ class Crossing(NamedTuple):
     inward: Floats
     frequency: Floats
 
+    def only(self, some: NDArray[np.bool_]) -> Crossing:
+        """Some of the edges."""
+        return Crossing(self.value[some], self.tip[some], self.inward[some], self.frequency[some])
+
 
 @dataclass(frozen=True)
 class SimulatedEdges:
@@ -196,7 +200,7 @@ class SimulatedEdges:
 
     def only(self, some: NDArray[np.bool_]) -> SimulatedEdges:
         """Some of the edges."""
-        return SimulatedEdges(self.centre, Crossing(*(one[some] for one in self.at)), self.slopes[some])
+        return SimulatedEdges(self.centre, self.at.only(some), self.slopes[some])
 
 
 @dataclass
