@@ -299,3 +299,15 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     shares, count = coverage(range(1000))
     assert count > 950
     assert np.all((shares > 0.93) & (shares < 0.97)), shares
+
+
+def test_a_drive_of_a_leg_is_the_same_under_the_names_of_its_copies():
+    from zwidth.identify.drives import drive_named, drives_of
+
+    delta = zwidth.load("stamper-delta")
+    (drive,) = drives_of(delta)
+    assert drive.path.startswith("mechanism.legs.")
+    names = [drive.name, drive.joint, f"{drive.name}-2", f"{drive.joint}-3", "1"]
+    assert {drive_named(delta, name).path for name in names} == {drive.path}
+    with pytest.raises(DeviceError, match="no drive or joint"):
+        drive_named(delta, f"{drive.name}-9")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from zwidth.device.device import Device
-from zwidth.device.faults import comma_list, fail, quote, suggestion
+from zwidth.device.faults import comma_list, dotted, fail, quote, suggestion
+from zwidth.device.legs import members, written
 
 
 @dataclass(frozen=True)
@@ -31,15 +32,10 @@ def drives_of(device: Device) -> list[Drive]:
     without a mechanism."""
     if device.mechanism is None:
         raise fail(device.label, "mechanism", "is missing: this is identified of a mechanism's drives")
-    mechanism = device.document["mechanism"]
-    return list(_drives("mechanism", mechanism)) + [
-        drive for leg in mechanism.get("legs", ()) for drive in _drives(f"mechanism.legs.{leg['name']}", leg)
+    return [
+        Drive(entry["name"], entry["joint"], dotted(("mechanism", *path), device.document), entry)
+        for path, entry in written(device.document["mechanism"], "drives")
     ]
-
-
-def _drives(path: str, table: Mapping[str, Any]) -> Iterator[Drive]:
-    for one in table.get("drives", ()):
-        yield Drive(one["name"], one["joint"], f"{path}.drives.{one['name']}", one)
 
 
 def drive_named(device: Device, name: str | None) -> Drive:
@@ -58,9 +54,12 @@ def drive_named(device: Device, name: str | None) -> Drive:
             raise fail(device.label, "joint", f"is not named, and the device has several drives: {listed}")
         return drives[0]
     for drive in drives:
-        copies = [name] if "legs" not in drive.path else [name, name.rpartition("-")[0]]
-        if drive.name in copies or drive.joint in copies:
+        if name in (drive.name, drive.joint):
             return drive
+    for copy in members(device.document["mechanism"], "drives"):
+        if name in (copy.entry["name"], copy.entry["joint"]):
+            path = dotted(("mechanism", *copy.path), device.document)
+            return next(drive for drive in drives if drive.path == path)
     if name.isdigit() and 1 <= int(name) <= len(drives):
         return drives[int(name) - 1]
     known = {word for drive in drives for word in (drive.name, drive.joint)}
