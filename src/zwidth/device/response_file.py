@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from zwidth.device.faults import DeviceError, Fault, fail, plural, quote
 from zwidth.device.schema.response import ResponseSection
 from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
-from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, ResponseError
+from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, ResponseError, mean_path
 from zwidth.model.sweep_response import sweep_response
 
 Floats = NDArray[np.float64]
@@ -104,24 +104,17 @@ def _paths_of(handle: MeasuredHandle) -> dict[str, MeasuredPath]:
 def _mean(responses: Sequence[Response]) -> Response:
     """Repeated sweeps as one response; a frequency is as coherent as in the worst of them."""
     first = responses[0]
-    whole = _mean_path([MeasuredPath(response.value, response.coherence) for response in responses])
+    whole = mean_path([MeasuredPath(response.value, response.coherence) for response in responses])
     note = f"mean of {len(responses)} sweeps" + (f", each {first.note}" if first.note else "")
     handle = None
     if first.handle is not None:
         every = [_paths_of(response.handle) for response in responses if response.handle is not None]
         shared = [name for name in HANDLE_PATHS if all(name in paths for paths in every)]
         if len(every) == len(responses):
-            handle = _handle({name: _mean_path([paths[name] for paths in every]) for name in shared})
+            handle = _handle({name: mean_path([paths[name] for paths in every]) for name in shared})
     return replace(
         first, value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps, note=note, handle=handle
     )
-
-
-def _mean_path(paths: Sequence[MeasuredPath]) -> MeasuredPath:
-    """Repetitions of one path, and their mean."""
-    sweeps = np.array([path.value for path in paths])
-    known = [path.coherence for path in paths if path.coherence is not None]
-    return MeasuredPath(sweeps.mean(axis=0), np.min(known, axis=0) if known else None, sweeps)
 
 
 def _handle_experiment(
@@ -147,7 +140,7 @@ def _handle_experiment(
     for n, part in zip(_sweep_numbers(table), parts, strict=True):
         _check_sweep(path, n, part["frequency_Hz"], parts[0]["frequency_Hz"])
     every = [_handle_paths(part) for part in parts]
-    return parts[0]["frequency_Hz"], {name: _mean_path([paths[name] for paths in every]) for name in every[0]}
+    return parts[0]["frequency_Hz"], {name: mean_path([paths[name] for paths in every]) for name in every[0]}
 
 
 def _handle_paths(table: Table) -> dict[str, MeasuredPath]:

@@ -18,7 +18,7 @@ from zwidth.identify.record import Record
 from zwidth.identify.sampling import check_sampling
 from zwidth.identify.strokes import resolution_of
 from zwidth.loop.controller import Controller
-from zwidth.model.response import Response, ResponseError
+from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
 from zwidth.model.sweep_response import sweep_response
 from zwidth.progress import Progress
 
@@ -32,7 +32,6 @@ FIT_SHARE: Final = 2.0 / 3.0  # of each record, its beginning; the rest is predi
 FEWEST_COUNTS: Final = 10.0  # of the motion
 LIMITED: Final = 0.05  # share of the samples at the largest and the smallest force, from which on it was clipped
 FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
-COHERENT: Final = 0.5
 FEWEST_USABLE: Final = 0.2  # share of the frequencies
 
 
@@ -143,17 +142,14 @@ def _together(responses: Sequence[Response]) -> Response:
     """Repeated sweeps as one response: their mean, each beside it."""
     if len(responses) == 1:
         return responses[0]
-    sweeps = np.array([one.value for one in responses])
-    known = [one.coherence for one in responses if one.coherence is not None]
-    return replace(
-        responses[0], value=sweeps.mean(axis=0), coherence=np.min(known, axis=0) if known else None, sweeps=sweeps
-    )
+    whole = mean_path([MeasuredPath(one.value, one.coherence) for one in responses])
+    return replace(responses[0], value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps)
 
 
 def _usable(response: Response) -> Check:
     """From where to where the response can be relied on."""
     assert response.coherence is not None
-    good = response.coherence >= COHERENT
+    good = response.coherence >= LEAST_COHERENCE
     share = float(np.mean(good))
     if share < FEWEST_USABLE:
         return Check(
@@ -208,7 +204,7 @@ def _share_explained(response: Response, force: Floats, position: Floats, period
     U, Y = np.fft.rfft(force[: len(moved)] * window), np.fft.rfft(moved * window)
     f = np.fft.rfftfreq(len(moved), period)
     assert response.coherence is not None
-    good = response.coherence >= COHERENT
+    good = response.coherence >= LEAST_COHERENCE
     known, value = response.frequency[good], response.value[good]
     shifted = value * (np.exp(2j * np.pi * known * period) - 1.0) ** m
     inside = (f >= known[0]) & (f <= known[-1]) & (np.interp(f, response.frequency, good) > 0.99)

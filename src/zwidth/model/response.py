@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -40,6 +41,13 @@ class MeasuredPath:
     value: Complexes
     coherence: Floats | None = None
     sweeps: Complexes | None = None
+
+
+def mean_path(paths: Sequence[MeasuredPath]) -> MeasuredPath:
+    """Repetitions of one path, and their mean; a frequency is as coherent as in the worst of them."""
+    sweeps = np.array([path.value for path in paths])
+    known = [path.coherence for path in paths if path.coherence is not None]
+    return MeasuredPath(sweeps.mean(axis=0), np.min(known, axis=0) if known else None, sweeps)
 
 
 @dataclass(frozen=True)

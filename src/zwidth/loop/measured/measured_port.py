@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from zwidth.loop.measured.modal_terms import hold_response
 from zwidth.loop.measured.pole_fit import PathData, PoleModel, fit_poles
 from zwidth.model.response import (
+    LEAST_COHERENCE,
     MeasuredHandle,
     MeasuredPath,
     Response,
@@ -36,7 +37,6 @@ from zwidth.model.response import (
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-LEAST_COHERENCE: Final = 0.5  # below it a frequency says nothing of the device
 SMALL: Final = 0.02  # a value below this share of its neighbours' counts as if it had that size
 SUREST: Final = 1e-6  # relative deviation below which no value is believed
 LATEST: Final = 0.1  # radians at half the sampling rate, by which the fitted delay may be wrong
