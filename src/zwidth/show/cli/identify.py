@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -46,7 +46,6 @@ joint_option = click.option(
     help="Drive, or link whose joint it drives, that was measured. Default: the only one, or a column joint.",
 )
 
-
 parameter_option = click.option(
     "--parameter",
     "paths",
@@ -62,19 +61,23 @@ spring_option = click.option(
 )
 
 
+def segment_option(shortest: int, what: str) -> Callable[[Any], Any]:
+    """`--segment SAMPLES`, from a shortest one on, and what it is with its default."""
+    return click.option("--segment", metavar="SAMPLES", type=click.IntRange(shortest), help=what)
+
+
 class IdentifyCommand(Command):
     """What all kinds have in common: records are read, and the numbers can be written into the device file.
 
-    kind_options  names of the command's options that go to the function as they are
-    takes_point   whether the numbers are of the device at an operating point, and the command has its options
+    What a kind names as its options goes to its function under the same names.
+
+    takes_point  whether the numbers are of the device at an operating point, and the command has its options
     """
 
-    outputs = (".png", ".svg", ".pdf", ".csv", ".json")
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: measured and fitted, .json)."
     keys = ("check", "parameters", "validation")
     takes_responses = True
     linear = False
-    kind_options: ClassVar[tuple[str, ...]] = ()
     takes_point: ClassVar[bool] = False
 
     def about(self, command: Callback) -> Callback:
@@ -98,8 +101,7 @@ class IdentifyCommand(Command):
         if not Path(case.question.name).is_file():
             raise BadInput(
                 f"--write: {printable(case.question.name)} is bundled, or no file; write a device file of your "
-                "own, and "
-                "name that"
+                "own, and name that"
             )
         destination(case.question.name, (".toml",))
 
@@ -119,7 +121,7 @@ class IdentifyCommand(Command):
         return False
 
     def compute(self, case: CommandLine) -> Identification:
-        options = {name: case[name] for name in self.kind_options}
+        options = {name: case[name] for name in _option_names(self.options)}
         if self.takes_point:
             options["point"] = case.point
         found: Identification = case.device.identify(
@@ -179,6 +181,18 @@ class IdentifyCommand(Command):
         return self.circumstances(case) if self.takes_point else {"name": case.device.name}
 
 
+def _option_names(options: Sequence[Callable[[Any], Any]]) -> list[str]:
+    """The names under which click hands over what these decorators declare."""
+
+    def declared() -> None:
+        """Carries the options."""
+
+    for option in options:
+        option(declared)
+    parameters: list[click.Parameter] = getattr(declared, "__click_params__", [])
+    return [one.name for one in parameters if one.name]
+
+
 def _files(command: Callback) -> Callback:
     """The records, of which there is one at least."""
     return click.argument("files", metavar="FILE...", nargs=-1, required=True)(command)
@@ -218,7 +232,6 @@ class StiffnessCommand(IdentifyCommand):
             help="Where torque and angle were measured: at the motor's shaft, or at the link's joint.",
         ),
     )
-    kind_options = ("joint", "side")
 
 
 class FrictionCommand(IdentifyCommand):
@@ -241,7 +254,6 @@ class FrictionCommand(IdentifyCommand):
             help="In free motion, which tells only friction over mass, take the mass that DEVICE gives.",
         ),
     )
-    kind_options = ("joint", "spring", "mass_from_file")
 
 
 class MassCommand(IdentifyCommand):
@@ -255,7 +267,6 @@ class MassCommand(IdentifyCommand):
     summary = "Effective mass of a joint, from its motion and what drove it."
     examples = ("zwidth identify mass shaken.csv --device my-device.toml --joint upper",)
     options = (joint_option, spring_option)
-    kind_options = ("joint", "spring")
 
 
 class BoundaryCommand(IdentifyCommand):
@@ -293,7 +304,6 @@ class BoundaryCommand(IdentifyCommand):
             "--visible", metavar="M", type=Finite(), help="Amplitude up to which those trials count as still [m]."
         ),
     )
-    kind_options = ("paths", "damping_models", "through", "disturbance", "visible")
     takes_point = True
     size = (5.6, 4.4)
 
@@ -311,14 +321,8 @@ class ImpedanceCommand(IdentifyCommand):
     options = (
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall that was on [N/m]."),
         click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall that was on [Ns/m]."),
-        click.option(
-            "--segment",
-            metavar="SAMPLES",
-            type=click.IntRange(16),
-            help="Samples of a segment of the spectra. Default: 15 in a record.",
-        ),
+        segment_option(16, "Samples of a segment of the spectra. Default: 15 in a record."),
     )
-    kind_options = ("stiffness", "damping", "segment")
     takes_point = True
 
 
@@ -359,7 +363,6 @@ class ArmCommand(IdentifyCommand):
             help="Whether the rotors' inertias are fitted, or taken from DEVICE.",
         ),
     )
-    kind_options = ("side", "torque", "rotors")
     takes_point = True
 
 
@@ -392,14 +395,8 @@ class ModesCommand(IdentifyCommand):
             type=click.Choice(["H1", "H2", "Hv", "joint"]),
             help="Estimator of the response that is drawn. Default: H1, joint with a reference.",
         ),
-        click.option(
-            "--segment",
-            metavar="SAMPLES",
-            type=click.IntRange(64),
-            help="Samples of a segment of the averaged spectra. Default: 15 in a record.",
-        ),
+        segment_option(64, "Samples of a segment of the averaged spectra. Default: 15 in a record."),
     )
-    kind_options = ("paths", "fitted", "estimator", "segment")
     takes_point = True
 
 
@@ -422,14 +419,8 @@ class ResponseCommand(IdentifyCommand):
             type=click.IntRange(0, 2),
             help="Poles at z = 1: 2 of a free device, 1 with a dashpot, 0 on a spring. Default: as the data say.",
         ),
-        click.option(
-            "--segment",
-            metavar="SAMPLES",
-            type=click.IntRange(64),
-            help="Samples whose transform resolves what must be told apart. Default: by itself.",
-        ),
+        segment_option(64, "Samples whose transform resolves what must be told apart. Default: by itself."),
     )
-    kind_options = ("integrators", "segment")
 
 
 KINDS: tuple[Callable[[], IdentifyCommand], ...] = (
