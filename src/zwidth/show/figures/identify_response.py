@@ -17,6 +17,7 @@ def draw_response(ax: Axes, identification: Identification) -> None:
     curves = {name: np.asarray(values) for name, values in identification.curves.items()}
     sweep = curves.get("sweep", np.ones(len(curves["frequency_Hz"])))
     averages = float(identification.details["averages"])
+    marked = False
     for number, one in enumerate(np.unique(sweep)):
         mine = sweep == one
         f = curves["frequency_Hz"][mine]
@@ -27,12 +28,19 @@ def draw_response(ax: Axes, identification: Identification) -> None:
         name = f"sweep {one:g}" if len(np.unique(sweep)) > 1 else "|P|"
         if number == 0:
             ax.fill_between(
-                f, P * (1 - error), P * (1 + error), color=BLUE, alpha=0.25, linewidth=0, label="95 % of it"
+                f,
+                P * (1 - error),
+                P * (1 + error),
+                color=BLUE,
+                alpha=0.25,
+                linewidth=0,
+                label="95 % at each frequency",
             )
         ax.plot(f, P, color=colour, linestyle=dashes, linewidth=1.1, label=name)
         poor = coherence < 0.5
         if poor.any():
-            text = "not coherent" if number == 0 else ""
+            text = "" if marked else "not coherent"
+            marked = True
             ax.plot(f[poor], P[poor], color=VERMILION, marker="x", markersize=3.0, linestyle="none", label=text)
     ax.set_xscale("log")
     ax.set_yscale("log")
