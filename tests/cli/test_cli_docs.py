@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, run_command
+from tests.identify.spring_bench import bench_record
 from zwidth.show.cli.group import zwidth as group
+from zwidth.show.output import csv_text
 
 PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
 DEVICE = """
@@ -55,6 +57,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "my-device.toml").write_text(DEVICE)
     (tmp_path / "walls.csv").write_text("stiffness_N_per_m,damping_Ns_per_m\n4000,10\n9000,10\n")
     (tmp_path / "my-study.toml").write_text(STUDY)
+    (tmp_path / "strokes.csv").write_text(csv_text(bench_record(1, forward=0.45, friction=0.003, amplitude=0.045)))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -83,9 +86,10 @@ def test_the_python_example_runs(capsys):
 def test_every_command_has_its_section_and_every_option_its_word():
     for name, command in group.commands.items():
         assert f"\n## {name}\n" in PAGE
-        for option in command.params:
-            if option.param_type_name == "option" and not option.hidden:
-                assert option.opts[0] in PAGE
+        for one in (command, *getattr(command, "commands", {}).values()):
+            for option in one.params:
+                if option.param_type_name == "option" and not option.hidden:
+                    assert option.opts[0] in PAGE
 
 
 def test_the_keys_that_come_out_are_those_explained(folder):

@@ -7,11 +7,14 @@ import csv
 import numpy as np
 import pytest
 
+import zwidth
 from tests import systems
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from tests.measured_cases import measured_response
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.measured import fit_check
 from zwidth.loop.controller import Butterworth
+from zwidth.model.response import ResponseError
 
 HEAD = "frequency_Hz,real_m_per_N,imag_m_per_N"
 DEVICE = """
@@ -295,6 +298,15 @@ def test_a_contact_is_simulated_by_a_fitted_plant_that_says_its_error(device):
     out = run_command("simulate", device, *wall).out
     assert "by a plant of" in out
     assert "modes fitted to the response" in out
+
+
+@pytest.mark.parametrize("verb", ["simulate", "bounds"])
+def test_a_plant_with_other_walls_than_the_response_stands_for_nothing(device, monkeypatch, verb):
+    point = zwidth.load(device).at()
+    wall = (800.0, 2.5) if verb == "simulate" else ()
+    monkeypatch.setattr(fit_check, "FURTHEST", 1.0)
+    with pytest.raises(ResponseError, match=r"but its largest stiffness is .* N/m, by the response itself .* N/m"):
+        getattr(point, verb)(*wall)
 
 
 def test_bounds_are_those_of_the_fitted_plant(device):

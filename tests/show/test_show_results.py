@@ -13,6 +13,7 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 
 import zwidth
+from tests.identify.spring_bench import bench_record
 from zwidth.result import Result
 from zwidth.show.figures.plots import DRAWINGS
 from zwidth.show.output import json_value
@@ -60,6 +61,9 @@ def results():
         "limit cycles": rubbing().at().limit_cycles(2600.0, 0.0, simulate=False),
         "boundary": point.without_operator.measure_boundary(plan),
         "sensitivities": device().sensitivities(),
+        "identification": arms.identify(
+            "stiffness", bench_record(1, forward=0.45, friction=0.003, amplitude=0.045), joint="upper-right"
+        ),
         **function_results(point, arms),
     }
 
@@ -124,6 +128,7 @@ NAMES = [
     "limit cycles",
     "boundary",
     "sensitivities",
+    "identification",
     "felt chart",
     "guarantee",
     "validity",
@@ -187,8 +192,9 @@ def test_every_kind_of_result_is_tried(all_results):
     assert kinds - tried - {"Couplings", "MeasuredChart", "MeasuredVerdicts"} == set()
 
 
-def test_whatever_a_public_function_returns_is_a_result_or_known_not_to_be():
-    """Read off the annotations: a new type has to become a `Result`, or be named below."""
+def test_whatever_a_public_function_returns_is_a_result_or_known_not_to_be(all_results):
+    """Read off the annotations: a new type has to become a `Result`, or be named above."""
+    assert all_results  # with them every kind of result is imported
     known = {*STAGES.split(), *NUMBERS.split()} | {kind.__name__ for kind in _subclasses(Result)}
     unknown = {
         f"{word} of {where}"

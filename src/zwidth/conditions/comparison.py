@@ -131,7 +131,10 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
     (0.666666667, 0.666666667)
     """
     require("point", point, OperatingPoint)
-    point = point.modelled
+    if point.response is not None:
+        from zwidth.chart.measured.fit_check import modelled_point
+
+        point = modelled_point(point)
     if damping is not None:
         check_number("damping", damping, "N s/m")
     loop = point.loop

@@ -126,7 +126,10 @@ def simulate_contact(
       501 samples, 0.5 s
     """
     require("point", point, OperatingPoint)
-    point = point.modelled
+    if point.response is not None:
+        from zwidth.chart.measured.fit_check import modelled_point
+
+        point = modelled_point(point)
     _check_numbers(wall_position, start_position, start_velocity, duration, seed)
     parameters = parameters or {}
     if point.load is not None:

@@ -154,7 +154,7 @@ class MeasuredChart(DrawnChart):
             return [*super()._numbers(), "error              not known; nothing is said about how sure this is"]
         high = self.band.stiffness_high
         nominal = f"{self.stiffness_max_nominal:.6g} N/m as measured, at most {high:.6g} N/m"
-        return [*super()._numbers(), f"within the error   {nominal}, {self.band.meaning}"]
+        return [*super()._numbers(), f"within the error   {nominal}"]
 
 
 def measured_chart(response: Response, controller: Controller) -> MeasuredChart:

@@ -25,7 +25,8 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 POINTS: Final = 250  # frequencies to which a plant is fitted
-STEPS: Final = 25  # of the search, times its unknowns
+STEPS: Final = 300  # of the search
+CHANGE: Final = 1.5e-8  # relative, of unknowns for derivatives
 WORST: Final = 0.1  # relative misfit, beyond that of noise, from which no plant is given
 
 
@@ -197,7 +198,7 @@ def _shapes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tupl
 
 def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> ModalModel:
     """All numbers of the model by least squares."""
-    from scipy.optimize import least_squares
+    from scipy.optimize import approx_fprime, least_squares
 
     n, first = len(start.squared), int(start.free)
     m = n - first
@@ -241,8 +242,12 @@ def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool
     scale = np.maximum(np.abs(x), 1e-3 * np.max(np.abs(x)))
     if len(x) > 2 * len(data.theta) * len(data.values):
         return start
+
+    def slopes(x: Floats) -> Floats:  # by this function, since SciPy's versions count those of its own unlike
+        return np.asarray(approx_fprime(x, residual, CHANGE * scale))
+
     found = least_squares(
-        residual, x, x_scale=scale, method="lm", max_nfev=STEPS * len(x), ftol=1e-8, xtol=1e-10, gtol=1e-15
+        residual, x, slopes, x_scale=scale, method="lm", max_nfev=STEPS, ftol=1e-8, xtol=1e-10, gtol=1e-15
     )
     return unpack(found.x)
 
