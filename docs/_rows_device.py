@@ -18,6 +18,7 @@ from docs._comparison_row import (
 )
 from gallery import appendix_b
 from gallery import appendix_b_random as drawn
+from gallery import identified_five_bar as identified
 from gallery import optimal_mass as optimum
 from gallery import table_3_4 as device
 from gallery.fig_3_7_bilateral_wall import loop
@@ -261,9 +262,29 @@ def inertia() -> list[Row]:
     ]
 
 
+def identification() -> list[Row]:
+    """Table 3.3 as an identification, from deflections that are made up: the thesis's are in no scan."""
+    rows: list[Row] = []
+    for number, found in enumerate(identified.stiffnesses(), start=1):
+        for which, printed in (("largest", identified.LARGEST), ("average", identified.AVERAGE)):
+            stiffness = found[f"{which} stiffness"]
+            rows.append(
+                Number(
+                    "Table 3.3, 3.1.3",
+                    f"{which} stiffness of drive {number}, identified from deflections that are made up from the "
+                    f"printed value, with friction and noise (95 %: {stiffness.low:.4f} to {stiffness.high:.4f})",
+                    stiffness.value,
+                    "N m/rad",
+                    printed=f"{printed[number - 1]:.2f}",
+                    digits=4,
+                )
+            )
+    return rows
+
+
 def rows() -> list[Row]:
     """3.1."""
-    return [*drives(), *masses(), *frequencies()]
+    return [*drives(), *identification(), *masses(), *frequencies()]
 
 
 def appendix() -> list[Row]:

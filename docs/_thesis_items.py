@@ -32,8 +32,9 @@ NOT_COVERED = (
     ("(2.19), (2.20)", "How the generalised forces are split, and the rigid-body model with them: definitions."),
     (
         "Fig. 3.5",
-        "Torque over deflection of both drives, and with it Table 3.3 as an identification: the measured points "
-        "are not in the scan. The rows of Table 3.4 and 3.1.3 take the stiffnesses of Table 3.3 as printed.",
+        "Torque over deflection of both drives: the measured points are not in the scan. The rows on Table 3.3 "
+        "identify the stiffnesses from deflections that are made up; those of Table 3.4 and 3.1.3 take them as "
+        "printed.",
     ),
     ("Fig. 3.6", "Measured frequency responses, not in the scan."),
     (
