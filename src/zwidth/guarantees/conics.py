@@ -12,13 +12,14 @@ cut into short pieces with a quartic each. Panels start narrow across resonances
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from zwidth.guarantees.disks import Aliases, force_filter_response, one_less_z_inverse
+from zwidth.guarantees.disks import Aliases, Disks, force_filter_response, one_less_z_inverse
 from zwidth.guarantees.port import Floats, Port, port
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.loop import Loop
@@ -34,6 +35,8 @@ POINTS, PIECES, QUARTIC = 11, 8, 5
 TOLERANCE, NOISE = 1e-9, 2e-13
 # Within a resonance rounding counts more by this share of its quality.
 LIGHT = 0.1
+# Relative error of the polynomials of disks that are interpolated between measured frequencies.
+FOLLOWED = 1e-7
 # Largest number of halvings of a panel; and largest growth of their number, beyond which rounding limits them.
 HALVINGS, MOST = 24, 4
 # Disks are wide from the first share of their centre's size on; a panel of wide disks has none below the second.
@@ -81,19 +84,65 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
     at = port(loop.plant, held)
     aliases = Aliases.of(loop, at)
     singular = _singularities(loop, at)
-    ends = np.log(panel_ends(loop, at))
-    nodes = (1.0 + chebyshev.chebpts2(POINTS)) / 2.0
+
+    def functions(angles: Floats) -> tuple[Floats, Floats]:
+        values, sizes = _functions(loop, aliases, angles)
+        return values, _noise(singular, angles) * sizes
+
+    panels = _panels(functions, np.log(panel_ends(loop, at)))
+    if panels is None:
+        return None
+    left, right, values, wide = panels
+    nodes = _panel_nodes()
+    limit, below = _towards_zero(left[0] + (right[0] - left[0]) * nodes, values[0], nodes)
+    left = np.append(left[0] - np.log(2.0) * np.arange(len(below), 0, -1), left)
+    values, wide = np.concatenate([below, values]), np.append(np.ones(len(below), dtype=bool), wide)
+    return _cut(left, float(right[-1]), values, wide, limit)
+
+
+def conics_of_disks(disks: Callable[[Floats], Disks], speed: Callable[[Floats], Complexes], ends: Floats) -> Conics:
+    """The conics of disks that are known as a function of the angle, from the lowest of `ends` to the highest.
+
+    disks  the disks at angles (k,), finite
+    speed  the velocity estimate w (k,) there
+    ends   (n,) ascending angles between which the disks are smooth
+    """
+
+    def functions(angles: Floats) -> tuple[Floats, Floats]:
+        values = disk_functions(disks(angles), speed(angles))
+        return values, FOLLOWED * np.abs(values)
+
+    panels = _panels(functions, np.log(ends))
+    if panels is None:
+        raise ValueError("a disk has no finite radius; its walls must be left out before")
+    left, right, values, wide = panels
+    return _cut(left, float(right[-1]), values, wide, np.eye(6)[0])
+
+
+def _panel_nodes() -> Floats:
+    """Points of a panel as shares of its width."""
+    return np.asarray((1.0 + chebyshev.chebpts2(POINTS)) / 2.0)
+
+
+def _panels(
+    functions: Callable[[Floats], tuple[Floats, Floats]], ends: Floats
+) -> tuple[Floats, Floats, Floats, Flags] | None:
+    """Panels of log(angle) that polynomials resolve: their ends (n,), (n,), the functions at their points
+    (n, 10, POINTS), and whether they are wide (n,); None where a function is not finite.
+
+    functions  of angles (k,): the ten functions (10, k) and their errors by rounding
+    """
+    nodes = _panel_nodes()
     left, right = ends[:-1], ends[1:]
     done: list[tuple[Floats, Floats, Floats, Flags]] = []
     for halving in range(HALVINGS + 1):
         x = left[:, None] + (right - left)[:, None] * nodes
         x[:, -1] = right
-        angles = np.minimum(np.exp(x), np.pi)
-        both = _functions(loop, aliases, angles.ravel())
+        both = np.array(functions(np.minimum(np.exp(x), np.pi).ravel()))
         if not np.all(np.isfinite(both)):
             return None
         values, rounding = both.reshape(2, 10, len(left), POINTS).swapaxes(1, 2)
-        wide, good = _resolved(values, np.max(_noise(singular, angles)[:, None] * rounding, axis=-1))
+        wide, good = _resolved(values, np.max(rounding, axis=-1))
         good |= halving == HALVINGS or len(left) > MOST * len(ends)
         done.append((left[good], right[good], values[good], wide[good]))
         left, right = left[~good], right[~good]
@@ -103,13 +152,14 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
     left, right, values, wide = (np.concatenate(part) for part in zip(*done, strict=True))
     order = np.argsort(left)
-    left, right, values, wide = left[order], right[order], values[order], wide[order]
-    limit, below = _towards_zero(left[0] + (right[0] - left[0]) * nodes, values[0], nodes)
-    left = np.append(left[0] - np.log(2.0) * np.arange(len(below), 0, -1), left)
-    values, wide = np.concatenate([below, values]), np.append(np.ones(len(below), dtype=bool), wide)
-    parts = left[:, None] + np.diff(np.append(left, right[-1]))[:, None] * np.arange(PIECES) / PIECES
-    angles = np.exp(np.append(parts.ravel(), right[-1]))
-    pieces = np.einsum("mqp,nfp->nmfq", _cutting(nodes), values).reshape(-1, 10, QUARTIC)
+    return left[order], right[order], values[order], wide[order]
+
+
+def _cut(left: Floats, end: float, values: Floats, wide: Flags, limit: Floats) -> Conics:
+    """The pieces of adjoining panels that begin at log(angle) `left` (n,), the last of which ends at `end`."""
+    parts = left[:, None] + np.diff(np.append(left, end))[:, None] * np.arange(PIECES) / PIECES
+    angles = np.exp(np.append(parts.ravel(), end))
+    pieces = np.einsum("mqp,nfp->nmfq", _cutting(_panel_nodes()), values).reshape(-1, 10, QUARTIC)
     return Conics(angles, np.ascontiguousarray(pieces), np.repeat(wide, PIECES), limit)
 
 
@@ -159,17 +209,22 @@ def _functions(loop: Loop, aliases: Aliases, angles: Floats) -> Floats:
     inf where a disk has an infinite radius.
     """
     disks, w, T = aliases.disks(angles), velocity_estimate(loop, angles), loop.period
-    C, X, V = disks.centre, disks.power, w * disks.centre
-    R2 = np.maximum(disks.radius, LEAST * np.abs(C)) ** 2
-    of_H = np.array([np.ones(len(w)), 2.0 * w.real, np.abs(w) ** 2])
     # zeros of filters are exact to roundings of what the filters are given
     passed = np.maximum(np.abs(force_filter_response(loop, angles)), 1e-300)
     speed = np.maximum(np.abs(w), np.abs(one_less_z_inverse(angles)) / T)
-    size = np.sqrt(np.abs(C) ** 2 + R2) / passed
+    R2 = np.maximum(disks.radius, LEAST * np.abs(disks.centre)) ** 2
+    size = np.sqrt(np.abs(disks.centre) ** 2 + R2) / passed
     linear = np.array([size, speed * size])
     square = np.array([size**2, speed * size**2, (speed * size) ** 2])
-    values = np.concatenate([[C.real, V.real, C.imag, V.imag], of_H * X, of_H * R2])
-    return np.array([values, np.concatenate([linear, linear, square, square])])
+    return np.array([disk_functions(disks, w), np.concatenate([linear, linear, square, square])])
+
+
+def disk_functions(disks: Disks, w: Complexes) -> Floats:
+    """The ten functions (10, k) of disks (k,) with a velocity estimate w (k,)."""
+    C, X, V = disks.centre, disks.power, w * disks.centre
+    R2 = np.maximum(disks.radius, LEAST * np.abs(C)) ** 2
+    of_H = np.array([np.ones(len(w)), 2.0 * w.real, np.abs(w) ** 2])
+    return np.concatenate([[C.real, V.real, C.imag, V.imag], of_H * X, of_H * R2])
 
 
 def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:

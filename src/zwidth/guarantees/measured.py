@@ -5,14 +5,14 @@ At each measured frequency the sampled response with any passive operator fills 
     centre  P - sum_k q_k,    radius  sum_k |q_k|,    q = G_eh W G_ha jw/(2 Re(jw G_hh))
 
 q_0 is made of the data, the q_k of the frequencies that look alike of the fitted modes. The wall is passive where
-it keeps clear of the disk at every measured frequency (see `gauge`); between them nothing is computed. The power
-that the handle takes in, Re(jw G_hh), is small against jw G_hh itself: where the measurement's error hides it,
+it keeps clear of every disk (see `gauge`): between measured frequencies they are interpolated, and made larger by
+what that may miss (see `between_frequencies`). The power that the handle takes in, Re(jw G_hh), is small against jw G_hh itself: where the measurement's error hides it,
 nothing is promised.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.guarantees.between_frequencies import disks_between
+from zwidth.guarantees.conics import conics_of_disks
+from zwidth.guarantees.disks import Disks
+from zwidth.guarantees.gauge import Gauge
 from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
+from zwidth.guarantees.passive import passive_region_of
 from zwidth.guarantees.region import Region, empty_region
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
@@ -29,33 +34,22 @@ from zwidth.loop.operating_point import OperatingPoint
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
 
 FAR: Final = 1000  # aliases to either side
 SURE: Final = 1.96  # standard deviations of the dissipation that are taken off
-DIRECTIONS: Final = 1440  # of rays in the plane of walls
-SHORT: Final = 1e-9  # a stiffness below this share of the largest counts as 0
+SCALES: Final = 4  # sizes of 1/H that are tried, and the factor within which the last is that of the stiffest wall
+ALIKE: Final = 2.0
 ONLY_MODEL: Final = (
     "this takes the chart of every spring, which needs a model; attach springs to the response as an [operator]"
 )
-NO_PASSIVE: Final = "no wall with K > 0 and B >= 0 is stable with every passive operator"
 
 
-@dataclass(frozen=True)
-class MeasuredDisks:
-    """Disks |P - centre| <= radius at angles (k,), force filter and software's delay included.
+def measured_disks(port: MeasuredPort, passed: Complexes) -> tuple[Disks, Flags]:
+    """The disks of a measured port at its angles (n,), and where the error hides the power that the handle takes in.
 
-    hidden  (k,) whether the error hides the power that the handle takes in
+    passed  what the computer adds to P there (n,): force filter and software's delay
     """
-
-    angles: Floats
-    centre: Complexes
-    radius: Floats
-    power: Floats
-    hidden: NDArray[np.bool_]
-
-
-def measured_disks(port: MeasuredPort, passed: Complexes) -> MeasuredDisks:
-    """The disks of a measured port at its angles (n,). passed: what the computer adds to P there (n,)."""
     theta = port.theta
     jw = 1j * theta / port.period
     base = port.baseband
@@ -72,7 +66,7 @@ def measured_disks(port: MeasuredPort, passed: Complexes) -> MeasuredDisks:
         # |p - q + c|^2 - (|q| + r)^2 without the cancellation of |q|^2
         power = np.abs(p) ** 2 - 2.0 * np.real(p * q.conj()) + 2.0 * np.real((p - q) * c.conj())
         power = size**2 * (power - 2.0 * np.abs(q) * reach + np.abs(c) ** 2 - reach**2)
-    return MeasuredDisks(theta, centre, radius, power, hidden)
+    return Disks(theta, centre, radius, power), hidden
 
 
 def _own(port: MeasuredPort, name: str) -> Complexes:
@@ -98,33 +92,25 @@ def _beyond(port: MeasuredPort) -> tuple[Complexes, Floats]:
     return total, size
 
 
-def _largest_mu(disks: MeasuredDisks, K: Floats, B: Floats, speed: Complexes) -> Floats:
-    """mu (k,) of walls K, B (k,): 1/mu is the factor at which each fails first."""
-    mu = np.zeros(len(K))
-    for i in range(len(disks.angles)):
-        H = K + B * speed[i]
-        if not np.isfinite(disks.radius[i]):
-            mu[H != 0.0] = np.inf
-            continue
-        a, b = np.real(H * disks.centre[i]), np.abs(H) ** 2 * disks.power[i]
-        D = np.abs(H) ** 2 * disks.radius[i] ** 2 - np.imag(H * disks.centre[i]) ** 2
-        root = np.sqrt(np.maximum(D, 0.0))
-        own = np.where(a > 0.0, -b / np.maximum(a + root, 1e-300), root - a)
-        mu = np.maximum(mu, np.where((D >= 0.0) & (own > 0.0), own, 0.0))
-    return mu
+def _softest_spring(disks: Disks) -> float:
+    """1/K of the softest spring that fails at a measured angle; where none fails, the size of the disks."""
+    across = disks.radius**2 - disks.centre.imag**2
+    mu = np.where(across >= 0.0, np.sqrt(np.maximum(across, 0.0)) - disks.centre.real, 0.0)
+    largest = float(np.max(mu))
+    return largest if largest > 0.0 else float(np.median(np.abs(disks.centre) + disks.radius))
 
 
 def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
-    """The walls that keep clear of every passive operator at all measured frequencies."""
+    """The walls that keep clear of every passive operator."""
     inner = port.theta < np.pi * (1.0 - 1e-9)
     for source in set(port.origin.values()):
         inner &= np.isfinite(port.deviations[source])
     force = force_filter(loop.controller)
     z, d = np.exp(1j * port.theta), np.expm1(1j * port.theta)
     passed = factor_response(force.numerator, force.denominator, d) * z ** -round(loop.controller.delay)
-    disks = measured_disks(port, np.asarray(passed))
+    disks, hidden = measured_disks(port, np.asarray(passed))
     frequency = port.theta / (2.0 * np.pi * port.period)
-    lost = inner & disks.hidden
+    lost = inner & hidden
     if np.any(lost):
         at = np.flatnonzero(lost)
         stretch = f"{frequency[at[0]]:.4g} to {frequency[at[-1]]:.4g} Hz"
@@ -139,29 +125,24 @@ def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
             "this is not known: the fitted modes, which continue the device beyond half the sampling rate, do not "
             "all take in power there"
         )
-    kept = MeasuredDisks(
-        *(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power", "hidden"))
+    kept = Disks(*(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power")))
+    scale = _softest_spring(kept)
+    for _ in range(SCALES):
+        between = disks_between(kept, scale)
+        if between is None:
+            return empty_region("this is not known: the handle is known at too few frequencies")
+        # a negative spring shows at frequencies below all that were measured: none is promised
+        found = Gauge(conics_of_disks(between.disks, loop.w, between.ends), (np.inf, np.inf))
+        region = passive_region_of(found, port.period)
+        stiffness = region.stiffness_max
+        if not stiffness > 0.0 or 1.0 / ALIKE < stiffness * scale < ALIKE:
+            break
+        scale = 1.0 / stiffness
+    warning = (
+        f"from {np.count_nonzero(inner)} measured frequencies, interpolated, with twice the error of that taken "
+        f"off; below {frequency[inner][0]:.4g} Hz continued"
     )
-    speed, T = loop.w(kept.angles), port.period
-
-    def ends(directions: Floats) -> tuple[Floats, Floats]:
-        K, B = np.cos(directions) / T, np.sin(directions)
-        reach = 1.0 / np.maximum(_largest_mu(kept, K, B, speed), 1e-300)
-        return K * reach, B * reach
-
-    directions = np.linspace(-np.pi, np.pi, DIRECTIONS + 1)
-    K, B = ends(directions)
-    ring = np.column_stack([K, B])
-    usable = (directions >= 0.0) & (directions < 0.5 * np.pi) & (SHORT * np.max(np.abs(K)) < K)
-    if not usable.any():
-        return Region((ring,), float("nan"), float("nan"), NO_PASSIVE)
-    best = int(np.argmax(np.where(usable, K, -np.inf)))
-    low, high = max(directions[best - 1], 0.0), min(directions[best + 1], 0.5 * np.pi)
-    closer = np.linspace(low, high, 401)
-    Kc, Bc = ends(closer)
-    top = int(np.argmax(Kc))
-    warning = f"at {len(kept.angles)} measured frequencies; between them the condition is not computed"
-    return Region((ring,), float(Kc[top]), float(Bc[top]), None, warning)
+    return replace(region, warning=warning)
 
 
 def measured_guarantees(point: OperatingPoint) -> Guarantees:

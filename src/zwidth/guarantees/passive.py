@@ -64,19 +64,24 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     loop_gauge = gauge(loop, held)
     if loop_gauge.conics is None and loop.has_fixed_feedback:
         return empty_region(ACTIVE)
-    directions, ends = _outline(loop_gauge, loop.period)
+    return passive_region_of(loop_gauge, loop.period)
+
+
+def passive_region_of(passive_gauge: Gauge, period: float) -> Region:
+    """The walls below 1 by a gauge, with a sampling period [s]."""
+    directions, ends = _outline(passive_gauge, period)
     if not np.any(ends):
         return empty_region(NOTHING)
     corners = np.append(ends[:1], ends[1:][ends[1:] != ends[:-1]])
-    ring = np.column_stack([corners.real / loop.period, corners.imag])
+    ring = np.column_stack([corners.real / period, corners.imag])
     ring = np.vstack([ring, ring[:1]])
-    K = ends.real / loop.period
+    K = ends.real / period
     usable = (directions >= 0.0) & (directions < np.pi / 2.0) & (SHORT * np.max(np.abs(K)) < K)
     if not usable.any():
         return Region((ring,), float("nan"), float("nan"), NO_SPRING)
     best = int(np.argmax(np.where(usable, K, -np.inf)))
     low, high = max(directions[best - 1], 0.0), min(directions[best + 1], np.pi / 2.0)
-    return Region((ring,), *_stiffest(loop_gauge, loop.period, low, high))
+    return Region((ring,), *_stiffest(passive_gauge, period, low, high))
 
 
 def feedback_obstacle(loop: Loop) -> str:

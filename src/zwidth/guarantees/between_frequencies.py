@@ -1,0 +1,212 @@
+"""Disks of passive operators between measured frequencies: interpolated, and made larger by what that may miss.
+
+A wall H = K + B w fails at an angle if P = -1/H lies within the disk |P - C| <= R there,
+
+    n0 |p|^2 - 2 Re(p conj n1) + n2 <= 0,     (n0, n1, n2) ~ (s^2, s C, |C|^2 - R^2),  p = P/s
+
+of unit length, s the size of 1/H. These numbers stay smooth where centre and radius run away together to half
+planes. Cubics through four neighbours interpolate them. The error of that is the divided difference of five
+neighbours times the distances to the four, and twice as much is allowed for, as in charts of responses. Errors
+e0, e1, e2 leave a disk again, a larger one: since 2 |p| <= t |p|^2 + 1/t for every t > 0,
+
+    n0 - e0 - t e1,   n1,   n2 - e2 - e1/t
+
+Of a small disk far from 0 the radius is the small difference of these: there C is interpolated itself, or 1/C or
+log C, and R/|C| beside it, and the errors of both add to R. Each interval takes what makes its disks less larger.
+Both are mirrored at the angles 0 and pi, as every response is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.guarantees.disks import Disks
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
+MIRRORED: Final = 3  # angles repeated beyond either end
+FEWEST: Final = 6  # angles
+PAIR: Final = 0.05  # of both gaps beside it, below which a gap is that of two angles which count as one
+BELOW: Final = 1.0 / 64.0  # of the lowest angle: how far down the disks are followed
+KEPT: Final = 0.25  # share of n0 that each error may take off it at most; the rest comes off n2
+SOFTEST: Final = 3.0  # |p| up to which that is enough: walls of a third of 1/s
+MOST: Final = 20.0  # factor by which an error grows through an inverse at most; a larger one is never used
+ROUNDING: Final = 1e-13  # relative error of measured numbers themselves
+
+
+@dataclass(frozen=True)
+class CubicPieces:
+    """Cubics through four neighbouring nodes each, one for every interval between nodes.
+
+    nodes   (n,)       ascending
+    values  (m, n)     of m functions
+    fifth   (m, n - 1) size of the divided differences of five nodes round each interval
+    """
+
+    nodes: Floats
+    values: Complexes
+    fifth: Floats
+
+    @classmethod
+    def through(cls, nodes: Floats, values: Complexes) -> CubicPieces:
+        """The cubics through values (m, n) at nodes (n,)."""
+        window = np.arange(len(nodes) - 4)[:, None] + np.arange(5)
+        apart = nodes[window][:, :, None] - nodes[window][:, None, :] + np.eye(5)
+        fifth = np.abs(np.sum(values[:, window] / np.prod(apart, axis=2), axis=2))
+        # the largest of the windows that begin one to four nodes before an interval's left end
+        first = np.arange(len(nodes) - 1)[:, None] - np.arange(4)
+        return cls(nodes, values, fifth[:, np.clip(first, 0, len(window) - 1)].max(axis=2))
+
+    def interval(self, at: Floats) -> NDArray[np.int64]:
+        """Number (k,) of the interval that holds each of several places (k,)."""
+        return np.clip(np.searchsorted(self.nodes, at, side="right") - 1, 0, len(self.nodes) - 2)
+
+    def at(self, at: Floats) -> tuple[Complexes, Floats]:
+        """Values and the errors to be allowed for, (m, k) each, at places (k,)."""
+        i = self.interval(at)
+        window = np.clip(i - 1, 0, len(self.nodes) - 4)[:, None] + np.arange(4)
+        x = self.nodes[window]
+        away = at[:, None] - x
+        weights = np.array(
+            [np.prod(np.delete(away, j, 1) / np.delete(x[:, [j]] - x, j, 1), axis=1) for j in range(4)]
+        )
+        missed = self.fifth[:, i] * np.abs(np.prod(away, axis=1))
+        return np.einsum("jk,mkj->mk", weights, self.values[:, window]), BETWEEN * missed
+
+
+@dataclass(frozen=True)
+class DisksBetween:
+    """Disks between measured angles, which hold the true ones.
+
+    angles   (k,)  those measured
+    scale    s, a stiffness's inverse [m/N]
+    forms    n0, n1, n2
+    centres  C/s, s/C and log C/s, by three cubics each
+    ratio    R/|C|
+    kind     (n - 1,) per interval of the nodes: 0 to 2 for `centres`, 3 for `forms`
+    """
+
+    angles: Floats
+    scale: float
+    forms: CubicPieces
+    centres: CubicPieces
+    ratio: CubicPieces
+    kind: NDArray[np.int64]
+
+    @property
+    def ends(self) -> Floats:
+        """Ascending angles between which the disks are smooth, from below the lowest measured one to pi."""
+        below = self.angles[0] * np.geomspace(BELOW, 0.5, 6)
+        return np.concatenate([below, self.angles, [np.pi]])
+
+    def disks(self, angles: Floats) -> Disks:
+        """The disks at angles (n,) in (0, pi]."""
+        kind = self.kind[self.forms.interval(angles)]
+        C, X = self._by_forms(angles)
+        for k in range(3):
+            own = kind == k
+            if np.any(own):
+                C[own], X[own] = self._by_centres(angles[own], k)
+        radius = np.sqrt(np.maximum(np.abs(C) ** 2 - X, 0.0))
+        return Disks(angles, self.scale * C, self.scale * radius, self.scale**2 * X)
+
+    def _by_forms(self, angles: Floats) -> tuple[Complexes, Floats]:
+        """C/s and (|C|^2 - R^2)/s^2 (n,) by n0, n1, n2."""
+        (n0, n1, n2), (e0, e1, e2) = self.forms.at(angles)
+        return _larger(n0.real, n1, n2.real, e0, e1, e2)
+
+    def _by_centres(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
+        """C/s and (|C|^2 - R^2)/s^2 (n,) by C itself, its inverse or its logarithm."""
+        values, errors = self.centres.at(angles)
+        C, error = _centre(values[kind], errors[kind], kind)
+        (ratio,), (missed,) = self.ratio.at(angles)
+        R = np.maximum(ratio.real, 0.0) + missed + (1.0 + np.abs(ratio)) * error
+        return C, np.abs(C) ** 2 * (1.0 - R**2)
+
+
+def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floats]:
+    """C/s (n,) and its relative error from what was interpolated."""
+    if kind == 2:
+        return np.exp(value), np.expm1(np.minimum(error, MOST))
+    share = error / np.maximum(np.abs(value), 1e-300)
+    if kind == 0:
+        return value, share
+    return 1.0 / np.where(value == 0.0, 1e-300, value), share / (1.0 - np.minimum(share, 1.0 - 1.0 / MOST))
+
+
+def _larger(
+    n0: Floats, n1: Complexes, n2: Floats, e0: Floats, e1: Floats, e2: Floats
+) -> tuple[Complexes, Floats]:
+    """Centre and |centre|^2 - radius^2 (n,) of disks that hold all those of these errors."""
+    low = np.maximum(n0, ROUNDING)
+    e0, e1 = e0 + (low - n0), e1 + ROUNDING
+    taken = np.minimum(e0, KEPT * low)
+    t = np.minimum(1.0, KEPT * low / e1)
+    own = low - taken - t * e1
+    return n1 / own, (n2 - e2 - e1 / t - SOFTEST**2 * (e0 - taken)) / own
+
+
+def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
+    """The disks between measured ones; None for too few of them.
+
+    disks  at ascending angles (k,), finite
+    scale  1/|H| of the walls that matter [m/N]
+    """
+    keep = _kept(disks.angles)
+    theta, C = disks.angles[keep], disks.centre[keep] / scale
+    R, X = disks.radius[keep] / scale, disks.power[keep] / scale**2
+    if len(theta) < FEWEST:
+        return None
+    form = np.array([np.ones(len(C)), C, X])
+    form = form / np.sqrt(1.0 + 2.0 * np.abs(C) ** 2 + X**2)
+    nodes = _mirrored_angles(theta)
+    even, odd = (CubicPieces.through(nodes, _mirrored(form, sign)) for sign in (1.0, -1.0))
+    forms = min(even, odd, key=lambda one: float(np.max(one.fifth[:, MIRRORED - 1])))
+    size = np.maximum(np.abs(C), 1e-300)
+    inner = _mirrored(np.array([C]), 1.0)[0]
+    inner = np.where(np.abs(inner) > 0.0, inner, 1e-300)
+    log = np.log(np.abs(inner)) + 1j * np.unwrap(np.angle(inner))
+    centres = CubicPieces.through(nodes, np.array([inner, 1.0 / inner, log]))
+    ratio = CubicPieces.through(nodes, _mirrored(np.array([R / size + 0j]), 1.0))
+    return DisksBetween(theta, scale, forms, centres, ratio, _best_kind(nodes, forms, centres, ratio))
+
+
+def _best_kind(nodes: Floats, forms: CubicPieces, centres: CubicPieces, ratio: CubicPieces) -> NDArray[np.int64]:
+    """Which interpolation (n - 1,) makes the disks least larger in the middle of each interval."""
+    middle = 0.5 * (nodes[1:] + nodes[:-1])
+    (n0, n1, n2), (e0, e1, e2) = forms.at(middle)
+    low = np.maximum(n0.real, ROUNDING)
+    r = np.sqrt(np.maximum(np.abs(n1) ** 2 - low * n2.real, 0.0))
+    own = e0 + 2.0 * e1 + e2
+    growth = [own / (np.sqrt(r**2 + low * own) + r + 1e-300)]
+    values, errors = centres.at(middle)
+    (share,), (missed,) = ratio.at(middle)
+    for kind in range(3):
+        C, error = _centre(values[kind], errors[kind], kind)
+        growth.insert(kind, np.abs(C) * (missed + (1.0 + np.abs(share)) * error))
+    return np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0)
+
+
+def _kept(angles: Floats) -> NDArray[np.bool_]:
+    """Which angles (k,) are nodes: of two that all but coincide among more distant ones the second is none."""
+    gaps = np.diff(np.concatenate([-angles[:1], angles, 2.0 * np.pi - angles[-1:]]))
+    pair = (gaps[1:-1] < PAIR * gaps[:-2]) & (gaps[1:-1] < PAIR * gaps[2:])
+    keep = np.append(True, ~pair)
+    keep[-1] &= gaps[-1] >= PAIR * gaps[-2]
+    return keep
+
+
+def _mirrored_angles(angles: Floats) -> Floats:
+    return np.concatenate([-angles[MIRRORED - 1 :: -1], angles, 2.0 * np.pi - angles[: -MIRRORED - 1 : -1]])
+
+
+def _mirrored(values: Complexes, sign: float) -> Complexes:
+    """Values (m, n) with their mirror images; sign -1: those below 0 with the other sign."""
+    low, high = values[:, MIRRORED - 1 :: -1], values[:, : -MIRRORED - 1 : -1]
+    return np.concatenate([sign * low.conj(), values, high.conj()], axis=1)
