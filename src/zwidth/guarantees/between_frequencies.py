@@ -4,14 +4,15 @@ A wall H = K + B w fails at an angle if P = -1/H lies within the disk |P - C| <=
 
     n0 |p|^2 - 2 Re(p conj n1) + n2 <= 0,     (n0, n1, n2) ~ (s^2, s C, |C|^2 - R^2),  p = P/s
 
-of unit length, s the size of 1/H. These numbers stay smooth where centre and radius run away together to half
+best scaled to unit length, s the size of 1/H. These numbers stay smooth where centre and radius run away together to half
 planes. Cubics through four neighbours interpolate them. The error of that is the divided difference of five
 neighbours times the distances to the four, and twice as much is allowed for, as in charts of responses. Errors
 e0, e1, e2 leave a disk again, a larger one: since 2 |p| <= t |p|^2 + 1/t for every t > 0,
 
     n0 - e0 - t e1,   n1,   n2 - e2 - e1/t
 
-Of a small disk far from 0 the radius is the small difference of these: there C is interpolated itself, or 1/C or
+At low frequency C grows like 1/theta or 1/theta^2 where the device is free: there (1, C/s, ..) times sin(theta/2)
+or its square is interpolated instead of the numbers of unit length, and where C is smooth itself, that. Of a small disk far from 0 the radius is the small difference of these: there C is interpolated itself, or 1/C or
 log C, and R/|C| beside it, and the errors of both add to R. Each interval takes what makes its disks less larger.
 Both are mirrored at the angles 0 and pi, as every response is.
 """
@@ -30,6 +31,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
+CENTRES: Final = 3  # kinds of interpolated centres
 MIRRORED: Final = 3  # angles repeated beyond either end
 FEWEST: Final = 6  # angles
 PAIR: Final = 0.05  # of both gaps beside it, below which a gap is that of two angles which count as one
@@ -86,17 +88,17 @@ class DisksBetween:
 
     angles   (k,)  those measured
     scale    s, a stiffness's inverse [m/N]
-    forms    n0, n1, n2
-    centres  C/s, s/C and log C/s, by three cubics each
+    centres  C/s, s/C and log C/s
     ratio    R/|C|
-    kind     (n - 1,) per interval of the nodes: 0 to 2 for `centres`, 3 for `forms`
+    forms    n0, n1, n2 in several scalings
+    kind     (n - 1,) per interval of the nodes: 0 to 2 for `centres`, from 3 for `forms`
     """
 
     angles: Floats
     scale: float
-    forms: CubicPieces
     centres: CubicPieces
     ratio: CubicPieces
+    forms: tuple[CubicPieces, ...]
     kind: NDArray[np.int64]
 
     @property
@@ -107,18 +109,18 @@ class DisksBetween:
 
     def disks(self, angles: Floats) -> Disks:
         """The disks at angles (n,) in (0, pi]."""
-        kind = self.kind[self.forms.interval(angles)]
-        C, X = self._by_forms(angles)
-        for k in range(3):
+        kind = self.kind[self.ratio.interval(angles)]
+        C, X = np.zeros(len(angles), dtype=complex), np.zeros(len(angles))
+        for k in range(CENTRES + len(self.forms)):
             own = kind == k
             if np.any(own):
-                C[own], X[own] = self._by_centres(angles[own], k)
+                C[own], X[own] = self._by_centres(angles[own], k) if k < CENTRES else self._by_forms(angles[own], k)
         radius = np.sqrt(np.maximum(np.abs(C) ** 2 - X, 0.0))
         return Disks(angles, self.scale * C, self.scale * radius, self.scale**2 * X)
 
-    def _by_forms(self, angles: Floats) -> tuple[Complexes, Floats]:
+    def _by_forms(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (n,) by n0, n1, n2."""
-        (n0, n1, n2), (e0, e1, e2) = self.forms.at(angles)
+        (n0, n1, n2), (e0, e1, e2) = self.forms[kind - CENTRES].at(angles)
         return _larger(n0.real, n1, n2.real, e0, e1, e2)
 
     def _by_centres(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
@@ -163,33 +165,37 @@ def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
     R, X = disks.radius[keep] / scale, disks.power[keep] / scale**2
     if len(theta) < FEWEST:
         return None
-    form = np.array([np.ones(len(C)), C, X])
-    form = form / np.sqrt(1.0 + 2.0 * np.abs(C) ** 2 + X**2)
-    nodes = _mirrored_angles(theta)
-    even, odd = (CubicPieces.through(nodes, _mirrored(form, sign)) for sign in (1.0, -1.0))
-    forms = min(even, odd, key=lambda one: float(np.max(one.fifth[:, MIRRORED - 1])))
+    nodes, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C, X])
+    length, small = np.sqrt(1.0 + 2.0 * np.abs(C) ** 2 + X**2), np.sin(theta / 2.0)
+    scalings = [(1.0 / length, 1.0), (1.0 / length, -1.0), (small**0, 1.0), (small, -1.0), (small**2, 1.0)]
+    forms = tuple(CubicPieces.through(nodes, _mirrored(form * scaling, sign)) for scaling, sign in scalings)
     size = np.maximum(np.abs(C), 1e-300)
     inner = _mirrored(np.array([C]), 1.0)[0]
     inner = np.where(np.abs(inner) > 0.0, inner, 1e-300)
     log = np.log(np.abs(inner)) + 1j * np.unwrap(np.angle(inner))
     centres = CubicPieces.through(nodes, np.array([inner, 1.0 / inner, log]))
     ratio = CubicPieces.through(nodes, _mirrored(np.array([R / size + 0j]), 1.0))
-    return DisksBetween(theta, scale, forms, centres, ratio, _best_kind(nodes, forms, centres, ratio))
+    return DisksBetween(theta, scale, centres, ratio, forms, _best_kind(nodes, centres, ratio, forms))
 
 
-def _best_kind(nodes: Floats, forms: CubicPieces, centres: CubicPieces, ratio: CubicPieces) -> NDArray[np.int64]:
-    """Which interpolation (n - 1,) makes the disks least larger in the middle of each interval."""
+def _best_kind(
+    nodes: Floats, centres: CubicPieces, ratio: CubicPieces, forms: tuple[CubicPieces, ...]
+) -> NDArray[np.int64]:
+    """Which interpolation (n - 1,) makes the disks least larger, near |p| = 1, in the middle of each interval."""
     middle = 0.5 * (nodes[1:] + nodes[:-1])
-    (n0, n1, n2), (e0, e1, e2) = forms.at(middle)
-    low = np.maximum(n0.real, ROUNDING)
-    r = np.sqrt(np.maximum(np.abs(n1) ** 2 - low * n2.real, 0.0))
-    own = e0 + 2.0 * e1 + e2
-    growth = [own / (np.sqrt(r**2 + low * own) + r + 1e-300)]
+    middle[MIRRORED - 1] = 0.5 * nodes[MIRRORED]  # of the stretch down to 0 itself
+    growth = []
     values, errors = centres.at(middle)
     (share,), (missed,) = ratio.at(middle)
-    for kind in range(3):
+    for kind in range(CENTRES):
         C, error = _centre(values[kind], errors[kind], kind)
-        growth.insert(kind, np.abs(C) * (missed + (1.0 + np.abs(share)) * error))
+        growth.append(np.abs(C) * (missed + (1.0 + np.abs(share)) * error))
+    for one in forms:
+        (n0, n1, n2), (e0, e1, e2) = one.at(middle)
+        low = np.maximum(n0.real, ROUNDING)
+        r = np.sqrt(np.maximum(np.abs(n1) ** 2 - low * n2.real, 0.0))
+        own = e0 + 2.0 * e1 + e2
+        growth.append(own / (np.sqrt(r**2 + low * own) + r + 1e-300))
     return np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0)
 
 
