@@ -20,6 +20,7 @@ Both are mirrored at the angles 0 and pi, as every response is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -31,6 +32,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
+FORM_SIGNS: Final = np.array([1.0, 1.0, -1.0, 1.0])  # of n0, Re n1, Im n1, n2 at mirrored angles
 CENTRES: Final = 3  # kinds of interpolated centres
 MIRRORED: Final = 3  # angles repeated beyond either end
 FEWEST: Final = 6  # angles
@@ -49,21 +51,24 @@ class CubicPieces:
     nodes   (n,)       ascending
     values  (m, n)     of m functions
     fifth   (m, n - 1) size of the divided differences of five nodes round each interval
+    odd     (m,)       whether a function is odd: next to 0 its error is, too
     """
 
     nodes: Floats
     values: Complexes
     fifth: Floats
+    odd: NDArray[np.bool_]
 
     @classmethod
-    def through(cls, nodes: Floats, values: Complexes) -> CubicPieces:
-        """The cubics through values (m, n) at nodes (n,)."""
+    def through(cls, nodes: Floats, values: Complexes, signs: Floats) -> CubicPieces:
+        """The cubics through values (m, n) at nodes (n,); signs (m,) -1 of odd functions."""
         window = np.arange(len(nodes) - 4)[:, None] + np.arange(5)
         apart = nodes[window][:, :, None] - nodes[window][:, None, :] + np.eye(5)
         fifth = np.abs(np.sum(values[:, window] / np.prod(apart, axis=2), axis=2))
         # the largest of the windows that begin one to four nodes before an interval's left end
         first = np.arange(len(nodes) - 1)[:, None] - np.arange(4)
-        return cls(nodes, values, fifth[:, np.clip(first, 0, len(window) - 1)].max(axis=2))
+        fifth = fifth[:, np.clip(first, 0, len(window) - 1)].max(axis=2)
+        return cls(nodes, values, fifth, signs < 0.0)
 
     def interval(self, at: Floats) -> NDArray[np.int64]:
         """Number (k,) of the interval that holds each of several places (k,)."""
@@ -79,7 +84,51 @@ class CubicPieces:
             [np.prod(np.delete(away, j, 1) / np.delete(x[:, [j]] - x, j, 1), axis=1) for j in range(4)]
         )
         missed = self.fifth[:, i] * np.abs(np.prod(away, axis=1))
+        near = np.minimum(np.abs(at) / self.nodes[MIRRORED], 1.0)
+        missed = missed * np.where(self.odd[:, None], near, 1.0)
         return np.einsum("jk,mkj->mk", weights, self.values[:, window]), BETWEEN * missed
+
+
+@dataclass(frozen=True)
+class Form:
+    """Numbers n0, n1, n2 (k,) of disks, and their errors e0, e1, e2 (k,)."""
+
+    n0: Floats
+    n1: Complexes
+    n2: Floats
+    e0: Floats
+    e1: Floats
+    e2: Floats
+
+    @classmethod
+    def at(cls, pieces: CubicPieces, angles: Floats) -> Form:
+        """The numbers at angles (k,), of cubics through n0, Re n1, Im n1 and n2."""
+        (n0, real, imag, n2), (e0, e_real, e_imag, e2) = pieces.at(angles)
+        low = np.maximum(n0.real, ROUNDING)
+        return cls(low, real + 1j * imag, n2.real, e0 + (low - n0.real), np.hypot(e_real, e_imag) + ROUNDING, e2)
+
+    @cached_property
+    def radius(self) -> Floats:
+        """n0 R/s (k,)."""
+        return np.sqrt(np.maximum(np.abs(self.n1) ** 2 - self.n0 * self.n2, 0.0))
+
+    @cached_property
+    def nearest(self) -> Floats:
+        """|p| (k,) of the point of each disk nearest to 0, or 1 where that is larger: where it has to be exact."""
+        return np.maximum(self.n2 / (np.abs(self.n1) + self.radius + 1e-300), 1.0)
+
+    def growth(self) -> Floats:
+        """By how much (k,) the errors move the edge of a disk at `nearest`, over s."""
+        own = self.e0 * self.nearest**2 + 2.0 * self.e1 * self.nearest + self.e2
+        return np.asarray(own / (np.sqrt(self.radius**2 + self.n0 * own) + self.radius + 1e-300))
+
+    def larger(self) -> tuple[Complexes, Floats]:
+        """C/s and (|C|^2 - R^2)/s^2 (k,) of disks that hold all those of these errors."""
+        taken = np.minimum(self.e0, KEPT * self.n0)
+        t = np.minimum(1.0 / self.nearest, KEPT * self.n0 / self.e1)
+        own = self.n0 - taken - t * self.e1
+        rest = (SOFTEST * self.nearest) ** 2 * (self.e0 - taken)
+        return self.n1 / own, (self.n2 - self.e2 - self.e1 / t - rest) / own
 
 
 @dataclass(frozen=True)
@@ -114,14 +163,15 @@ class DisksBetween:
         for k in range(CENTRES + len(self.forms)):
             own = kind == k
             if np.any(own):
-                C[own], X[own] = self._by_centres(angles[own], k) if k < CENTRES else self._by_forms(angles[own], k)
+                C[own], X[own] = (
+                    self._by_centres(angles[own], k) if k < CENTRES else self._by_forms(angles[own], k)
+                )
         radius = np.sqrt(np.maximum(np.abs(C) ** 2 - X, 0.0))
         return Disks(angles, self.scale * C, self.scale * radius, self.scale**2 * X)
 
     def _by_forms(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (n,) by n0, n1, n2."""
-        (n0, n1, n2), (e0, e1, e2) = self.forms[kind - CENTRES].at(angles)
-        return _larger(n0.real, n1, n2.real, e0, e1, e2)
+        return Form.at(self.forms[kind - CENTRES], angles).larger()
 
     def _by_centres(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (n,) by C itself, its inverse or its logarithm."""
@@ -142,18 +192,6 @@ def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floa
     return 1.0 / np.where(value == 0.0, 1e-300, value), share / (1.0 - np.minimum(share, 1.0 - 1.0 / MOST))
 
 
-def _larger(
-    n0: Floats, n1: Complexes, n2: Floats, e0: Floats, e1: Floats, e2: Floats
-) -> tuple[Complexes, Floats]:
-    """Centre and |centre|^2 - radius^2 (n,) of disks that hold all those of these errors."""
-    low = np.maximum(n0, ROUNDING)
-    e0, e1 = e0 + (low - n0), e1 + ROUNDING
-    taken = np.minimum(e0, KEPT * low)
-    t = np.minimum(1.0, KEPT * low / e1)
-    own = low - taken - t * e1
-    return n1 / own, (n2 - e2 - e1 / t - SOFTEST**2 * (e0 - taken)) / own
-
-
 def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
     """The disks between measured ones; None for too few of them.
 
@@ -165,16 +203,14 @@ def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
     R, X = disks.radius[keep] / scale, disks.power[keep] / scale**2
     if len(theta) < FEWEST:
         return None
-    nodes, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C, X])
+    nodes, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C.real, C.imag, X])
     length, small = np.sqrt(1.0 + 2.0 * np.abs(C) ** 2 + X**2), np.sin(theta / 2.0)
     scalings = [(1.0 / length, 1.0), (1.0 / length, -1.0), (small**0, 1.0), (small, -1.0), (small**2, 1.0)]
-    forms = tuple(CubicPieces.through(nodes, _mirrored(form * scaling, sign)) for scaling, sign in scalings)
+    forms = tuple(_pieces(nodes, form * scaling, sign * FORM_SIGNS) for scaling, sign in scalings)
     size = np.maximum(np.abs(C), 1e-300)
-    inner = _mirrored(np.array([C]), 1.0)[0]
-    inner = np.where(np.abs(inner) > 0.0, inner, 1e-300)
-    log = np.log(np.abs(inner)) + 1j * np.unwrap(np.angle(inner))
-    centres = CubicPieces.through(nodes, np.array([inner, 1.0 / inner, log]))
-    ratio = CubicPieces.through(nodes, _mirrored(np.array([R / size + 0j]), 1.0))
+    phase = np.unwrap(np.angle(np.where(C == 0.0, 1e-300, C)))
+    centres = _pieces(nodes, np.array([C, 1.0 / np.where(C == 0.0, 1e-300, C), np.log(size) + 1j * phase]))
+    ratio = _pieces(nodes, np.array([R / size + 0j]))
     return DisksBetween(theta, scale, centres, ratio, forms, _best_kind(nodes, centres, ratio, forms))
 
 
@@ -190,12 +226,7 @@ def _best_kind(
     for kind in range(CENTRES):
         C, error = _centre(values[kind], errors[kind], kind)
         growth.append(np.abs(C) * (missed + (1.0 + np.abs(share)) * error))
-    for one in forms:
-        (n0, n1, n2), (e0, e1, e2) = one.at(middle)
-        low = np.maximum(n0.real, ROUNDING)
-        r = np.sqrt(np.maximum(np.abs(n1) ** 2 - low * n2.real, 0.0))
-        own = e0 + 2.0 * e1 + e2
-        growth.append(own / (np.sqrt(r**2 + low * own) + r + 1e-300))
+    growth += [Form.at(one, middle).growth() for one in forms]
     return np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0)
 
 
@@ -212,7 +243,13 @@ def _mirrored_angles(angles: Floats) -> Floats:
     return np.concatenate([-angles[MIRRORED - 1 :: -1], angles, 2.0 * np.pi - angles[: -MIRRORED - 1 : -1]])
 
 
-def _mirrored(values: Complexes, sign: float) -> Complexes:
-    """Values (m, n) with their mirror images; sign -1: those below 0 with the other sign."""
-    low, high = values[:, MIRRORED - 1 :: -1], values[:, : -MIRRORED - 1 : -1]
-    return np.concatenate([sign * low.conj(), values, high.conj()], axis=1)
+def _pieces(nodes: Floats, values: Complexes, signs: Floats | None = None) -> CubicPieces:
+    """Cubics through values (m, n - 2 MIRRORED) and their mirror images, complex conjugate ones.
+
+    signs  (m,) of the images below 0; those beyond pi have none, but for imaginary parts
+    """
+    signs = np.ones(len(values)) if signs is None else signs
+    beyond = FORM_SIGNS if len(values) == len(FORM_SIGNS) else np.ones(len(values))
+    low, high = values[:, MIRRORED - 1 :: -1].conj(), values[:, : -MIRRORED - 1 : -1].conj()
+    every = np.concatenate([signs[:, None] * low, values, beyond[:, None] * high], axis=1)
+    return CubicPieces.through(nodes, every, signs)

@@ -89,7 +89,7 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
         values, sizes = _functions(loop, aliases, angles)
         return values, _noise(singular, angles) * sizes
 
-    panels = _panels(functions, np.log(panel_ends(loop, at)))
+    panels = _panels(functions, np.log(panel_ends(loop, at)), POINTS - 2)
     if panels is None:
         return None
     left, right, values, wide = panels
@@ -97,10 +97,12 @@ def conics(loop: Loop, held: Floats) -> Conics | None:
     limit, below = _towards_zero(left[0] + (right[0] - left[0]) * nodes, values[0], nodes)
     left = np.append(left[0] - np.log(2.0) * np.arange(len(below), 0, -1), left)
     values, wide = np.concatenate([below, values]), np.append(np.ones(len(below), dtype=bool), wide)
-    return _cut(left, float(right[-1]), values, wide, limit)
+    return _cut(left, float(right[-1]), values, wide, limit, PIECES)
 
 
-def conics_of_disks(disks: Callable[[Floats], Disks], speed: Callable[[Floats], Complexes], ends: Floats) -> Conics:
+def conics_of_disks(
+    disks: Callable[[Floats], Disks], speed: Callable[[Floats], Complexes], ends: Floats
+) -> Conics:
     """The conics of disks that are known as a function of the angle, from the lowest of `ends` to the highest.
 
     disks  the disks at angles (k,), finite
@@ -112,11 +114,11 @@ def conics_of_disks(disks: Callable[[Floats], Disks], speed: Callable[[Floats], 
         values = disk_functions(disks(angles), speed(angles))
         return values, FOLLOWED * np.abs(values)
 
-    panels = _panels(functions, np.log(ends))
+    panels = _panels(functions, np.log(ends), QUARTIC)
     if panels is None:
         raise ValueError("a disk has no finite radius; its walls must be left out before")
     left, right, values, wide = panels
-    return _cut(left, float(right[-1]), values, wide, np.eye(6)[0])
+    return _cut(left, float(right[-1]), values, wide, np.eye(6)[0], 1)
 
 
 def _panel_nodes() -> Floats:
@@ -125,12 +127,13 @@ def _panel_nodes() -> Floats:
 
 
 def _panels(
-    functions: Callable[[Floats], tuple[Floats, Floats]], ends: Floats
+    functions: Callable[[Floats], tuple[Floats, Floats]], ends: Floats, degree: int
 ) -> tuple[Floats, Floats, Floats, Flags] | None:
     """Panels of log(angle) that polynomials resolve: their ends (n,), (n,), the functions at their points
     (n, 10, POINTS), and whether they are wide (n,); None where a function is not finite.
 
-    functions  of angles (k,): the ten functions (10, k) and their errors by rounding
+    functions  of angles (k,): the ten functions (10, k) and the errors that they are allowed
+    degree     of the Chebyshev polynomials from which on nothing may be left
     """
     nodes = _panel_nodes()
     left, right = ends[:-1], ends[1:]
@@ -142,7 +145,7 @@ def _panels(
         if not np.all(np.isfinite(both)):
             return None
         values, rounding = both.reshape(2, 10, len(left), POINTS).swapaxes(1, 2)
-        wide, good = _resolved(values, np.max(rounding, axis=-1))
+        wide, good = _resolved(values, np.max(rounding, axis=-1), degree)
         good |= halving == HALVINGS or len(left) > MOST * len(ends)
         done.append((left[good], right[good], values[good], wide[good]))
         left, right = left[~good], right[~good]
@@ -155,12 +158,13 @@ def _panels(
     return left[order], right[order], values[order], wide[order]
 
 
-def _cut(left: Floats, end: float, values: Floats, wide: Flags, limit: Floats) -> Conics:
-    """The pieces of adjoining panels that begin at log(angle) `left` (n,), the last of which ends at `end`."""
-    parts = left[:, None] + np.diff(np.append(left, end))[:, None] * np.arange(PIECES) / PIECES
+def _cut(left: Floats, end: float, values: Floats, wide: Flags, limit: Floats, count: int) -> Conics:
+    """`count` pieces each of adjoining panels that begin at log(angle) `left` (n,), the last of which ends at
+    `end`."""
+    parts = left[:, None] + np.diff(np.append(left, end))[:, None] * np.arange(count) / count
     angles = np.exp(np.append(parts.ravel(), end))
-    pieces = np.einsum("mqp,nfp->nmfq", _cutting(_panel_nodes()), values).reshape(-1, 10, QUARTIC)
-    return Conics(angles, np.ascontiguousarray(pieces), np.repeat(wide, PIECES), limit)
+    pieces = np.einsum("mqp,nfp->nmfq", _cutting(_panel_nodes(), count), values).reshape(-1, 10, QUARTIC)
+    return Conics(angles, np.ascontiguousarray(pieces), np.repeat(wide, count), limit)
 
 
 def panel_ends(loop: Loop, held_port: Port) -> Floats:
@@ -236,14 +240,15 @@ def velocity_estimate(loop: Loop, angles: Floats) -> Complexes:
     )
 
 
-def _resolved(values: Floats, rounding: Floats) -> tuple[Flags, Flags]:
+def _resolved(values: Floats, rounding: Floats, degree: int) -> tuple[Flags, Flags]:
     """Which panels (n,) of values (n, 10, POINTS) have wide disks, and which their polynomials represent exactly.
 
-    rounding  (n, 10) of the values
+    rounding  (n, 10) errors that are allowed
+    degree    from which on nothing may be left
     """
     grid = chebyshev.chebpts2(POINTS)
     to_coefficients = np.linalg.inv(chebyshev.chebvander(grid, POINTS - 1))
-    tail = np.abs((values @ to_coefficients.T)[..., -2:]).max(axis=-1)
+    tail = np.abs((values @ to_coefficients.T)[..., degree:]).max(axis=-1)
     size = np.abs(values).max(axis=-1)
     centre = np.hypot(values[:, [A_K, A_B]], values[:, [C_K, C_B]])
     radius = np.sqrt(values[:, R_KK])
@@ -261,11 +266,11 @@ def _resolved(values: Floats, rounding: Floats) -> tuple[Flags, Flags]:
     return wide, good & ~(wide & (ratio.min(axis=-1) < THIN))
 
 
-def _cutting(nodes: Floats) -> Floats:
-    """Matrix from values at a panel's points to powers of s in each of its pieces (PIECES, QUARTIC, POINTS)."""
+def _cutting(nodes: Floats, count: int) -> Floats:
+    """Matrix from values at a panel's points to powers of s in each of its `count` pieces (count, QUARTIC, POINTS)."""
     basis = np.linalg.inv(chebyshev.chebvander(2.0 * nodes - 1.0, POINTS - 1))
     inner = np.linspace(0.0, 1.0, QUARTIC)
-    at = (np.arange(PIECES)[:, None] + inner) / PIECES
+    at = (np.arange(count)[:, None] + inner) / count
     powers = np.linalg.inv(np.vander(inner, increasing=True))
     return np.asarray(powers @ chebyshev.chebvander(2.0 * at - 1.0, POINTS - 1) @ basis)
 
