@@ -4,17 +4,18 @@ A wall H = K + B w fails at an angle if P = -1/H lies within the disk |P - C| <=
 
     n0 |p|^2 - 2 Re(p conj n1) + n2 <= 0,     (n0, n1, n2) ~ (s^2, s C, |C|^2 - R^2),  p = P/s
 
-best scaled to unit length, s the size of 1/H. These numbers stay smooth where centre and radius run away together to half
-planes. Cubics through four neighbours interpolate them. The error of that is the divided difference of five
-neighbours times the distances to the four, and twice as much is allowed for, as in charts of responses. Errors
+best scaled to unit length, s the size of 1/H. These numbers stay smooth where centre and radius run away together
+to half planes. Cubics through four neighbours interpolate them. The error of that is the divided difference of
+five neighbours times the distances to the four; twice as much is allowed for, as in charts of responses. Errors
 e0, e1, e2 leave a disk again, a larger one: since 2 |p| <= t |p|^2 + 1/t for every t > 0,
 
     n0 - e0 - t e1,   n1,   n2 - e2 - e1/t
 
 At low frequency C grows like 1/theta or 1/theta^2 where the device is free: there (1, C/s, ..) times sin(theta/2)
-or its square is interpolated instead of the numbers of unit length, and where C is smooth itself, that. Of a small disk far from 0 the radius is the small difference of these: there C is interpolated itself, or 1/C or
-log C, and R/|C| beside it, and the errors of both add to R. Each interval takes what makes its disks less larger.
-Both are mirrored at the angles 0 and pi, as every response is.
+or its square is interpolated instead of the numbers of unit length, and where C is smooth itself, that. Of a small
+disk far from 0 the radius is the small difference of these: there C is interpolated, or 1/C or log C, and R/|C|
+beside it, and the errors of both add to R. Each interval takes what makes its disks least larger. All are mirrored
+at the angles 0 and pi, as every response is.
 """
 
 from __future__ import annotations

@@ -267,7 +267,7 @@ def _resolved(values: Floats, rounding: Floats, degree: int) -> tuple[Flags, Fla
 
 
 def _cutting(nodes: Floats, count: int) -> Floats:
-    """Matrix from values at a panel's points to powers of s in each of its `count` pieces (count, QUARTIC, POINTS)."""
+    """Matrix from values at a panel's points to powers of s in each of its pieces (count, QUARTIC, POINTS)."""
     basis = np.linalg.inv(chebyshev.chebvander(2.0 * nodes - 1.0, POINTS - 1))
     inner = np.linspace(0.0, 1.0, QUARTIC)
     at = (np.arange(count)[:, None] + inner) / count

@@ -6,8 +6,8 @@ At each measured frequency the sampled response with any passive operator fills 
 
 q_0 is made of the data, the q_k of the frequencies that look alike of the fitted modes. The wall is passive where
 it keeps clear of every disk (see `gauge`): between measured frequencies they are interpolated, and made larger by
-what that may miss (see `between_frequencies`). The power that the handle takes in, Re(jw G_hh), is small against jw G_hh itself: where the measurement's error hides it,
-nothing is promised.
+what that may miss (see `between_frequencies`). The power that the handle takes in, Re(jw G_hh), is small against
+jw G_hh itself: where the measurement's error hides it, nothing is promised.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
@@ -37,16 +38,18 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 FAR: Final = 1000  # aliases to either side
+NEAR, NODES = 8, 16  # those summed at every angle; and angles at which the others are summed, which vary little
 SURE: Final = 1.96  # standard deviations of the dissipation that are taken off
-SCALES: Final = 4  # sizes of 1/H that are tried, and the factor within which the last is that of the stiffest wall
-ALIKE: Final = 2.0
+# Sizes of 1/H that are tried at most, until the last is within this factor that of the stiffest wall found: all
+# are on the safe side.
+SCALES, ALIKE = 4, 1.1
 ONLY_MODEL: Final = (
     "this takes the chart of every spring, which needs a model; attach springs to the response as an [operator]"
 )
 
 
 def measured_disks(port: MeasuredPort, passed: Complexes) -> tuple[Disks, Flags]:
-    """The disks of a measured port at its angles (n,), and where the error hides the power that the handle takes in.
+    """The disks of a measured port at its angles (n,), and where the error hides the power taken in at the handle.
 
     passed  what the computer adds to P there (n,): force filter and software's delay
     """
@@ -77,19 +80,33 @@ def _own(port: MeasuredPort, name: str) -> Complexes:
 
 def _beyond(port: MeasuredPort) -> tuple[Complexes, Floats]:
     """Sums (n,) of q and |q| over the frequencies that look alike, of the fitted modes; inf where they take in no
-    power."""
-    total, size = np.zeros(len(port.theta), dtype=complex), np.zeros(len(port.theta))
+    power.
+
+    All have the factor W theta of hold and delay. What lies beyond the modes is, without it, smooth in the angle.
+    """
+    theta = np.append(port.theta, 0.5 * np.pi * (1.0 + chebyshev.chebpts1(NODES)))
+    total, size = np.zeros(len(theta), dtype=complex), np.zeros(len(theta))
     for k in range(1, FAR + 1):
+        if k == NEAR + 1:
+            near, theta = (total[:-NODES], size[:-NODES]), theta[-NODES:]
+            total, size = np.zeros(NODES, dtype=complex), np.zeros(NODES)
         for turn in (2.0 * np.pi * k, -2.0 * np.pi * k):
-            theta = port.theta + turn
-            jw = 1j * theta / port.period
-            taken = np.real(jw * port.continued("hh", theta))
-            pushed = port.continued("sh", theta) * port.continued("ha", theta) * port.model.hold(theta) * jw
+            alias = theta + turn
+            jw = 1j * alias / port.period
+            taken = np.real(jw * port.continued("hh", alias))
+            pushed = port.continued("sh", alias) * port.continued("ha", alias) * port.model.hold(alias) * jw
             q = np.where(taken > 0.0, pushed / (2.0 * np.where(taken > 0.0, taken, 1.0)), np.inf)
             total, size = total + q, size + np.abs(q)
             if k == FAR:
                 size = size + np.abs(q) * FAR  # terms fall like 1/k^2
-    return total, size
+    if not np.all(np.isfinite(size)):
+        return near[0], np.full(len(port.theta), np.inf)
+    own = port.model.hold(theta) * theta
+    basis = chebyshev.chebvander(chebyshev.chebpts1(NODES), NODES - 1)
+    fitted = np.linalg.solve(basis, np.column_stack([total / own, size / np.abs(own)]))
+    far = chebyshev.chebvander(2.0 * port.theta / np.pi - 1.0, NODES - 1) @ fitted
+    own = port.model.hold(port.theta) * port.theta
+    return near[0] + far[:, 0] * own, near[1] + far[:, 1].real * np.abs(own)
 
 
 def _softest_spring(disks: Disks) -> float:
@@ -126,18 +143,19 @@ def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
             "all take in power there"
         )
     kept = Disks(*(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power")))
-    scale = _softest_spring(kept)
+    scale, regions = _softest_spring(kept), []
     for _ in range(SCALES):
         between = disks_between(kept, scale)
         if between is None:
             return empty_region("this is not known: the handle is known at too few frequencies")
         # a negative spring shows at frequencies below all that were measured: none is promised
         found = Gauge(conics_of_disks(between.disks, loop.w, between.ends), (np.inf, np.inf))
-        region = passive_region_of(found, port.period)
-        stiffness = region.stiffness_max
+        regions.append(passive_region_of(found, port.period))
+        stiffness = regions[-1].stiffness_max
         if not stiffness > 0.0 or 1.0 / ALIKE < stiffness * scale < ALIKE:
             break
         scale = 1.0 / stiffness
+    region = max(regions, key=lambda one: float(np.nan_to_num(one.stiffness_max)))
     warning = (
         f"from {np.count_nonzero(inner)} measured frequencies, interpolated, with twice the error of that taken "
         f"off; below {frequency[inner][0]:.4g} Hz continued"

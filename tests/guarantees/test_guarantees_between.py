@@ -1,0 +1,58 @@
+"""Passive walls of devices measured at few frequencies: never more than the plant's, and nearly as many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.measured_handle_cases import AT_SENSOR, COLLOCATED, EVERY, RECIPROCAL, frequencies, measured_device
+from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.guarantees.measured import measured_passive_region
+from zwidth.guarantees.passive import passive_region
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.loop.measured.measured_port import measured_port
+from zwidth.model.plant import Plant
+from zwidth.model.response import ResponseError
+
+# What a promise may exceed the exact one by: the data themselves are fitted modes beyond half the sampling rate.
+TOLERANCE = 1e-5
+
+
+def chain(rng, period, size, kind):
+    """Masses joined by springs of 1 Hz to beyond half the sampling rate, damped by 0.1 to 150 %, on a dashpot."""
+    m = 10.0 ** rng.uniform(-2.0, 0.0, size)
+    K, B = np.zeros((size, size)), np.zeros((size, size))
+    for i in range(size - 1):
+        light = m[i : i + 2].min()
+        k = (2.0 * np.pi * 10.0 ** rng.uniform(0.0, np.log10(0.65 / period))) ** 2 * light
+        slip = np.eye(size)[i] - np.eye(size)[i + 1]
+        K += k * np.outer(slip, slip)
+        B += 2.0 * 10.0 ** rng.uniform(-3.0, 0.18) * np.sqrt(k * light) * np.outer(slip, slip)
+    B[0, 0] += m.sum() * np.pi / period * 10.0 ** rng.uniform(-3.0, -1.5)
+    first, last = np.eye(size)[0], np.eye(size)[-1]
+    return Plant(
+        np.diag(m),
+        B,
+        K,
+        first if kind == AT_SENSOR else last,
+        last,
+        first if kind in (EVERY, RECIPROCAL) else last,
+    )
+
+
+def promised_and_exact(seed, largest=3):
+    """Largest passive stiffness [N/m] by data and by the plant; none where the data do not tell the delay."""
+    rng = np.random.default_rng(seed)
+    period, delay = 1.0 / 10.0 ** rng.uniform(np.log10(200.0), np.log10(20000.0)), float(rng.uniform(0.0, 2.0))
+    size, kind = int(rng.integers(1, largest + 1)), (EVERY, RECIPROCAL, AT_SENSOR, COLLOCATED)[rng.integers(4)]
+    plant = chain(rng, period, size, kind)
+    half, count = 0.5 / period, int(rng.choice([60, 150, 400]))
+    grid = frequencies(period, count, 3e-4) if rng.random() < 0.7 else np.linspace(half / count, half, count)
+    response = measured_device(plant, period, delay, kind, grid)
+    try:
+        port = measured_port(response, period)
+    except ResponseError:
+        return None
+    region = measured_passive_region(port, MeasuredLoop(response, Controller(period)))
+    return region, passive_region(Loop(plant, Controller(period, delay)))
