@@ -56,3 +56,19 @@ def promised_and_exact(seed, largest=3):
         return None
     region = measured_passive_region(port, MeasuredLoop(response, Controller(period)))
     return region, passive_region(Loop(plant, Controller(period, delay)))
+
+
+@pytest.mark.parametrize(("seed", "lost"), [(3, 1e-6), (12, 1e-6), (17, 1e-4)])
+def test_a_promise_is_nearly_the_exact_one_and_no_more(seed, lost):
+    found, exact = promised_and_exact(seed)
+    assert (1.0 - lost) * exact.stiffness_max < found.stiffness_max <= (1.0 + TOLERANCE) * exact.stiffness_max
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200))
+def test_no_promise_is_larger_than_the_exact_one(seed):
+    both = promised_and_exact(seed, 3 if seed < 60 else 2)
+    if both is None:
+        return
+    found, exact = both
+    assert not found.stiffness_max > (1.0 + TOLERANCE) * exact.stiffness_max

@@ -32,7 +32,8 @@ def test_passive_walls_are_those_of_the_plant(plant, kind):
     exact = passive_region(Loop(plant, Controller(T, 0.4)))
     passive = found["passive"].region
     assert passive.stiffness_max == pytest.approx(exact.stiffness_max, rel=5e-4)
-    assert "between them the condition is not computed" in passive.warning
+    assert "with twice the error of that taken off" in passive.warning
+    assert passive.stiffness_max <= exact.stiffness_max * (1.0 + 1e-6)
     K = np.array([0.3, 0.9, 1.05]) * exact.stiffness_max
     B = exact.damping_at_stiffness_max * np.ones(3)
     assert passive.contains(K, B).tolist() == exact.contains(K, B).tolist()

@@ -35,6 +35,7 @@ Complexes = NDArray[np.complex128]
 BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
 FORM_SIGNS: Final = np.array([1.0, 1.0, -1.0, 1.0])  # of n0, Re n1, Im n1, n2 at mirrored angles
 CENTRES: Final = 3  # kinds of interpolated centres
+OUTSIDE: Final = 5.0  # times as much below the lowest angle, where a resonance may lie
 MIRRORED: Final = 3  # angles repeated beyond either end
 FEWEST: Final = 6  # angles
 PAIR: Final = 0.05  # of both gaps beside it, below which a gap is that of two angles which count as one
@@ -86,7 +87,7 @@ class CubicPieces:
         )
         missed = self.fifth[:, i] * np.abs(np.prod(away, axis=1))
         near = np.minimum(np.abs(at) / self.nodes[MIRRORED], 1.0)
-        missed = missed * np.where(self.odd[:, None], near, 1.0)
+        missed = missed * np.where(near < 1.0, OUTSIDE, 1.0) * np.where(self.odd[:, None], near, 1.0)
         return np.einsum("jk,mkj->mk", weights, self.values[:, window]), BETWEEN * missed
 
 
@@ -168,7 +169,7 @@ class DisksBetween:
                     self._by_centres(angles[own], k) if k < CENTRES else self._by_forms(angles[own], k)
                 )
         radius = np.sqrt(np.maximum(np.abs(C) ** 2 - X, 0.0))
-        return Disks(angles, self.scale * C, self.scale * radius, self.scale**2 * X)
+        return Disks(angles, np.asarray(self.scale * C), self.scale * radius, self.scale**2 * X)
 
     def _by_forms(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (n,) by n0, n1, n2."""
@@ -180,7 +181,7 @@ class DisksBetween:
         C, error = _centre(values[kind], errors[kind], kind)
         (ratio,), (missed,) = self.ratio.at(angles)
         R = np.maximum(ratio.real, 0.0) + missed + (1.0 + np.abs(ratio)) * error
-        return C, np.abs(C) ** 2 * (1.0 - R**2)
+        return np.asarray(C), np.abs(C) ** 2 * (1.0 - R**2)
 
 
 def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floats]:
@@ -228,7 +229,7 @@ def _best_kind(
         C, error = _centre(values[kind], errors[kind], kind)
         growth.append(np.abs(C) * (missed + (1.0 + np.abs(share)) * error))
     growth += [Form.at(one, middle).growth() for one in forms]
-    return np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0)
+    return np.asarray(np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0))
 
 
 def _kept(angles: Floats) -> NDArray[np.bool_]:
