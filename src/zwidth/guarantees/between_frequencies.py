@@ -35,6 +35,7 @@ Complexes = NDArray[np.complex128]
 BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
 FORM_SIGNS: Final = np.array([1.0, 1.0, -1.0, 1.0])  # of n0, Re n1, Im n1, n2 at mirrored angles
 CENTRES: Final = 3  # kinds of interpolated centres
+GROWTH: Final = 1.5  # from node to node, of those that tell the disks below the lowest angle
 OUTSIDE: Final = 5.0  # times as much below the lowest angle, where a resonance may lie
 MIRRORED: Final = 3  # angles repeated beyond either end
 FEWEST: Final = 6  # angles
@@ -107,7 +108,15 @@ class Form:
         """The numbers at angles (k,), of cubics through n0, Re n1, Im n1 and n2."""
         (n0, real, imag, n2), (e0, e_real, e_imag, e2) = pieces.at(angles)
         low = np.maximum(n0.real, ROUNDING)
-        return cls(low, real + 1j * imag, n2.real, e0 + (low - n0.real), np.hypot(e_real, e_imag) + ROUNDING, e2)
+        n1, size = real + 1j * imag, np.maximum(np.hypot(real.real, imag.real), 1e-300)
+        along = (np.abs(real) * e_real + np.abs(imag) * e_imag) / size**2
+        across = (np.abs(imag) * e_real + np.abs(real) * e_imag) / size
+        # the form means the same times any number: an error along n1 becomes one of n0 and n2
+        turned = along < 0.5
+        scaled = np.where(turned, along / np.where(turned, 1.0 - along, 1.0), 0.0)
+        e1 = np.where(turned, across * (1.0 + scaled), np.hypot(e_real, e_imag)) + ROUNDING * size
+        e0 = (e0 + low - n0.real) * (1.0 + scaled) + low * scaled
+        return cls(low, n1, n2.real, e0, e1, e2 * (1.0 + scaled) + np.abs(n2) * scaled)
 
     @cached_property
     def radius(self) -> Floats:
@@ -143,6 +152,7 @@ class DisksBetween:
     ratio    R/|C|
     forms    n0, n1, n2 in several scalings
     kind     (n - 1,) per interval of the nodes: 0 to 2 for `centres`, from 3 for `forms`
+    below    those below the lowest angle, by angles further apart; None: by the same
     """
 
     angles: Floats
@@ -151,6 +161,7 @@ class DisksBetween:
     ratio: CubicPieces
     forms: tuple[CubicPieces, ...]
     kind: NDArray[np.int64]
+    below: DisksBetween | None = None
 
     @property
     def ends(self) -> Floats:
@@ -160,16 +171,23 @@ class DisksBetween:
 
     def disks(self, angles: Floats) -> Disks:
         """The disks at angles (n,) in (0, pi]."""
+        C, X = self._interpolated(angles)
+        radius = np.sqrt(np.maximum(np.abs(C) ** 2 - X, 0.0))
+        return Disks(angles, np.asarray(self.scale * C), self.scale * radius, self.scale**2 * X)
+
+    def _interpolated(self, angles: Floats) -> tuple[Complexes, Floats]:
+        """C/s and (|C|^2 - R^2)/s^2 (n,) of the larger disks."""
         kind = self.kind[self.ratio.interval(angles)]
         C, X = np.zeros(len(angles), dtype=complex), np.zeros(len(angles))
         for k in range(CENTRES + len(self.forms)):
             own = kind == k
             if np.any(own):
-                C[own], X[own] = (
-                    self._by_centres(angles[own], k) if k < CENTRES else self._by_forms(angles[own], k)
-                )
-        radius = np.sqrt(np.maximum(np.abs(C) ** 2 - X, 0.0))
-        return Disks(angles, np.asarray(self.scale * C), self.scale * radius, self.scale**2 * X)
+                of_kind = self._by_centres if k < CENTRES else self._by_forms
+                C[own], X[own] = of_kind(angles[own], k)
+        low = angles < self.angles[0]
+        if self.below is not None and np.any(low):
+            C[low], X[low] = self.below._interpolated(angles[low])
+        return C, X
 
     def _by_forms(self, angles: Floats, kind: int) -> tuple[Complexes, Floats]:
         """C/s and (|C|^2 - R^2)/s^2 (n,) by n0, n1, n2."""
@@ -197,23 +215,38 @@ def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floa
 def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
     """The disks between measured ones; None for too few of them.
 
+    Below the lowest angle neighbours that are close together would tell the curvature badly: there nodes are taken
+    that grow by a factor.
+
     disks  at ascending angles (k,), finite
     scale  1/|H| of the walls that matter [m/N]
     """
-    keep = _kept(disks.angles)
-    theta, C = disks.angles[keep], disks.centre[keep] / scale
-    R, X = disks.radius[keep] / scale, disks.power[keep] / scale**2
-    if len(theta) < FEWEST:
+    nodes = np.flatnonzero(_kept(disks.angles))
+    if len(nodes) < FEWEST:
         return None
-    nodes, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C.real, C.imag, X])
+    sparse = nodes[:1]
+    for node in nodes:
+        if disks.angles[node] >= GROWTH * disks.angles[sparse[-1]]:
+            sparse = np.append(sparse, node)
+    below = _disks_through(disks, sparse, scale, None) if len(sparse) >= FEWEST else None
+    return _disks_through(disks, nodes, scale, below)
+
+
+def _disks_through(
+    disks: Disks, nodes: NDArray[np.int64], scale: float, below: DisksBetween | None
+) -> DisksBetween:
+    """The disks between those at some of the measured angles (k,)."""
+    theta, C = disks.angles[nodes], disks.centre[nodes] / scale
+    R, X = disks.radius[nodes] / scale, disks.power[nodes] / scale**2
+    x, form = _mirrored_angles(theta), np.array([np.ones(len(C)), C.real, C.imag, X])
     length, small = np.sqrt(1.0 + 2.0 * np.abs(C) ** 2 + X**2), np.sin(theta / 2.0)
     scalings = [(1.0 / length, 1.0), (1.0 / length, -1.0), (small**0, 1.0), (small, -1.0), (small**2, 1.0)]
-    forms = tuple(_pieces(nodes, form * scaling, sign * FORM_SIGNS) for scaling, sign in scalings)
+    forms = tuple(_pieces(x, form * scaling, sign * FORM_SIGNS) for scaling, sign in scalings)
     size = np.maximum(np.abs(C), 1e-300)
     phase = np.unwrap(np.angle(np.where(C == 0.0, 1e-300, C)))
-    centres = _pieces(nodes, np.array([C, 1.0 / np.where(C == 0.0, 1e-300, C), np.log(size) + 1j * phase]))
-    ratio = _pieces(nodes, np.array([R / size + 0j]))
-    return DisksBetween(theta, scale, centres, ratio, forms, _best_kind(nodes, centres, ratio, forms))
+    centres = _pieces(x, np.array([C, 1.0 / np.where(C == 0.0, 1e-300, C), np.log(size) + 1j * phase]))
+    ratio = _pieces(x, np.array([R / size + 0j]))
+    return DisksBetween(theta, scale, centres, ratio, forms, _best_kind(x, centres, ratio, forms), below)
 
 
 def _best_kind(
