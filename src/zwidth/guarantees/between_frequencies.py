@@ -209,7 +209,8 @@ def _centre(value: Complexes, error: Floats, kind: int) -> tuple[Complexes, Floa
     share = error / np.maximum(np.abs(value), 1e-300)
     if kind == 0:
         return value, share
-    return 1.0 / np.where(value == 0.0, 1e-300, value), share / (1.0 - np.minimum(share, 1.0 - 1.0 / MOST))
+    inverse = np.asarray(1.0 / np.where(value == 0.0, 1e-300, value), dtype=complex)
+    return inverse, share / (1.0 - np.minimum(share, 1.0 - 1.0 / MOST))
 
 
 def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
