@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 RATE = 10_000  # samples per second
+SEGMENT = 2**16  # samples of the peers' spectra
 SMOOTHED = 101  # samples of the peers' polynomials
 
 
@@ -88,11 +89,56 @@ def arm_by_lstsq(table: Any) -> dict[str, float]:
     return {"inertia at joint 1": float(numbers[0]), "inertia at joint 2": float(numbers[1])}
 
 
+def response_by_welch(table: Any) -> dict[str, float]:
+    """H1 from Welch's spectra of the whole arrays, and its largest value: the resonance."""
+    from scipy.signal import csd, welch
+
+    force, position = table["force_N"].to_numpy(), table["position_m"].to_numpy()
+    f, power = welch(force, RATE, nperseg=SEGMENT)
+    _, cross = csd(force, position, RATE, nperseg=SEGMENT)
+    size = np.abs(cross[1:] / power[1:])
+    return {"resonance": float(f[1:][np.argmax(size)]), "largest response": float(np.max(size))}
+
+
+def modes_by_curve_fit(table: Any) -> dict[str, float]:
+    """Two masses to H1 of Welch's spectra."""
+    from scipy.signal import csd, welch
+
+    force, position = table["force_N"].to_numpy(), table["position_m"].to_numpy()
+    f, power = welch(force, RATE, nperseg=SEGMENT)
+    _, cross = csd(force, position, RATE, nperseg=SEGMENT)
+    used = (f > 0.5) & (f < 1000.0)
+    return masses_by_curve_fit(f[used], (cross / power)[used])
+
+
+def masses_by_curve_fit(frequency: Any, response: Any) -> dict[str, float]:
+    """Two masses on a spring to the ground by `curve_fit`, without hold and sampling, from numbers that are off by
+    a third; weighted by the response's size."""
+    from scipy.optimize import curve_fit
+
+    s = 2j * np.pi * frequency
+
+    def model(_: Any, *logarithms: float) -> Any:
+        m1, m2, c, k, c0, k0, delay = np.exp(logarithms)
+        link, near, far = c * s + k, m2 * s**2 + c0 * s + k0, m1 * s**2
+        value = (far + link) / ((far + link) * (near + link) - link**2) * np.exp(-s * delay)
+        value = value / response
+        return np.concatenate([value.real, value.imag])
+
+    start = np.log([0.35, 0.02, 2.5, 12000.0, 9.0, 5000.0, 7e-5])
+    wanted = np.concatenate([np.ones(len(s)), np.zeros(len(s))])
+    numbers, _ = curve_fit(model, None, wanted, start)
+    m1, m2, c, k, *_ = np.exp(numbers).tolist()
+    return {"mass 1": m1, "mass 2": m2, "damping": c, "stiffness": k}
+
+
 PEERS: Mapping[str, tuple[str, Callable[[Any], dict[str, float]]]] = {
     "stiffness": ("pandas, numpy.polyfit", spring_by_line),
     "friction": ("pandas, savgol_filter, lstsq", joint_by_lstsq),
     "mass": ("pandas, savgol_filter, lstsq", joint_by_lstsq),
     "impedance": ("pandas, scipy.signal.welch", impedance_by_welch),
+    "response": ("pandas, scipy.signal.csd and welch", response_by_welch),
+    "modes": ("pandas, csd and welch, curve_fit", modes_by_curve_fit),
     "arm": ("pandas, savgol_filter, lstsq", arm_by_lstsq),
 }
 

@@ -1,14 +1,17 @@
-"""Records of measurements as long as one likes: a stretch that is made once and repeated, in memory or as CSV.
+"""Records of measurements as long as one likes, stretch by stretch, in memory or as CSV.
 
-Each stretch is periodic, so that it goes on smoothly where it begins anew. Its noise repeats too: the records are
-for timing, not for judging the numbers.
+Where a stretch is made once and repeated it is periodic, so that it goes on smoothly where it begins anew. Its
+noise repeats too: those records are for timing, not for judging the numbers. Records whose spectra are fitted line
+by line go on without repeating.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -30,16 +33,21 @@ Columns = dict[str, np.ndarray]
 class Bench:
     """A device and what is recorded of it.
 
-    device   loads or makes it
-    stretch  makes the columns of the stretch, without its time
-    options  of `identify`
-    timed    whether the record has a column time_s
+    device     loads or makes it
+    stretches  makes the columns of one stretch after the other, without their time
+    options    of `identify`
+    timed      whether the record has a column time_s
     """
 
     device: Callable[[], Device]
-    stretch: Callable[[], Columns]
+    stretches: Callable[[], Iterator[Columns]]
     options: Mapping[str, object] = field(default_factory=dict)
     timed: bool = True
+
+
+def repeated(stretch: Callable[[], Columns]) -> Callable[[], Iterator[Columns]]:
+    """The same stretch again and again."""
+    return lambda: repeat(stretch())
 
 
 def spring() -> Columns:
@@ -104,63 +112,103 @@ def _chains() -> Chains:
     return random_chains(np.random.default_rng(1), 2, 1)
 
 
-def chain() -> Columns:
-    """The arm on tones, its angles as counted, torques with noise."""
+def chain() -> Iterator[Columns]:
+    """The arm on tones that do not repeat, its angles as counted, torques with noise."""
     rng, count, chains = np.random.default_rng(2), STRETCH_S * RATE, _chains()
-    t = np.arange(count)[:, None] / RATE
-    q, v, a = (np.zeros((count, 2)) for _ in range(3))
-    for turns in range(5, 105, 14):
-        w, phase = 2.0 * np.pi * (turns + np.array([0, 3])) / STRETCH_S, rng.uniform(0.0, 2.0 * np.pi, 2)
-        size = 0.4 / (1.0 + (turns / (1.5 * STRETCH_S)) ** 2)
-        q += size * np.sin(w * t + phase)
-        v += size * w * np.cos(w * t + phase)
-        a -= size * w**2 * np.sin(w * t + phase)
-    q += [0.4, 1.2]
     many = Chains(*(np.broadcast_to(getattr(chains, name), (count, 2)) for name in CHAIN), chains.gravity)
-    torques = many.torques(q, v, a)
-    torques += 0.01 * np.std(torques, axis=0) * rng.normal(size=torques.shape)
+    w = 2.0 * np.pi * np.array([[0.23, 0.41], [0.83, 1.09], [1.7, 1.93], [2.9, 2.45], [4.1, 3.7]])
+    size, phase = 0.4 / (1.0 + (w / (2.0 * np.pi * 1.5)) ** 2), rng.uniform(0.0, 2.0 * np.pi, w.shape)
     step = 2.0 * np.pi / 8000
-    columns = {f"angle_rad.link-{i + 1}": step * np.round(q[:, i] / step) for i in range(2)}
-    columns |= {f"torque_Nm.link-{i + 1}": torques[:, i] for i in range(2)}
-    return columns
+    for number in itertools.count():
+        t = (number * count + np.arange(count))[:, None, None] / RATE
+        angle = w * t + phase
+        q = np.array([0.4, 1.2]) + np.sum(size * np.sin(angle), axis=1)
+        torques = many.torques(
+            q, np.sum(size * w * np.cos(angle), axis=1), -np.sum(size * w**2 * np.sin(angle), axis=1)
+        )
+        torques += 0.01 * np.std(torques, axis=0) * rng.normal(size=torques.shape)
+        columns = {f"angle_rad.link-{i + 1}": step * np.round(q[:, i] / step) for i in range(2)}
+        yield columns | {f"torque_Nm.link-{i + 1}": torques[:, i] for i in range(2)}
+
+
+def two_masses() -> Device:
+    """Two masses that a soft, damped spring holds to the ground, sampled at `RATE`."""
+    damping = [[1.8744, -1.8744], [-1.8744, 13.8744]]
+    stiffness = [[15620.0, -15620.0], [-15620.0, 19620.0]]
+    settings = {"plant.damping_Ns_per_m": damping, "plant.stiffness_N_per_m": stiffness}
+    return load("published-two-mass", settings | {"loop.sampling_period_s": 1.0 / RATE})
+
+
+def pushed() -> Iterator[Columns]:
+    """The two masses under a random force that is held for each sample: their modes, one by one, and noise."""
+    from scipy.signal import cont2discrete, lfilter
+
+    plant, rng, count = two_masses().at().plant, np.random.default_rng(3), STRETCH_S * RATE
+    inverse, n = np.linalg.inv(plant.mass), plant.size
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ plant.stiffness, -inverse @ plant.damping]])
+    B = np.concatenate([np.zeros(n), inverse @ plant.actuator])[:, None]
+    C = np.concatenate([plant.sensor, np.zeros(n)])[None]
+    Ad, Bd, *_ = cont2discrete((A, B, C, np.zeros((1, 1))), 1.0 / RATE)
+    poles, vectors = np.linalg.eig(Ad)
+    gains = (C @ vectors)[0] * np.linalg.solve(vectors, Bd.astype(complex))[:, 0]
+    state = np.zeros((len(poles), 1), dtype=complex)
+    while True:
+        force, position = rng.normal(size=count), 1e-8 * rng.normal(size=count)
+        for k, (pole, gain) in enumerate(zip(poles, gains, strict=True)):
+            moved, state[k] = lfilter([0.0, gain], [1.0, -pole], force, zi=state[k])
+            position += moved.real
+        yield {"force_N": force, "position_m": position}
 
 
 CHAIN = ("length", "mass", "center", "inertia", "rotor", "coulomb", "viscous")
-JOINT = Bench(partial(load, "hapkit-course"), joint)
+JOINT = Bench(partial(load, "hapkit-course"), repeated(joint))
+PUSHED = Bench(two_masses, pushed)
 BENCHES: Mapping[str, Bench] = {
-    "stiffness": Bench(partial(load, "five-bar"), spring, {"joint": "motor-right"}, timed=False),
+    "stiffness": Bench(partial(load, "five-bar"), repeated(spring), {"joint": "motor-right"}, timed=False),
     "friction": JOINT,
     "mass": JOINT,
-    "impedance": Bench(partial(load, "published-two-mass"), handle),
+    "impedance": Bench(partial(load, "published-two-mass"), repeated(handle)),
     "arm": Bench(arm, chain),
+    "response": PUSHED,
+    "modes": PUSHED,
 }
 
 
 def columns_of(bench: Bench, seconds: int) -> Columns:
     """The record in memory, so many seconds of it."""
-    columns = {name: np.resize(values, seconds * RATE) for name, values in bench.stretch().items()}
+    stretches = list(itertools.islice(bench.stretches(), -(-seconds // STRETCH_S)))
+    columns = {name: np.concatenate([one[name] for one in stretches])[: seconds * RATE] for name in stretches[0]}
     return ({"time_s": np.arange(seconds * RATE) / RATE} if bench.timed else {}) | columns
 
 
 def write_csv(path: Path, bench: Bench, seconds: int) -> None:
-    """Write the record, so many seconds of it, second by second: cells of fixed width, of which only those of the
-    time change from stretch to stretch."""
-    count, columns = STRETCH_S * RATE, bench.stretch()
-    cells = list[np.ndarray]()
-    if bench.timed:
-        fractions = [f"{'0' * SECONDS_DIGITS}.{k:04d}" for k in range(RATE)] * STRETCH_S
-        cells.append(_letters(fractions))
-    cells += [_letters([f"{value:+.8e}" for value in values.tolist()]) for values in columns.values()]
-    comma, end = np.full((count, 1), ord(","), np.uint8), np.full((count, 1), ord("\n"), np.uint8)
-    between = [part for one in cells for part in (one, comma)][:-1]
-    lines = np.hstack([*between, end]).reshape(STRETCH_S, RATE, -1)
+    """Write the record, so many seconds of it, second by second, in cells of fixed width."""
+    stretches = bench.stretches()
     with open(path, "wb") as file:
-        file.write((",".join([*(["time_s"] if bench.timed else []), *columns]) + "\n").encode())
+        columns: Columns = {}
         for second in range(seconds):
+            if second % STRETCH_S == 0:
+                before, columns = columns, next(stretches)
+                if columns is not before:
+                    lines = _lines(columns, bench.timed)
+                if not second:
+                    names = [*(["time_s"] if bench.timed else []), *columns]
+                    file.write((",".join(names) + "\n").encode())
             part = lines[second % STRETCH_S]
             if bench.timed:
                 part[:, :SECONDS_DIGITS] = np.frombuffer(f"{second:0{SECONDS_DIGITS}d}".encode(), np.uint8)
             file.write(part.tobytes())
+
+
+def _lines(columns: Columns, timed: bool) -> np.ndarray:
+    """The lines of a stretch (seconds, lines, bytes), the digits of its whole seconds to be filled in."""
+    count, cells = STRETCH_S * RATE, list[np.ndarray]()
+    if timed:
+        cells.append(_letters([f"{'0' * SECONDS_DIGITS}.{k:04d}" for k in range(RATE)] * STRETCH_S))
+    cells += [_letters([f"{value:+.8e}" for value in values.tolist()]) for values in columns.values()]
+    comma, end = np.full((count, 1), ord(","), np.uint8), np.full((count, 1), ord("\n"), np.uint8)
+    between = [part for one in cells for part in (one, comma)][:-1]
+    return np.hstack([*between, end]).reshape(STRETCH_S, RATE, -1)
 
 
 def _letters(words: list[str]) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -16,10 +16,10 @@ from zwidth.identify.columns import Columns
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import check_sampling
-from zwidth.identify.strokes import resolution_of
+from zwidth.identify.sweep_blocks import SweepBlocks, SweepRange
 from zwidth.loop.controller import Controller
 from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
-from zwidth.model.sweep_response import sweep_response
+from zwidth.model.sweep_response import block_length, sweep_response_of_blocks
 from zwidth.progress import Progress
 
 Floats = NDArray[np.float64]
@@ -31,6 +31,7 @@ KIND: Final = "response"
 FIT_SHARE: Final = 2.0 / 3.0  # of each record, its beginning; the rest is predicted
 FEWEST_COUNTS: Final = 10.0  # of the motion
 LIMITED: Final = 0.05  # share of the samples at the largest and the smallest force, from which on it was clipped
+FIRST_LEVELS: Final = 100_000  # samples among which the force's levels are counted
 FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
 FEWEST_USABLE: Final = 0.2  # share of the frequencies
 
@@ -53,22 +54,29 @@ def identify_response(
     Raises       DeviceError  for records that cannot be read
     """
     period = device.controller.sampling_period
-    checks, sweeps = list[Check](), list[tuple[Floats, Floats]]()
+    checks, sweeps = list[Check](), list[SweepBlocks]()
     for record in records:
         sampling, check = check_sampling(record, period)
         checks.append(replace(check, what=_named("sampling", record, records)))
         if sampling is None:
             continue
-        force, position, whole = _longest(record, sampling.runs)
-        checks.append(whole)
-        checks += [replace(one, what=_named(one.what, record, records)) for one in _check_sweep(force, position)]
-        sweeps.append((force, position))
+        name = next(one for one in FORCES if one in record)
+        sweep = SweepBlocks.longest(record, sampling, name, "position_m")
+        checks.append(replace(_gaps(len(sweep), sampling.rows), what=_named("gaps", record, records)))
+        checks += [replace(one, what=_named(one.what, record, records)) for one in _check_sweep(sweep)]
+        sweeps.append(sweep)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    count = min(len(force) for force, _ in sweeps)
+    count = min(len(sweep) for sweep in sweeps)
     fitted = int(FIT_SHARE * count)
+    length = block_length(fitted, segment)
     try:
-        responses = [sweep_response(f[:fitted], x[:fitted], period, integrators, segment) for f, x in sweeps]
+        responses = [
+            sweep_response_of_blocks(
+                _reported(sweep.part(0, fitted), length, f"sweep {n + 1}", progress), period, integrators, segment
+            )
+            for n, sweep in enumerate(sweeps)
+        ]
     except ResponseError as error:
         checks.append(Check("response", False, f"{records[0].label} {error}"))
         return Identification(KIND, device.label, tuple(checks))
@@ -80,7 +88,7 @@ def identify_response(
     checks.append(Check("chart", chart is not None, why))
     if chart is None:
         return Identification(KIND, device.label, tuple(checks), curves=_columns(responses))
-    shares = [_share_explained(response, f[fitted:], x[fitted:], period) for f, x in sweeps]
+    shares = [_share_explained(response, sweep.part(fitted, len(sweep)), length, period) for sweep in sweeps]
     return Identification(
         KIND,
         device.label,
@@ -100,40 +108,47 @@ def _named(what: str, record: Record, records: Sequence[Record]) -> str:
     return what if len(records) == 1 else f"{record.label}: {what}"
 
 
-def _longest(record: Record, runs: NDArray[np.int64]) -> tuple[Floats, Floats, Check]:
-    """Force and position (n,) of the longest stretch without a gap."""
-    columns = record.columns()
-    name = next(one for one in FORCES if one in record)
-    first, behind = max(runs.tolist(), key=lambda run: run[1] - run[0], default=(0, 0))
-    kept, rows = behind - first, len(columns["time_s"])
+def _reported(
+    sweep: SweepBlocks, length: int, name: str, progress: Progress | None
+) -> Iterator[tuple[Floats, Floats]]:
+    """The blocks of a sweep, with progress."""
+    for number, block in enumerate(sweep.blocks(length)):
+        if progress is not None:
+            progress(f"transforming {name}", number, len(sweep) // length)
+        yield block
+
+
+def _gaps(kept: int, rows: int) -> Check:
+    """Whether the longest stretch without a gap is most of the record."""
     said = (
         "no sample is missing"
         if kept == rows
         else f"the longest stretch without a gap is used, {kept} of {rows} rows"
     )
     enough = kept >= 0.5 * rows
-    reason = said if enough else f"{said}; record without gaps"
-    return columns[name][first:behind], columns["position_m"][first:behind], Check("gaps", enough, reason)
+    return Check("gaps", enough, said if enough else f"{said}; record without gaps")
 
 
-def _check_sweep(force: Floats, position: Floats) -> list[Check]:
+def _check_sweep(sweep: SweepBlocks) -> list[Check]:
     """Is something excited, does it move, and is the force free to take its values?"""
-    if np.ptp(force) == 0.0:
-        return [Check("excitation", False, f"the force is {force[0]:g} N all the time; excite the device")]
-    if np.ptp(position) == 0.0:
-        return [Check("motion", False, f"the position is {position[0]:g} m all the time; is the encoder read?")]
-    checks = [Check("excitation", True, f"the force runs from {np.min(force):.4g} to {np.max(force):.4g} N")]
-    step = resolution_of(position).step
-    counts = float(np.ptp(position)) / step if step else np.inf
-    said = f"the position runs over {np.ptp(position):.4g} m" + (f", {counts:.4g} counts" if step else "")
+    if not len(sweep):
+        return []
+    seen = SweepRange.of(sweep, FIRST_LEVELS)
+    (least, most), (lowest, highest) = seen.force, seen.position
+    if least == most:
+        return [Check("excitation", False, f"the force is {least:g} N all the time; excite the device")]
+    if lowest == highest:
+        return [Check("motion", False, f"the position is {lowest:g} m all the time; is the encoder read?")]
+    checks = [Check("excitation", True, f"the force runs from {least:.4g} to {most:.4g} N")]
+    counts = (highest - lowest) / seen.step if seen.step else np.inf
+    said = f"the position runs over {highest - lowest:.4g} m" + (f", {counts:.4g} counts" if seen.step else "")
     moved = counts >= FEWEST_COUNTS
     checks.append(
         Check("motion", moved, said if moved else f"{said}; at least {FEWEST_COUNTS:g} are needed, push more")
     )
-    levels = len(np.unique(force[: min(len(force), 100_000)]))
-    limits = [float(np.mean(force == end)) for end in (np.max(force), np.min(force))]
-    clipped = levels > FEW_LEVELS and max(limits) > LIMITED
-    said = f"{100 * max(limits):.2g} % of the samples are at the largest or smallest force"
+    limited = max(seen.at_largest, seen.at_smallest) / len(sweep)
+    clipped = seen.levels > FEW_LEVELS and limited > LIMITED
+    said = f"{100 * limited:.2g} % of the samples are at the largest or smallest force"
     reason = f"{said}: clipped? excite less, a command that was not followed is no input" if clipped else said
     return [*checks, Check("saturation", not clipped, reason)]
 
@@ -193,24 +208,29 @@ def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[s
     return said
 
 
-def _share_explained(response: Response, force: Floats, position: Floats, period: float) -> float:
+def _share_explained(response: Response, unseen: SweepBlocks, length: int, period: float) -> float:
     """Share of the unseen motion's power that the response predicts from the force, where it can be relied on.
 
     The position is differenced twice, and both are weighted by a Hann window, since a device that drifts leaks.
+
+    length  of the blocks that are transformed at once, at most [samples]
     """
     m = 2
-    moved = np.diff(position, n=m)
-    window = np.hanning(len(moved))
-    U, Y = np.fft.rfft(force[: len(moved)] * window), np.fft.rfft(moved * window)
-    f = np.fft.rfftfreq(len(moved), period)
     assert response.coherence is not None
     good = response.coherence >= LEAST_COHERENCE
     known, value = response.frequency[good], response.value[good]
     shifted = value * (np.exp(2j * np.pi * known * period) - 1.0) ** m
-    inside = (f >= known[0]) & (f <= known[-1]) & (np.interp(f, response.frequency, good) > 0.99)
-    predicted = np.interp(f, known, shifted.real) + 1j * np.interp(f, known, shifted.imag)
-    missed = np.sum(np.abs(Y - predicted * U)[inside] ** 2)
-    return float(1.0 - missed / np.sum(np.abs(Y[inside]) ** 2))
+    missed = total = 0.0
+    for force, position in unseen.blocks(min(length, len(unseen))):
+        moved = np.diff(position, n=m)
+        window = np.hanning(len(moved))
+        U, Y = np.fft.rfft(force[: len(moved)] * window), np.fft.rfft(moved * window)
+        f = np.fft.rfftfreq(len(moved), period)
+        inside = (f >= known[0]) & (f <= known[-1]) & (np.interp(f, response.frequency, good) > 0.99)
+        predicted = np.interp(f, known, shifted.real) + 1j * np.interp(f, known, shifted.imag)
+        missed += float(np.sum(np.abs(Y - predicted * U)[inside] ** 2))
+        total += float(np.sum(np.abs(Y[inside]) ** 2))
+    return 1.0 - missed / total
 
 
 def _columns(responses: Sequence[Response]) -> dict[str, Any]:

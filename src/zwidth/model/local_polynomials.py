@@ -14,6 +14,7 @@ is a bias grows, and the error falls.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,6 +49,7 @@ class Fits:
     cubic         (n, 4) coefficients of G in r where both polynomials have one more term
     noise         (n,) variance of the noise at one frequency of the transform
     excited       (n,) mean squared |U| in the window
+    freedom       (n,) values of a window beyond the coefficients, from which the noise is known
     """
 
     width: int
@@ -56,11 +58,7 @@ class Fits:
     cubic: Complexes
     noise: Floats
     excited: Floats
-
-    @property
-    def freedom(self) -> int:
-        """Values of a window beyond the coefficients, from which the noise is known."""
-        return 2 * self.width + 1 - TERMS
+    freedom: Floats
 
     def at(self, tile: Whole, r: Floats) -> tuple[Complexes, Floats]:
         """G (n,) and its variance (n,) for noise of variance 1, at places r (n,) of tiles (n,)."""
@@ -82,7 +80,8 @@ def fit_tiles(U: Complexes, Y: Complexes, width: int) -> Fits:
     size = 2 * width + 1
     chunk = max(1, CHUNK // (size * TERMS))
     parts = [_fit_windows(U, Y, middles[i : i + chunk], width) for i in range(0, len(middles), chunk)]
-    return Fits(width, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Fits(width, *columns, freedom=np.full(len(middles), float(size - TERMS)))
 
 
 def _fit_windows(
@@ -158,11 +157,25 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
     floor      (k,) least variance of the noise in Y
     narrowest  half the narrowest window, in spacings; even
     """
-    last = len(U) - 1
+    widths = window_widths(len(U) - 1, narrowest)
+    return merged_windows([fit_tiles(U, Y, width) for width in widths], places, floor)
+
+
+def window_widths(last: int, narrowest: int) -> list[int]:
+    """Half of each window's width, from the narrowest to what still divides `last` spacings into some tiles."""
     widths = [narrowest]
     while last / (2 * widths[-1]) >= FEWEST_TILES and 4 * widths[-1] <= last:
         widths.append(2 * widths[-1])
-    levels = [_with_floor(fit_tiles(U, Y, width), floor) for width in widths]
+    return widths
+
+
+def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> LocalResponse:
+    """The response at places (n,) by the widest windows that agree with the narrower ones within them.
+
+    fits   of windows of rising widths, each twice the one before;   floor  as in `local_response`
+    """
+    narrowest = fits[0].width
+    levels = [_with_floor(one, floor) for one in fits]
     count = len(levels[0].noise)
     level = np.zeros(count, dtype=np.int64)  # of the window that each of the narrowest tiles goes with
     whole = np.ones(count, dtype=bool)
@@ -182,7 +195,7 @@ def local_response(U: Complexes, Y: Complexes, places: Floats, floor: Floats, na
         noise = spread * fits.noise[numbers]
         error = (UNSEEN if n else 1.0) * noise + fits.curvature(numbers, r)
         result.value[at], result.variance[at] = value, error + (TOLERANCE * np.abs(value)) ** 2
-        result.freedom[at] = fits.freedom
+        result.freedom[at] = fits.freedom[numbers]
         result.noise[at], result.excited[at] = levels[0].noise[tile[at]], levels[0].excited[tile[at]]
     return result
 

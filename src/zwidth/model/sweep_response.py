@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.local_polynomials import MOST_TILES, NARROWEST, LocalResponse, local_response
+from zwidth.model.local_polynomials import (
+    MOST_TILES,
+    NARROWEST,
+    LocalResponse,
+    local_response,
+    merged_windows,
+    window_widths,
+)
 from zwidth.model.response import Response, ResponseError
+from zwidth.model.summed_polynomials import NARROWEST_WINDOW, PieceSums
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 SHORTEST_SEGMENT = 64  # samples
@@ -21,6 +34,8 @@ LARGEST_IN_DEVIATIONS = 3.0  # what is a bound is taken as so many standard devi
 PIECE, MOST_PIECES = 64, 2000  # samples in which the frequencies of a force at one time are counted
 CLOSEST = 3.0  # spacing of the response's frequencies, in those of the record's transform
 RATIO = 0.01  # the same in shares of the frequency, from where that is wider
+BLOCK = 2**20  # samples of a long record that are transformed at once; its response is one over all blocks
+SEGMENTS_IN_BLOCK = 256  # that were given; so that a window of 64 spacings is no wider than theirs
 BELOW_ALL_STEPS = 1e-9  # of the largest reading: what is closer is no step of an encoder, but rounding
 
 
@@ -29,8 +44,9 @@ def sweep_response(
 ) -> Response:
     """The response P of a sampled record, and the coherence that tells its error.
 
-    By polynomials over the transform of the whole record (`local_polynomials`). A device without a spring drifts;
-    so the position is differenced first, once for each integrator (twice where their number is not known), and the
+    By polynomials over the transform of the whole record (`local_polynomials`); of a record of more than two
+    million samples over those of blocks of a million (`summed_polynomials`). A device without a spring drifts; so
+    the position is differenced first, once for each integrator (twice where their number is not known), and the
     result divided by (z - 1)^m again. Noise is taken to be at least that of the encoder's steps, q^2 / 12 in each
     reading, whatever the record shows: readings that follow the force alone hide it.
 
@@ -50,27 +66,64 @@ def sweep_response(
     >>> float(np.max(np.abs(found.value * (z - 1.0) - 1.0))) < 1e-9
     True
     """
-    from scipy.fft import rfft
+    size = block_length(len(force), segment)
+    starts = range(0, len(force) - size + 1, size)
+    blocks = ((force[start : start + size], position[start : start + size]) for start in starts)
+    return sweep_response_of_blocks(blocks, period, integrators, segment)
 
+
+def block_length(samples: int, segment: int | None = None) -> int:
+    """Samples of the blocks that a record of so many is cut into: all of them, of a long record about `BLOCK`."""
+    block = BLOCK if segment is None else max(BLOCK, SEGMENTS_IN_BLOCK * segment)
+    return samples if samples < 2 * block else samples // (samples // block)
+
+
+def sweep_response_of_blocks(
+    blocks: Iterable[tuple[Floats, Floats]],
+    period: float,
+    integrators: int | None = None,
+    segment: int | None = None,
+) -> Response:
+    """The response as by `sweep_response`, from blocks of force and position (n,), all of one length, which are
+    read one after the other and not kept: least squares over all of them (`summed_polynomials`).
+
+    Raises  ResponseError  as `sweep_response` does
+    """
     m = 2 if integrators is None else integrators
     length = segment or SHORTEST_SEGMENT
-    if length < SHORTEST_SEGMENT or len(force) < 2 * length + m:
+    blocks = iter(blocks)
+    first, second = next(blocks, (np.zeros(0), np.zeros(0))), next(blocks, None)
+    samples = len(first[0])
+    if length < SHORTEST_SEGMENT or samples < 2 * length + m:
         raise ResponseError(
-            f"has {len(force)} samples, too few for two segments of {max(length, SHORTEST_SEGMENT)}; record "
+            f"has {samples} samples, too few for two segments of {max(length, SHORTEST_SEGMENT)}; record "
             f"longer, or set segment_samples (at least {SHORTEST_SEGMENT})"
         )
-    if np.ptp(force) == 0.0:
-        raise ResponseError(f"the commanded force is {force[0]:g} N all the time; excite the device")
-    differences = np.diff(position, n=m)
-    count = len(differences)
-    U, Y = rfft(force[:count]), rfft(differences)
-    step = encoder_step(position)
-    floor = count * step**2 / 12.0 * np.abs(2.0 * np.sin(np.pi * np.arange(len(U)) / count)) ** (2 * m)
-    narrowest = max(NARROWEST, 2 * (count // (4 * segment)) if segment else 2 * (len(U) // (2 * MOST_TILES)))
-    places = _places(len(force), segment) * count
-    local = local_response(U, Y, places, floor, min(narrowest, 2 * ((len(U) - 2) // 4)))
+    sizes, step = list[_ForceSize](), np.inf
+    count = samples - m if second is None else fast_length(samples - m)
+    values = count // 2 + 1
+    least = NARROWEST if second is None else NARROWEST_WINDOW
+    narrowest = max(least, 2 * (count // (4 * segment)) if segment else 2 * (values // (2 * MOST_TILES)))
+    narrowest = min(narrowest, 2 * ((values - 2) // 4))
+    sums = None if second is None else PieceSums(values, narrowest)
+    for force, position in chain([first], [] if second is None else [second], blocks):
+        sizes.append(_ForceSize.of(force))
+        step = min(step, encoder_step(position) or np.inf)
+        U, Y = transforms(force, position, m, count)
+        if sums is not None:
+            sums.add(U, Y)
+    whole = _ForceSize.together(sizes)
+    if whole.low == whole.high:
+        raise ResponseError(f"the commanded force is {whole.low:g} N all the time; excite the device")
+    step = step if np.isfinite(step) else 0.0
+    floor = count * step**2 / 12.0 * np.abs(2.0 * np.sin(np.pi * np.arange(values) / count)) ** (2 * m)
+    places = _places(samples, segment) * count
+    if sums is None:
+        local = local_response(U, Y, places, floor, narrowest)
+    else:
+        local = merged_windows(sums.fits(window_widths(values - 1, narrowest)), places, floor)
     one = np.abs(2.0 * np.sin(np.pi * places / count)) ** m
-    hidden = _hidden_by_steps(force, step, places / count, local, one)
+    hidden = _hidden_by_steps(whole, step, places / count, local, one, samples)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = (local.variance + (hidden * one) ** 2) / np.abs(local.value) ** 2
         coherence = 1.0 / (1.0 + AVERAGES * relative)
@@ -83,11 +136,68 @@ def sweep_response(
         coherence=np.where(excited, coherence, 0.0),
         averages=AVERAGES,
         freedom=local.freedom,
-        note=f"from {len(force)} samples by local polynomials",
+        note=f"from {len(sizes) * samples} samples by local polynomials",
     )
 
 
-def _hidden_by_steps(force: Floats, step: float, f: Floats, local: LocalResponse, one: Floats) -> Floats:
+def fast_length(samples: int) -> int:
+    """So many samples, or a few fewer whose transform is fast."""
+    from scipy.fft import prev_fast_len
+
+    return int(prev_fast_len(samples))
+
+
+def transforms(force: Floats, position: Floats, m: int, count: int) -> tuple[Complexes, Complexes]:
+    """Transforms of force, and of position differenced m times, over their first `count` samples."""
+    from scipy.fft import rfft
+
+    return np.asarray(rfft(force[:count])), np.asarray(rfft(np.diff(position, n=m)[:count]))
+
+
+@dataclass(frozen=True)
+class _ForceSize:
+    """Size of a force: samples, smallest and largest value, mean, variance [N], and its power in short pieces, and
+    that power times the frequencies that share it."""
+
+    samples: int
+    low: float
+    high: float
+    mean: float
+    variance: float
+    power: float
+    shared: float
+
+    @classmethod
+    def of(cls, force: Floats) -> _ForceSize:
+        """The size of a block (n,)."""
+        pieces = force[: len(force) // PIECE * PIECE].reshape(-1, PIECE)
+        pieces = pieces[:: max(1, len(pieces) // MOST_PIECES)]
+        power = np.abs(np.fft.rfft(pieces * np.hanning(PIECE), axis=1)) ** 2
+        total = np.sum(power, axis=1)
+        taking_part = total**2 / np.maximum(np.sum(power**2, axis=1), 1e-300)
+        low, high, mean = (float(of(force)) for of in (np.min, np.max, np.mean))
+        variance = float(np.mean((force - mean) ** 2))
+        return cls(len(force), low, high, mean, variance, float(np.sum(total)), float(np.sum(total * taking_part)))
+
+    @classmethod
+    def together(cls, blocks: Sequence[_ForceSize]) -> _ForceSize:
+        """The size of blocks of one length."""
+        means = [one.mean for one in blocks]
+        variance = np.mean([one.variance for one in blocks]) + np.var(means)
+        power, shared = (sum(getattr(one, name) for one in blocks) for name in ("power", "shared"))
+        low, high = min(one.low for one in blocks), max(one.high for one in blocks)
+        samples = sum(one.samples for one in blocks)
+        return cls(samples, low, high, float(np.mean(means)), float(variance), power, shared)
+
+    @property
+    def broad(self) -> bool:
+        """Whether the force holds many frequencies at a time, as noise does and a sweep does not."""
+        return self.shared > 0.25 * PIECE / 2.0 * self.power
+
+
+def _hidden_by_steps(
+    force: _ForceSize, step: float, f: Floats, local: LocalResponse, one: Floats, samples: int
+) -> Floats:
     """Error of P (n,) [m/N], as a deviation, that the encoder's steps make and no scatter shows.
 
     A sine of amplitude A is read with an error that follows it: where it is smaller than a step it is not read at
@@ -96,31 +206,21 @@ def _hidden_by_steps(force: Floats, step: float, f: Floats, local: LocalResponse
     follow the force, and under noise the motion at other frequencies; slow motion, slower than 1/4 of the
     frequency, does not, nor what the steps themselves may make, q^2 / 4.
 
-    force  (n,);  step q [m];  f (n,) frequencies in those of sampling
+    step q [m];  f (n,) frequencies in those of sampling;  samples  of a transform
     local  the response of the differenced position, and one (n,) = |z - 1|^m
     """
     if step == 0.0:
         return np.zeros(len(f))
-    own = (np.abs(local.value) / one) ** 2 * local.excited * _is_broad(force)
-    spectrum = 2.0 * (local.noise / one**2 + own) / len(force)
+    own = (np.abs(local.value) / one) ** 2 * local.excited * force.broad
+    spectrum = 2.0 * (local.noise / one**2 + own) / samples
     widths = np.gradient(f)
     above = np.cumsum((spectrum * widths)[::-1])[::-1]
     slower = np.searchsorted(f, f / SLOW)
     other = np.maximum(above[slower] - step**2 / 4.0, 0.0)
-    amplitude = np.sqrt(2.0 * np.mean((force - np.mean(force)) ** 2))
+    amplitude = np.sqrt(2.0 * force.variance)
     steps = np.abs(local.value) / one * amplitude / step
     largest = 2.0 / np.pi * np.minimum(1.0, 0.7 / np.sqrt(np.maximum(steps, 1e-9))) * step / amplitude
     return np.asarray(largest * np.exp(-2.0 * np.pi**2 * other / step**2) / LARGEST_IN_DEVIATIONS)
-
-
-def _is_broad(force: Floats) -> bool:
-    """Whether the force holds many frequencies at a time, as noise does and a sweep does not."""
-    pieces = force[: len(force) // PIECE * PIECE].reshape(-1, PIECE)
-    pieces = pieces[:: max(1, len(pieces) // MOST_PIECES)]
-    power = np.abs(np.fft.rfft(pieces * np.hanning(PIECE), axis=1)) ** 2
-    total = np.sum(power, axis=1)
-    taking_part = total**2 / np.maximum(np.sum(power**2, axis=1), 1e-300)
-    return bool(np.sum(total * taking_part) > 0.25 * PIECE / 2.0 * np.sum(total))
 
 
 def _excited(places: Floats, power: Floats) -> Flags:
