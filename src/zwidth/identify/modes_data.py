@@ -76,14 +76,20 @@ class FittedData:
             return "the last fourth of each stretch"
         return "every fourth line of the transform, as the record excites each frequency only once"
 
-    def parts(self) -> Iterator[tuple[int, str, Lines, Lines | None]]:
+    def parts(self, only: tuple[int, int] | None = None) -> Iterator[tuple[int, str, Lines, Lines | None]]:
         """Record, name, and lines for the fit and for the validation, of each stretch; None: all of it is for the
-        other."""
+        other.
+
+        only  record and number of a single stretch; None: all
+        """
         n, last = 0, self.survey.stretches - self.survey.stretches // UNSEEN
         for k, source in enumerate(self.sources):
             if k in self.dropped:
                 continue
             for i, stretch in enumerate(source.stretches()):
+                if only is not None and (k, i) != only:
+                    n += 1
+                    continue
                 label = source.record.label + (f", stretch {i + 1}" if i or self.survey.stretches > 1 else "")
                 cut = len(stretch.force) - len(stretch.force) // UNSEEN
                 if self._whole:
@@ -123,12 +129,7 @@ class FittedData:
         """
         fitted = BandedRecord(where, self.period, self.closed, self.noise)
         unseen = BandedRecord(unseen_where, self.period, self.closed, self.noise)
-        counts = dict[int, int]()
-        for k, _, lines, rest in self.parts():
-            i = counts.get(k, 0)
-            counts[k] = i + 1
-            if only is not None and (k, i) != only:
-                continue
+        for _, _, lines, rest in self.parts(only):
             fitted.add(lines)
             if rest is not None:
                 unseen.add(rest)

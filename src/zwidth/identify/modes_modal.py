@@ -325,13 +325,18 @@ def _columns(
     elif base == "free, braked":
         columns.append(_row(0.5 * float(np.exp(vector[1])), 0.0, period, delay, theta))
     rates, ratios = np.exp(vector[before::2]), np.exp(vector[before + 1 :: 2])
-    for w, zeta in zip(rates, ratios, strict=True):
-        columns.append(_mode(float(w), float(zeta), period, delay, theta, damping))
+    modes = list(zip(rates.tolist(), ratios.tolist(), strict=True))
+    for w, zeta in modes:
+        columns.append(_row(zeta * w, w**2, period, delay, theta))
+    if damping == "hysteretic" and modes:
+        aliased = _aliased_hold(period, delay, theta)
+        for k, (w, zeta) in enumerate(modes, len(columns) - len(modes)):
+            columns[k] = columns[k] + _added_by_loss(w, zeta, aliased)
     fast = FASTEST * np.pi / period
     columns.append(_row(fast, fast**2, period, delay, theta))
     if coupled:
-        for w, zeta in zip(rates, ratios, strict=True):
-            columns.append(_row(float(zeta * w), float(w**2), period, delay, theta, 1.0 / float(w)))
+        for w, zeta in modes:
+            columns.append(_row(zeta * w, w**2, period, delay, theta, 1.0 / w))
     return np.column_stack(columns)
 
 
@@ -358,14 +363,18 @@ def _rows(
     return np.asarray(top / ((d + d1) * d + d0) / z**whole)
 
 
-def _mode(rate: float, ratio: float, period: float, delay: float, theta: Floats, damping: Damping) -> Complexes:
-    viscous = _row(ratio * rate, rate**2, period, delay, theta)
-    if damping == "viscous":
-        return viscous
-    k = np.arange(-ALIASES, ALIASES + 1)
-    w = (theta[:, None] + 2.0 * np.pi * k) / period
-    stiff = rate**2 - w**2
-    loss = 2.0 * ratio * rate
-    lossy = 1.0 / (stiff + 1j * np.sign(w) * loss * rate) - 1.0 / (stiff + 1j * w * loss)
-    hold = np.exp(-1j * w * delay * period) * -np.expm1(-1j * theta)[:, None] / (1j * w)
-    return np.asarray(viscous + np.sum(lossy * hold, axis=1) / period)
+def _aliased_hold(period: float, delay: float, theta: Floats) -> tuple[Floats, Complexes]:
+    """Rates (n, k) that sampling folds onto angles (n,), and the held and delayed response of 1 at each of them,
+    over the period."""
+    w = (theta[:, None] + 2.0 * np.pi * np.arange(-ALIASES, ALIASES + 1)) / period
+    hold = np.exp(-1j * w * delay * period) * -np.expm1(-1j * theta)[:, None] / (1j * w * period)
+    return w, np.asarray(hold)
+
+
+def _added_by_loss(rate: float, ratio: float, aliased: tuple[Floats, Complexes]) -> Complexes:
+    """What a mode with a loss factor has more than one with a damper (n,): 1/(S + i a) - 1/(S + i b), where
+    S = w_0^2 - w^2, a = sign(w) 2 zeta w_0^2, b = 2 zeta w_0 w."""
+    w, hold = aliased
+    stiff, loss = rate**2 - w**2, 2.0 * ratio * rate
+    a, b = np.sign(w) * loss * rate, loss * w
+    return np.asarray(np.sum(1j * (b - a) * hold / ((stiff + 1j * a) * (stiff + 1j * b)), axis=1))
