@@ -5,8 +5,8 @@ anew in a temporary folder, one file at a time. `ZWIDTH_RECORD_S=360 python benc
 of so many seconds. Each side is a process of its own, timed as a whole, with its largest resident memory.
 
 Before them two masses are fitted to a short record in memory. A boundary is no long record, and has no row. A kind
-that is added to BENCHES and to PEERS gets one. Seconds of the processor stand beside those of the clock, which other
-work on the computer lengthens; the ratio is of the former.
+that is added to BENCHES and to PEERS gets one. Seconds of the processor stand beside those of the clock, which
+other work on the computer lengthens; the ratio is of the former.
 """
 
 from __future__ import annotations
