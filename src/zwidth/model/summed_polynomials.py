@@ -12,11 +12,11 @@ piece, which has 32 or more.
 
 from __future__ import annotations
 
+from math import comb
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import comb
+from numpy.typing import ArrayLike, NDArray
 
 from zwidth.model.local_polynomials import CHUNK, ORDER, Fits
 
@@ -26,6 +26,7 @@ Complexes = NDArray[np.complex128]
 TERMS: Final = ORDER + 2  # coefficients of a cubic
 PIECES: Final = 4  # in a window
 NARROWEST_WINDOW: Final = 64  # half of it, in spacings: C takes four values of thirty-two
+BINOMIALS: Final = np.array([[comb(p, q) for p in range(TERMS)] for q in range(TERMS)], dtype=np.float64)
 UNEXCITED: Final = 1e-9  # of the largest force at any frequency, below which a window tells nothing
 
 
@@ -57,7 +58,7 @@ class PieceSums:
             columns[..., :TERMS] = self._powers
             columns[..., TERMS:-1] = u[some][..., None] * self._powers
             columns[..., -1] = y[some]
-            below = np.linalg.qr(columns, mode="r")[:, TERMS:, TERMS:]
+            below = np.asarray(np.linalg.qr(columns, mode="r"))[:, TERMS:, TERMS:]
             self._triangles[some] = _reduced([self._triangles[some], below])
         self._blocks += 1
 
@@ -102,14 +103,14 @@ def _reduced(stacked: list[Complexes]) -> Complexes:
     return np.asarray(np.linalg.qr(np.concatenate(stacked, axis=1), mode="r"), dtype=np.complex128)
 
 
-def _moved(middle: Floats | float, half: float) -> Floats:
+def _moved(middle: ArrayLike, half: float) -> Floats:
     """What turns columns u R^p of a piece into u r^p of a window, (n, 5, 5), where r = middle + half R:
     r^p = sum over q of (p over q) middle^(p - q) half^q R^q."""
     q, p = np.arange(TERMS)[:, None], np.arange(TERMS)
-    about = np.atleast_1d(middle)[:, None, None]
+    about = np.atleast_1d(np.asarray(middle, dtype=np.float64))[:, None, None]
     matrix = np.zeros((len(about), TERMS + 1, TERMS + 1))
     matrix[:, -1, -1] = 1.0
-    matrix[:, :-1, :-1] = comb(p, q) * about ** np.maximum(p - q, 0) * half**q
+    matrix[:, :-1, :-1] = BINOMIALS * about ** np.maximum(p - q, 0) * half**q
     return matrix
 
 
