@@ -20,7 +20,7 @@ def signals():
 def pieces(u, y, *cuts):
     rows = np.arange(len(u))
     for part in np.split(rows, cuts):
-        yield {"force": u[part], "position": y[part], "row": part}
+        yield {"force": u[part], "position": y[part], "sample": part}
 
 
 def test_they_are_those_of_scipy(signals):
@@ -38,7 +38,7 @@ def test_no_segment_reaches_across_a_gap(signals):
     u, y = signals
     rows = np.r_[:900, 1000:1900]
     both = [
-        {"force": u[part], "position": y[part], "row": part} for part in (np.arange(900), np.arange(1000, 1900))
+        {"force": u[part], "position": y[part], "sample": part} for part in (np.arange(900), np.arange(1000, 1900))
     ]
     found = averaged_spectra(both, 1e-3, 256, {"force": 0, "position": 0})
     apart = merged(

@@ -18,6 +18,7 @@ from zwidth.identify.friction_joint import Joint
 from zwidth.identify.friction_start import SHORTEST, weighted_balance, weighting
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.joint_identification import FittedJoint, fitted_joint
+from zwidth.identify.plausible import check_mass_in_file
 from zwidth.identify.record import Record
 from zwidth.progress import Progress
 
@@ -78,6 +79,9 @@ def identify_friction(
         return refused("friction", device.label, checks) or Identification("friction", device.label, checks)
     estimates = [*friction_estimates(fitted), *mass_estimates(fitted)]
     checks += (check_speeds(fitted), *([check_mass(fitted)] if fitted.motion.driven else []), *check_drift(fitted))
+    checks += (*mass_in_file(fitted),)
+    if (nothing := refused("friction", device.label, checks)) is not None:
+        return nothing
     return identification("friction", device, fitted, checks, estimates)
 
 
@@ -241,6 +245,14 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
         "force, such as steps in both directions",
         warning=not (needed and useless),
     )
+
+
+def mass_in_file(fitted: FittedJoint) -> list[Check]:
+    """Whether the mass is of the size that the file gives; [] in free motion, which tells none."""
+    if not fitted.motion.driven:
+        return []
+    joint, value = fitted.joint, float(fitted.fit.numbers.values[MASS])
+    return check_mass_in_file(joint.mass_name, value, joint.mass, joint.unit("mass"), turns=joint.angular)
 
 
 def check_drift(fitted: FittedJoint) -> list[Check]:

@@ -29,6 +29,7 @@ from zwidth.identify.impedance_spectra import (
     stretches_of,
     wall_states,
 )
+from zwidth.identify.plausible import check_periods
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling
 from zwidth.identify.spectra import Spectra, averaged_spectra, merged, segment_length
@@ -53,6 +54,7 @@ THOUSAND: Final = (2.3, 3.7)  # powers of ten that a forgotten thousand may look
 FAR_OFF: Final = 2.3  # powers of ten
 OPPOSITE: Final = -0.5  # cosine of the phase between measured and predicted, of a force with the wrong sign
 BELOW_HALF: Final = 0.95  # of half the sampling rate up to which lines are used
+CLIPPED: Final = 0.15  # share of them, from which on the force is not what acted
 STATES: Final = {"on": "wall on", "off": "wall off"}
 
 
@@ -108,6 +110,7 @@ def identify_impedance(
             f"the records have sampling periods from {min(periods):.6g} to {max(periods):.6g} s; give each alone"
         )
         return Identification(KIND, device.label, (*checks, Check("sampling", False, text)))
+    checks += check_periods(records, samplings, device.controller.sampling_period)
     for number, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
         report("looking at the records", number, len(records))
         checks += _check_signals(record, sampling)
@@ -205,7 +208,7 @@ def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
             f"the force of {record.label} is at its extreme in {held} of {total} samples, as if it were limited "
             "there; leave that stretch out, or push less"
         )
-        checks.append(Check("force", False, text, warning=True))
+        checks.append(Check("force", False, text, warning=held < CLIPPED * total))
     return checks
 
 
@@ -247,7 +250,8 @@ def _state(
     if len(impedance) < FEWEST_LINES:
         text = (
             f"{STATES[name]}: hand force and motion go together at {len(impedance)} of {len(spectra.frequency)} "
-            "frequencies only; push with more force, over more of the frequencies"
+            "frequencies only; push with more force, over more of the frequencies; or has a sign flipped in between, "
+            "or one of the columns stood still?"
         )
         return None, Check("coherence", False, text)
     f, c = impedance.frequency, impedance.coherence

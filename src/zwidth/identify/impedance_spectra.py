@@ -130,7 +130,7 @@ def stretches_of(
         ends = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(int), [0]])))
         for low, high in ends.reshape(-1, 2):
             some = slice(int(low), int(high))
-            yield {FORCE: piece[names[0]][some], POSITION: piece[names[1]][some], "row": row[some]}
+            yield {FORCE: piece[names[0]][some], POSITION: piece[names[1]][some], "sample": piece["sample"][some]}
 
 
 ON: Final = ("on", "1", "1.0", "true", "yes", "wall")

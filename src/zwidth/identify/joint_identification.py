@@ -29,6 +29,7 @@ from zwidth.identify.friction_record import Motion, read_motion, windows_of
 from zwidth.identify.friction_sense import reason_of_misfit
 from zwidth.identify.friction_start import first_starts, search_guess
 from zwidth.identify.identification import Check
+from zwidth.identify.plausible import check_periods
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling
 from zwidth.progress import Progress
@@ -125,6 +126,7 @@ def fitted_joint(
     checks += _enough(motion, samplings)
     if any(not check.passed for check in checks):
         return tuple(checks), None
+    checks += check_periods(records, samplings, device.controller.sampling_period)
     motion = _limited(motion, joint)
     windows = windows_of(motion)
     checks += checks_of(motion, windows, joint)
@@ -231,8 +233,9 @@ def _no_minimum(fit: JointFit) -> Check:
     return Check(
         "search",
         False,
-        f"the numbers that predict {count} windows best were not found, as where the joint hardly slides, or at "
-        "one speed only; record a larger force that changes in size and sign",
+        f"the numbers that predict {count} windows best were not found, as where the joint hardly slides, at "
+        "one speed only, or under another force than the one recorded (saturated, or late): record a larger force "
+        "that changes in size and sign, as it acts",
     )
 
 

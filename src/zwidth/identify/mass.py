@@ -11,6 +11,7 @@ from zwidth.identify.friction import (
     friction_estimates,
     identification,
     mass_estimates,
+    mass_in_file,
 )
 from zwidth.identify.friction_joint import COLUMNS as COLUMNS
 from zwidth.identify.identification import Check, Identification, refused
@@ -39,7 +40,7 @@ def identify_mass(
         checks += (Check("force", False, reason),)
         fitted = None
     elif fitted is not None:
-        checks += (check_mass(fitted, needed=True), *check_drift(fitted))
+        checks += (check_mass(fitted, needed=True), *mass_in_file(fitted), *check_drift(fitted))
     nothing = refused("mass", device.label, checks)
     if fitted is None or nothing is not None:
         return nothing or Identification("mass", device.label, checks)

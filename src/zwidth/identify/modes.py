@@ -65,6 +65,9 @@ MOST_ROUNDS: Final = 4
 STRONG: Final = 10.0  # difference of the information criterion that is clear (Kass and Raftery 1995)
 SHIFTED: Final = -0.5  # samples of delay, below which nothing more is fitted
 MISFIT: Final = 1.5  # by which residuals may exceed the noise before a model is said to miss something
+FOLLOWED: Final = 0.97  # share of the unseen motion that follows a force with flat tops, if it is what acted
+FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
+LEVELS_READ: Final = 100_000  # samples in which they are counted
 CURVE: Final = 2000  # points of a curve at most
 
 
@@ -301,10 +304,24 @@ def _fitted(
 
     curves = _curves(survey.spectra, seen, fitted)
     share = explained_share(unseen_part, fitted)
+    if _clipped(checks, data.sources) and share < FOLLOWED:
+        reason = (
+            f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another force "
+            "acted there than is written; drive less, or write what the amplifier gave"
+        )
+        return Identification("modes", device.label, (*checks, Check("validation", False, reason)))
     text = f"{data.unseen}, predicted from its force"
     return Identification(
         "modes", device.label, tuple(checks), tuple(estimates), share, text, tuple(remarks), curves, details
     )
+
+
+def _clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
+    """Whether a force has flat tops and is none that steps between a few levels on purpose."""
+    if all(check.passed for check in checks if check.what == "saturation"):
+        return False
+    first = [one for one in (source.first() for source in sources) if one is not None]
+    return any(len(np.unique(one.force[:LEVELS_READ])) > FEW_LEVELS for one in first)
 
 
 def _damping_remark(difference: float) -> str:

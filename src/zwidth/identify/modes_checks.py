@@ -115,7 +115,8 @@ def coherence_check(spectra: Spectra, excited: NDArray[np.bool_], closed: bool) 
     if not len(good) or coherence[excited].mean() < RELATED * by_chance:
         reason = (
             f"the coherence is {coherence[excited].mean():.2g} in the mean, as of unrelated columns: the "
-            "position does not follow the force; are the columns of one run, and of one time?"
+            "position does not follow the force; are the columns of one run, and of one time, has a sign flipped "
+            "in between, or one of them stood still?"
         )
         return Check("coherence", False, reason), 0.0
     top, last = float(f[good[-1]]), float(f[excited][-1])

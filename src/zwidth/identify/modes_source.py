@@ -97,18 +97,18 @@ class Source:
     def _read(self) -> Iterator[Stretch]:
         held, after = dict[str, Floats](), -1
         for piece in self.sampling.stretches(self.record):
-            rows = piece["row"]
-            if not len(rows):
+            numbers = piece["sample"]
+            if not len(numbers):
                 continue
             part = {field_: piece[name] for field_, name in self.channels.names.items()}
-            if held and int(rows[0]) == after:
+            if held and int(numbers[0]) == after:
                 part = {name: np.concatenate([held[name], values]) for name, values in part.items()}
             elif held:
                 yield from _stretch(held)
             while len(part["force"]) >= BLOCK:
                 yield from _stretch({name: values[:BLOCK] for name, values in part.items()})
                 part = {name: values[BLOCK:] for name, values in part.items()}
-            held, after = part, int(rows[-1]) + 1
+            held, after = part, int(numbers[-1]) + 1
         if held:
             yield from _stretch(held)
 

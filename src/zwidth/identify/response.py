@@ -15,6 +15,7 @@ from zwidth.device.faults import plural
 from zwidth.identify.columns import Columns
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.record import Record
+from zwidth.identify.response_checks import check_prediction, check_responses
 from zwidth.identify.sampling import check_sampling
 from zwidth.identify.sweep_blocks import SweepBlocks, SweepRange
 from zwidth.loop.controller import Controller
@@ -82,13 +83,17 @@ def identify_response(
         return Identification(KIND, device.label, tuple(checks))
     response = _together(responses)
     checks.append(_usable(response))
+    columns = next(one for one in FORCES if one in records[0]), "position_m"
+    if checks[-1].passed:
+        checks += check_responses(device, responses, [record.label for record in records], columns)
+        shares = [_share_explained(response, sweep.part(fitted, len(sweep)), length, period) for sweep in sweeps]
+        checks += check_prediction(min(shares))
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     chart, why = _chart(response, device.controller)
     checks.append(Check("chart", chart is not None, why))
     if chart is None:
         return Identification(KIND, device.label, tuple(checks), curves=_columns(responses))
-    shares = [_share_explained(response, sweep.part(fitted, len(sweep)), length, period) for sweep in sweeps]
     return Identification(
         KIND,
         device.label,
@@ -186,6 +191,11 @@ def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | 
         chart = measured_chart(response, computer)
     except ResponseError as error:
         return None, str(error)
+    if not np.isfinite(chart.stiffness_max_nominal):
+        return None, (
+            "no wall with a stiffness above 0 is stable by this response; write in each row the reading and the force "
+            "sent after it, as commanded: a force that was measured, or rows that are shifted, come too late"
+        )
     return chart, f"poles at z = 1: {chart.integrators}"
 
 

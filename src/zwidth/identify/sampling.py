@@ -18,6 +18,7 @@ UNEVEN: Final = 0.2  # share of the period by which a step may be longer or shor
 MOST_UNEVEN: Final = 0.01  # share of the steps that may be so
 FIRST: Final = 20_000  # rows from which the period is read at first
 FEWEST: Final = 100  # rows of a record
+ROUNDING: Final = 1e-8  # share of the period by which steps differ as numbers are rounded
 SAME_PERIOD: Final = 1e-3  # relative, by which the record's period may differ from the computer's
 
 
@@ -44,17 +45,23 @@ class Sampling:
         return int(np.max(np.diff(self.runs, axis=1), initial=0))
 
     def stretches(self, record: Record) -> Iterator[Piece]:
-        """The record's pieces, cut at the gaps, each with the row of its first sample in the column "row"."""
+        """The record's pieces, cut at the gaps, with two further columns.
+
+        row     of each sample in the record
+        sample  its number, which leaves out one at each gap: a piece goes on where the one before has ended only if
+                its numbers do, also where rows are not there
+        """
         start = 0
         for piece in record.pieces():
             rows = len(piece["time_s"])
             first = int(np.searchsorted(self.runs[:, 1], start, side="right"))
-            for low, high in self.runs[first:]:
+            for run, (low, high) in enumerate(self.runs[first:], first):
                 if low >= start + rows:
                     break
                 inside = slice(max(low - start, 0), min(high - start, rows))
                 cut = {name: values[inside] for name, values in piece.items()}
-                yield cut | {"row": np.arange(start + inside.start, start + inside.stop)}
+                row = np.arange(start + inside.start, start + inside.stop)
+                yield cut | {"row": row, "sample": row + run}
             start += rows
 
 
@@ -115,9 +122,25 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[Samplin
     if period is not None and abs(sampling.period / period - 1.0) > SAME_PERIOD:
         return failed(
             f"the rows of {record.label} come every {sampling.period:.6g} s, the device's computer samples every "
-            f"{period:.6g} s; record every sample of the loop, or correct loop.sampling_period_s"
+            f"{period:.6g} s; "
+            + (
+                unit_of_time(sampling.period / period)
+                or "record every sample of the loop, or correct loop.sampling_period_s"
+            )
         )
     return sampling, Check("sampling", True, _sentence(sampling))
+
+
+def unit_of_time(ratio: float) -> str:
+    """The question whether time_s is in another unit, by the ratio of its period to the computer's; "" where none.
+
+    >>> unit_of_time(900.0)
+    'is time_s in milliseconds? multiply by 0.001'
+    """
+    for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6)):
+        if 0.5 < ratio / factor < 2.0:
+            return f"is time_s in {unit}? multiply by {1.0 / factor:g}"
+    return ""
 
 
 def _usual_step(time: NDArray[np.float64]) -> float:
@@ -131,5 +154,9 @@ def _usual_step(time: NDArray[np.float64]) -> float:
 def _sentence(sampling: Sampling) -> str:
     gaps = len(sampling.runs) - 1
     lost = f", {plural(sampling.missing, 'sample')} missing in {plural(gaps, 'gap')}" if sampling.missing else ""
-    jitter = f", steps even to {100 * sampling.jitter / sampling.period:.2g} %" if sampling.jitter else ""
+    jitter = (
+        f", steps even to {100 * sampling.jitter / sampling.period:.2g} %"
+        if sampling.jitter > ROUNDING * sampling.period
+        else ""
+    )
     return f"{sampling.rows} rows every {sampling.period:.6g} s{jitter}{lost}"

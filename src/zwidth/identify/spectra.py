@@ -109,7 +109,7 @@ def averaged_spectra(
     """Welch's averaged spectra of pieces of a record: Hann windows of `length` that overlap by half, each less its
     mean, none across a gap (Welch 1967).
 
-    stretches    pieces with a column "row" that numbers the samples, as `Sampling.stretches` makes them; without
+    stretches    pieces with a column "sample" that numbers the samples, as `Sampling.stretches` makes them; without
                  it a gap lies between each two
     differences  channels, and how often each is differenced: a position that drifts leaks into every line
     """
@@ -119,10 +119,10 @@ def averaged_spectra(
     kept, after = np.empty((len(names), 0)), -1
     for piece in stretches:
         values = np.array([piece[name] for name in names])
-        rows = piece.get("row", np.zeros(0, dtype=int))
-        joins = len(rows) > 0 and int(rows[0]) == after
+        numbers = piece.get("sample", np.zeros(0, dtype=int))
+        joins = len(numbers) > 0 and int(numbers[0]) == after
         kept = np.concatenate([kept, values], axis=1) if joins else values
-        after = int(rows[-1]) + 1 if len(rows) else -1
+        after = int(numbers[-1]) + 1 if len(numbers) else -1
         kept = sums.add(kept, order)
     usable = slice(2, None)
     n = max(sums.count, 1)

@@ -106,6 +106,8 @@ def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> Sp
     for _ in range(len(EXTENSIONS) + 1):
         good &= ~_outliers(fit.residuals, good)
         kept = good & ~_across_kink(fit, strokes)
+        if np.count_nonzero(kept) <= len(fit.names):
+            kept = good
         fit = _fit(fit.names, strokes, resolution, kept, fit)
         better = _best_extension(fit, strokes, resolution, kept, both_sides)
         if better is None:

@@ -75,6 +75,8 @@ def _runs_by_drive(device: Device, records: Sequence[Record], joint: str | None)
             label = record.label if len(names) == 1 else f"{record.label}, joint {name}"
             run = Run(label, torque[mine], angle[mine], rows.together, rows.left_out)
             runs.setdefault(drive.path, (drive, []))[1].append(run)
+    if not runs:
+        raise records[0].fault("has no rows; record torque and angle")
     return list(runs.values())
 
 

@@ -69,6 +69,8 @@ def check_runs(
     Later checks are left out where an earlier one fails without which they mean nothing.
     """
     checks = [_rows(runs)]
+    if not checks[0].passed:
+        return checks, Resolution(known_step, 0.0), False
     constant = _constant(runs)
     if constant is not None:
         checks.append(constant)
@@ -168,7 +170,7 @@ def _motion(runs: Sequence[Run], resolution: Resolution) -> Check:
             "motion",
             False,
             f"the angle's noise is {resolution.noise:.3g} rad and its range {span:.3g} rad; use more torque, or "
-            "average",
+            "average; are the rows in the order of time?",
         )
     counts = (
         f"{span / resolution.step:.4g} counts of {resolution.step:.4g} rad"

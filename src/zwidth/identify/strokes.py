@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BINS: Final = 24  # of a stroke
+FEWEST_BINS: Final = 6  # of a stroke: bins across the kink at 0 are left out, and others must remain
 MOST_BINS: Final = 6000  # of a record
 LEAST_TURN: Final = 0.05  # share of the range by which the angle comes back where it turns
 TURN_COUNTS, TURN_NOISE = 3.0, 8.0  # or so many counts, or standard deviations of the noise
@@ -139,7 +140,7 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
         rows = start + _moving(sign * torque[start : end + 1], sign * angle[start : end + 1], stuck)
         if len(rows) < 2:
             continue
-        for part in np.array_split(rows, min(max(MOST_BINS // (len(turns) - 1), 2), BINS, len(rows))):
+        for part in np.array_split(rows, min(max(MOST_BINS // (len(turns) - 1), FEWEST_BINS), BINS, len(rows))):
             place = float(np.mean(part)) / max(len(angle) - 1, 1)
             reach = 0.5 * abs(float(angle[part[-1]] - angle[part[0]])) if len(part) > 1 else 0.0
             mean = float(np.mean(torque[part])), float(np.mean(angle[part]))

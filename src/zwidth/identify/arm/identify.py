@@ -49,7 +49,8 @@ from zwidth.identify.arm.parameters import BaseParameters, Parameters, base_para
 from zwidth.identify.arm.regression import Regression, regress
 from zwidth.identify.arm.smoothing import Band, choose_band
 from zwidth.identify.arm.stretches import Stretch, TorqueTiming, smoothed
-from zwidth.identify.identification import Check, Identification, refused
+from zwidth.identify.identification import Check, Estimate, Identification, refused
+from zwidth.identify.plausible import check_mass_in_file, check_periods
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling
 from zwidth.loop.operating_point import OperatingPoint
@@ -209,7 +210,8 @@ class _Work:
         checks += self._fit_checks(fit, base, beta, seen, validation, weights, band)
         if stop := self.refusal(checks):
             return stop
-        return self._result(checks, base, fit, beta, band, validation)
+        result = self._result(checks, base, fit, beta, band, validation)
+        return self.refusal(result.checks) or result
 
     # --- before the fit ---------------------------------------------------------------------------------
 
@@ -229,6 +231,8 @@ class _Work:
                     Check("sampling", False, f"records of different periods, {listed}; give those of one")
                 )
             period = self.device.controller.sampling_period
+            if self.torque == "measured":
+                checks += check_periods(self.records, samplings, period)
             if self.torque == "commanded" and abs(periods[0] / period - 1.0) > 1e-3:
                 reason = f"rows come every {periods[0]:.6g} s, but the computer commands every {period:.6g} s"
                 checks.append(Check("sampling", False, f"{reason}; correct loop.sampling_period_s, or the time"))
@@ -378,6 +382,14 @@ class _Work:
 
     # --- the result ---------------------------------------------------------------------------------------
 
+    def _mass_checks(self, rigid: Estimate) -> list[Check]:
+        """Whether the first effective mass is of the size that the file gives, where it gives all numbers."""
+        if self.device.missing:
+            return []
+        known = float(np.asarray(self.point.measure("rigid_mass"), dtype=np.float64).ravel()[0])
+        turns = not np.any(self.mechanism.links.joint == PRISMATIC)
+        return check_mass_in_file(rigid.name, rigid.value, known, rigid.unit, turns=turns)
+
     def _result(
         self,
         checks: Sequence[Check],
@@ -401,6 +413,7 @@ class _Work:
             *base_estimates(base, fit, beta),
             delay_estimate(fit),
         ]
+        checks += self._mass_checks(estimates[0])
         remarks = (
             f"torques were {self.torque}, at the {self.side}s; the rotors' inertias were {self.rotors}",
             f"compared up to {band.edge:.3g} Hz",

@@ -1,0 +1,632 @@
+"""Records that are not like simulations: virtual benches of all kinds, and what goes wrong on real ones.
+
+The page docs/faulty-records.md shows what `zwidth identify` says to each, and a test holds the two together.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, replace
+from functools import cache
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import zwidth
+from tests.identify.arm_benches import chain_columns, chain_device, moved_records, random_chains
+from tests.identify.boundary_cases import measured
+from tests.identify.impedance_bench import DOCUMENT, pushed
+from tests.identify.modes_bench import quantised, readings
+from tests.identify.spring_bench import bench_record
+from tests.identify.virtual_joint import Joint, records_of
+from zwidth.chart.edge_crossings import EdgeChords
+from zwidth.device.load import from_document
+from zwidth.model.plant import Plant
+from zwidth.show.cli.main import run
+from zwidth.show.output import csv_text
+
+Columns = dict[str, Any]
+
+PERIOD = 1e-3
+STEP = 1e-7  # m, of the benches' encoder
+COUNT = 4096
+DELAY = "loop.delay_samples"
+JOINT = Joint(
+    mass=0.12, damping=0.8, coulomb=0.5, bias=0.12, stiffness=0.0, step=2e-5, noise=1e-6, period=PERIOD,
+    delay=1.4, samples=1500,
+    tones=np.array([[2.0, 12.0, 0.3], [1.2, 31.0, 1.1], [0.8, 57.0, 2.0], [0.0, 1.0, 0.0]]),
+)  # fmt: skip
+
+
+# --- benches that work as they should -------------------------------------------------------------------------
+
+
+@cache
+def strokes(seed: int = 1, **more: Any) -> Columns:
+    """A drive of 0.45 and 0.35 N m/rad with 3 mN m of friction, drawn to both sides by its motor."""
+    spring = {"forward": 0.45, "backward": 0.35, "friction": 0.003, "amplitude": 0.045}
+    return bench_record(seed, **spring | more)
+
+
+@cache
+def driven(seed: int = 0) -> Columns:
+    """A joint of 0.12 kg with 0.5 N of dry friction and 0.8 N s/m, driven by three tones."""
+    return records_of([JOINT if not seed else replace(JOINT, tones=JOINT.tones[::-1], seed=seed)])[0]
+
+
+@cache
+def two_masses() -> zwidth.Device:
+    """The device of the sweeps and of the boundary: 0.12 and 0.05 kg on a spring of 9000 N/m, 1 kHz."""
+    return from_document(tomllib.loads(DOCUMENT), "bench")
+
+
+@cache
+def shaken(seed: int = 0, *, noise: float = 0.0, count: int = COUNT, cut: float = 0.0) -> Columns:
+    """Two masses under a random force, every sample of the loop, which acts 0.4 samples late.
+
+    noise  of the readings [m];   cut  share of the sampling rate above which the force has nothing
+    """
+    rng = np.random.default_rng(seed)
+    force = rng.normal(size=count)
+    if cut:
+        force = 5.0 * _low_pass(force, cut)
+    position = readings(two_masses().given_plant, PERIOD, force, 0.4) + (noise + STEP) * rng.normal(size=count)
+    return {"time_s": PERIOD * np.arange(count), "force_N": force, "position_m": quantised(position, STEP)}
+
+
+def _low_pass(values, cut):
+    spectrum = np.fft.rfft(values)
+    spectrum[int(cut * len(values)) :] *= 1e-3
+    return np.fft.irfft(spectrum, len(values))
+
+
+@cache
+def three_masses(count: int = 2500) -> Columns:
+    """Three masses in a row, with two resonances, where the file knows one."""
+    m = np.diag([0.05, 0.06, 0.03])
+    link, second = np.zeros((3, 3)), np.zeros((3, 3))
+    link[:2, :2] = second[1:, 1:] = [[1.0, -1.0], [-1.0, 1.0]]
+    ends = np.eye(3)
+    plant = Plant(m, 1.0 * link + 2.0 * second, 4e4 * link + 4e4 * second, ends[0], ends[0], handle=ends[2])
+    rng = np.random.default_rng(3)
+    force = rng.normal(size=count)
+    position = readings(plant, PERIOD, force, 0.4) + 20.0 * STEP * rng.normal(size=count)
+    return {"time_s": PERIOD * np.arange(count), "force_N": force, "position_m": quantised(position, STEP)}
+
+
+@cache
+def felt() -> Columns:
+    """The handle of the same device, pushed by a hand for 8 s, without a wall."""
+    return pushed(np.random.default_rng(5), two_masses(), seconds=8.0, resolution=1e-7, force_noise=1e-3)
+
+
+@cache
+def arm() -> tuple[zwidth.Device, Columns]:
+    """A planar arm of two links that a computer moves for 12 s, and its device file with other masses."""
+    rng = np.random.default_rng(11)
+    chains = random_chains(rng, 2, 1)
+    return chain_device(chains, 0, wrong=1.3), chain_columns(*moved_records(chains, rng, duration=12.0), 0)
+
+
+@cache
+def edge() -> Columns:
+    """The boundary of the two masses with a scatter of half a per cent."""
+    chords = EdgeChords.of(two_masses().with_({DELAY: 0.4}).at().chart(decay=False))
+    return measured(np.random.default_rng(2), chords, scatter=0.005)
+
+
+# --- what goes wrong --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FaultyRecord:
+    """A record with something wrong, and where `zwidth identify` speaks of it.
+
+    wrong    with the record, in words
+    kind     of measurement
+    runs     columns of each file, or its text
+    where    "fault" on standard error; "remark"; name of a check that did not pass; or of a number
+    words    that are said there
+    code     exit code: 0 a number is given all the same, 1 refused, 2 bad input
+    options  of the command
+    truth    name of a number -> true value, which its interval holds
+    """
+
+    wrong: str
+    kind: str
+    runs: Callable[[], tuple[Columns | str, ...]]
+    where: str
+    words: str
+    code: int = 1
+    options: tuple[str, ...] = ()
+    truth: Mapping[str, float] | None = None
+
+
+def changed(columns: Columns, **more: Callable[[Any], Any]) -> Columns:
+    """Columns of which some are changed, each by a function of itself."""
+    return {name: more.get(name, _same)(values) for name, values in columns.items()}
+
+
+def without(columns: Columns, first: int, behind: int) -> Columns:
+    """Columns of which some rows are not there."""
+    return {name: np.delete(np.asarray(values), slice(first, behind)) for name, values in columns.items()}
+
+
+def renamed(columns: Columns, **names: str) -> Columns:
+    """Columns under other names, two of them perhaps exchanged."""
+    return {names.get(name, name): values for name, values in columns.items()}
+
+
+def _same(values):
+    return values
+
+
+def _times(factor):
+    return lambda values: factor * np.asarray(values)
+
+
+def _clipped(limit):
+    return lambda values: np.clip(values, -limit, limit)
+
+
+def _turned_half_way(values):
+    return np.where(np.arange(len(values)) > len(values) // 2, -values, values)
+
+
+def _drifting(columns, name, rate):
+    return columns | {name: columns[name] + rate * columns["time_s"]}
+
+
+def _still_for_a_while(values):
+    return np.where((np.arange(len(values)) > 2000) & (np.arange(len(values)) < 2200), values[2000], values)
+
+
+def _uneven(time):
+    return time + 0.4e-3 * np.sin(np.arange(len(time)) ** 2)
+
+
+def _rows(columns, count):
+    return {name: values[:count] for name, values in columns.items()}
+
+
+def _measured_beside_commanded():
+    """The amplifier gives four fifths of the command, two samples late; both are recorded."""
+    force = driven()["force_N"]
+    return driven() | {"force_command_N": np.append(force[2:], [0.0, 0.0]) / 0.8}
+
+
+def _million():
+    """A million lines: strokes so slow that each reading is there 250 times."""
+    header, *lines = csv_text(strokes(count=4000)).splitlines(keepends=True)
+    return header + "".join(line * 250 for line in lines)
+
+
+UNIT_MASS = ("--set", "plant.mass_kg=0.1")  # the file's mass; that of the bench is 0.12
+GAPS = "a gap of missing samples"
+DRIFT = "the readings drift"
+FLIP = "a sign flips between runs"
+FADED = "coherence collapses above the resonance"
+SATURATED = "a saturated stretch"
+
+RECORDS: tuple[FaultyRecord, ...] = (
+    # not like simulations
+    FaultyRecord(
+        DRIFT,
+        "stiffness",
+        lambda: (strokes() | {"angle_rad": strokes()["angle_rad"] + np.linspace(0.0, 0.02, 6000)},),
+        "remark",
+        "drifts by",
+        0,
+        truth={"mechanism.drives.motor-right.stiffness_Nm_per_rad": 0.45},
+    ),
+    FaultyRecord(
+        DRIFT,
+        "friction",
+        lambda: (_drifting(driven(), "position_m", 0.05),),
+        "model",
+        "do not follow the rest",
+        0,
+        UNIT_MASS,
+        {"plant.mass_kg": 0.12},
+    ),
+    FaultyRecord(
+        FLIP,
+        "stiffness",
+        lambda: (strokes(), changed(strokes(2), torque_Nm=_times(-1.0))),
+        "sign",
+        "and grows in the other records",
+    ),
+    FaultyRecord(
+        FLIP,
+        "response",
+        lambda: (shaken(), changed(shaken(1), force_N=_times(-1.0))),
+        "runs agree",
+        "turned between",
+    ),
+    FaultyRecord(
+        FLIP, "modes", lambda: (shaken(), changed(shaken(1), force_N=_times(-1.0))), "runs agree", "turned between"
+    ),
+    FaultyRecord(
+        FLIP,
+        "arm",
+        lambda: (arm()[1], changed(arm()[1], **{"torque_Nm.link-1": _times(-1.0)})),
+        "signs",
+        "has the other sign",
+    ),
+    FaultyRecord(
+        "a sign flips in the middle of a run",
+        "response",
+        lambda: (changed(shaken(), force_N=_turned_half_way),),
+        "validation",
+        "has a sign flipped",
+    ),
+    FaultyRecord(
+        "a sign flips in the middle of a run",
+        "impedance",
+        lambda: (changed(felt(), handle_force_N=_turned_half_way),),
+        "coherence",
+        "has a sign flipped",
+    ),
+    FaultyRecord(
+        FADED,
+        "modes",
+        lambda: (shaken(noise=2e-5, count=2048),),
+        "coherence",
+        "it has collapsed",
+        0,
+        ("--fit", "modes"),
+        {"natural frequency of mode 1": 80.4},
+    ),
+    FaultyRecord(
+        FADED,
+        "response",
+        lambda: (shaken(noise=2e-5),),
+        "validation",
+        "of the unseen motion is predicted",
+        0,
+        (),
+        {"largest stiffness": 14724.0},
+    ),
+    FaultyRecord(
+        "several resonances",
+        "modes",
+        lambda: (three_masses(),),
+        "natural frequency of mode 2",
+        "Hz",
+        0,
+        ("--fit", "modes"),
+    ),
+    FaultyRecord(
+        "the force is a command, and less comes",
+        "friction",
+        lambda: (renamed(changed(driven(), force_N=_times(1.25)), force_N="force_command_N"),),
+        "remark",
+        "gain and offset are in all numbers",
+        0,
+        UNIT_MASS,
+        {"plant.mass_kg": 0.15},
+    ),
+    FaultyRecord(
+        "commanded and measured force, gain 0.8, 2 samples late",
+        "friction",
+        lambda: (_measured_beside_commanded(),),
+        "remark",
+        "0.8006 times force_command_N, 2 ms later",
+        0,
+        UNIT_MASS,
+        {"plant.mass_kg": 0.12},
+    ),
+    FaultyRecord(
+        "the measured force in place of the commanded one",
+        "response",
+        lambda: (changed(shaken(), force_N=lambda f: 0.8 * np.append([0.0, 0.0], f[:-2])),),
+        "chart",
+        "come too late",
+    ),
+    FaultyRecord(
+        "torques recorded 3 samples before they act",
+        "arm",
+        lambda: (_early_torques(),),
+        "timing",
+        "after their time stamps",
+        0,
+    ),
+    FaultyRecord(
+        GAPS, "impedance", lambda: (without(felt(), 1000, 1100),), "sampling", "100 samples missing in 1 gap", 0
+    ),
+    FaultyRecord(
+        GAPS,
+        "response",
+        lambda: (without(shaken(), 700, 760),),
+        "gaps",
+        "longest stretch without a gap",
+        0,
+        (),
+        {"largest stiffness": 14724.0},
+    ),
+    FaultyRecord(
+        SATURATED,
+        "stiffness",
+        lambda: (changed(strokes(), torque_Nm=_clipped(0.03)),),
+        "saturation",
+        "stands still",
+    ),
+    FaultyRecord(
+        SATURATED, "response", lambda: (changed(shaken(), force_N=_clipped(0.7)),), "saturation", "clipped?"
+    ),
+    FaultyRecord(
+        SATURATED,
+        "modes",
+        lambda: (changed(shaken(count=1024), force_N=_clipped(0.7)),),
+        "validation",
+        "another force acted",
+        1,
+        ("--fit", "modes"),
+    ),
+    FaultyRecord(
+        SATURATED,
+        "impedance",
+        lambda: (changed(felt(), handle_force_N=_clipped(2.0)),),
+        "force",
+        "as if it were limited",
+    ),
+    FaultyRecord(
+        SATURATED,
+        "arm",
+        lambda: (changed(arm()[1], **{"torque_Nm.link-1": _clipped(0.02)}),),
+        "torque",
+        "stands at the largest torque",
+        0,
+    ),
+    FaultyRecord(
+        "a reading stands still for a while",
+        "modes",
+        lambda: (changed(shaken(), position_m=_still_for_a_while),),
+        "coherence",
+        "stood still",
+    ),
+    # bad input
+    FaultyRecord("too short", "modes", lambda: (_rows(shaken(), 150),), "duration", "record longer"),
+    FaultyRecord("too short", "arm", lambda: (_rows(arm()[1], 150),), "length", "record longer"),
+    FaultyRecord("two lines", "friction", lambda: (_rows(driven(), 1),), "sampling", "at least 100 are needed"),
+    FaultyRecord(
+        "a header alone", "stiffness", lambda: ("torque_Nm,angle_rad\n",), "length", "at least 8 are needed"
+    ),
+    FaultyRecord(
+        "a million lines",
+        "stiffness",
+        lambda: (_million(),),
+        "length",
+        "1000000 readings",
+        0,
+        truth={"mechanism.drives.motor-right.stiffness_Nm_per_rad": 0.45},
+    ),
+    FaultyRecord(
+        "no excitation",
+        "modes",
+        lambda: (changed(shaken(), force_N=_times(0.0)),),
+        "excitation",
+        "excite the device",
+    ),
+    FaultyRecord(
+        "a constant column", "mass", lambda: (changed(driven(), position_m=_times(0.0)),), "motion", "is constant"
+    ),
+    FaultyRecord(
+        "swapped columns",
+        "stiffness",
+        lambda: (renamed(strokes(), torque_Nm="angle_rad", angle_rad="torque_Nm"),),
+        "hysteresis",
+        "swapped",
+    ),
+    FaultyRecord(
+        "swapped columns",
+        "response",
+        lambda: (renamed(shaken(), force_N="position_m", position_m="force_N"),),
+        "causality",
+        "swapped?",
+    ),
+    FaultyRecord(
+        "swapped columns",
+        "impedance",
+        lambda: (renamed(felt(), handle_force_N="handle_position_m", handle_position_m="handle_force_N"),),
+        "columns",
+        "swapped",
+    ),
+    FaultyRecord(
+        "swapped columns",
+        "boundary",
+        lambda: (renamed(edge(), stiffness_N_per_m="damping_Ns_per_m", damping_Ns_per_m="stiffness_N_per_m"),),
+        "columns",
+        "swapped",
+    ),
+    FaultyRecord(
+        "a column named in degrees",
+        "stiffness",
+        lambda: (renamed(strokes(), angle_rad="angle_deg"),),
+        "fault",
+        "multiply by pi/180",
+        2,
+    ),
+    FaultyRecord(
+        "degrees in angle_rad",
+        "stiffness",
+        lambda: (changed(strokes(amplitude=0.009), angle_rad=np.degrees),),
+        "stiffness in the file",
+        "is it degrees",
+    ),
+    FaultyRecord(
+        "degrees in angle_rad",
+        "arm",
+        lambda: (changed(arm()[1], **{"angle_rad.link-1": np.degrees}),),
+        "motion",
+        "in degrees",
+    ),
+    FaultyRecord(
+        "millimetres in position_m",
+        "mass",
+        lambda: (changed(driven(), position_m=_times(10.0), force_N=_times(0.01)),),
+        "mass in the file",
+        "in millimetres",
+        1,
+        UNIT_MASS,
+    ),
+    FaultyRecord(
+        "millimetres in position_m",
+        "response",
+        lambda: (changed(shaken(), position_m=_times(1e3)),),
+        "units",
+        "in millimetres",
+    ),
+    FaultyRecord(
+        "mN m in torque_Nm",
+        "arm",
+        lambda: (changed(arm()[1], **dict.fromkeys(("torque_Nm.link-1", "torque_Nm.link-2"), _times(1e3))),),
+        "mass in the file",
+        "in millinewton metres",
+    ),
+    FaultyRecord(
+        "milliseconds in time_s",
+        "friction",
+        lambda: (changed(driven(), time_s=_times(1e3)),),
+        "sampling period",
+        "in milliseconds",
+    ),
+    FaultyRecord(
+        "milliseconds in time_s",
+        "modes",
+        lambda: (changed(shaken(), time_s=_times(1e3)),),
+        "sampling",
+        "in milliseconds",
+    ),
+    FaultyRecord(
+        "N/mm in stiffness_N_per_m",
+        "boundary",
+        lambda: (changed(edge(), stiffness_N_per_m=_times(1e-3)),),
+        "units",
+        "N/mm",
+    ),
+    FaultyRecord(
+        "unsorted time",
+        "modes",
+        lambda: (changed(shaken(), time_s=lambda t: np.roll(t, 100)),),
+        "sampling",
+        "sort the rows",
+    ),
+    FaultyRecord(
+        "irregular time", "impedance", lambda: (changed(felt(), time_s=_uneven),), "sampling", "do not follow"
+    ),
+    FaultyRecord(
+        "missing values",
+        "boundary",
+        lambda: (changed(edge(), stiffness_N_per_m=lambda k: [np.nan, *k[1:]]),),
+        "rows",
+        "left out: line 2",
+        0,
+        (),
+        {DELAY: 0.4},
+    ),
+    FaultyRecord(
+        "another sampling rate than the file's",
+        "response",
+        lambda: (changed(shaken(), time_s=_times(0.8)),),
+        "sampling",
+        "correct loop.sampling_period_s",
+    ),
+    FaultyRecord(
+        "another sampling rate than the file's",
+        "mass",
+        lambda: (changed(driven(), time_s=_times(1.25)),),
+        "sampling period",
+        "if another recorder wrote it",
+        0,
+        UNIT_MASS,
+    ),
+    FaultyRecord(
+        "a boundary that no parameter explains",
+        "boundary",
+        lambda: (changed(edge(), damping_Ns_per_m=lambda b: np.array(b) + 20.0 * np.sin(np.arange(len(b)))),),
+        "explained",
+        "no value of the numbers that were named explains",
+    ),
+)
+
+
+def _early_torques():
+    """Torques that act 3 samples after they were written."""
+    return {name: v[3:] if name.startswith("torque") else v[:-3] for name, v in arm()[1].items()}
+
+
+# --- what is said of it -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What `zwidth identify` says: its exit code, the sentence that a record is about, and all numbers."""
+
+    code: int
+    said: str
+    numbers: Mapping[str, Mapping[str, Any]]
+
+
+def answer(record: FaultyRecord, folder: Path) -> Answer:
+    """Run the command on a record, with its files and the device's in a folder."""
+    files = []
+    for name, columns in zip(("first.csv", "second.csv"), record.runs(), strict=False):
+        files.append(folder / name)
+        text = columns if isinstance(columns, str) else csv_text(_arrays(columns))
+        files[-1].write_text(text, encoding="utf-8")
+    words = ("identify", record.kind, *files, *_device(record.kind, folder), *record.options, "--json")
+    out, err = StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = run([str(word) for word in words])
+    if record.where == "fault":
+        return Answer(code, _plain(err.getvalue(), folder), {})
+    document = json.loads(out.getvalue())
+    numbers = {one["path"] or one["name"]: one for one in document["parameters"]}
+    return Answer(code, _plain(_sentence(document, record, numbers), folder), numbers)
+
+
+def _sentence(document, record, numbers):
+    """The sentence of a document that holds the record's words; "" where nothing is said."""
+    if record.where in numbers:
+        one = numbers[record.where]
+        return f"{record.where}: {one['value']:.4g}, {one['low']:.4g} to {one['high']:.4g} {one['unit']}"
+    if record.where == "remark":
+        return next((text for text in document["remarks"] if record.words in text), "")
+    named = [one["reason"] for one in document["check"] if one["what"] == record.where]
+    return next((f"{record.where}: {text}" for text in named if record.words in text), "")
+
+
+def _plain(text, folder):
+    return text.replace(f"{folder}/", "").strip()
+
+
+def _arrays(columns):
+    return {name: np.asarray(values) for name, values in columns.items()}
+
+
+def _device(kind, folder):
+    """Options that name the device of a kind's bench; its file is written where it is not bundled."""
+    if kind == "stiffness":
+        return "--device", "five-bar", "--joint", "upper-right"
+    if kind in ("friction", "mass"):
+        return "--device", "hapkit-course"
+    path = folder / f"{kind}.toml"
+    path.write_text(_inline_toml(arm()[0].document) if kind == "arm" else DOCUMENT, encoding="utf-8")
+    return "--device", path, *(("--parameter", DELAY) if kind == "boundary" else ())
+
+
+def _inline_toml(document):
+    """A document as TOML, tables inline."""
+    return "".join(f"{key} = {_value(value)}\n" for key, value in document.items())
+
+
+def _value(value):
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_value(one)}" for key, one in value.items()) + "}"
+    return "[" + ", ".join(map(_value, value)) + "]" if isinstance(value, list | tuple) else json.dumps(value)
