@@ -250,8 +250,8 @@ def _state(
     if len(impedance) < FEWEST_LINES:
         text = (
             f"{STATES[name]}: hand force and motion go together at {len(impedance)} of {len(spectra.frequency)} "
-            "frequencies only; push with more force, over more of the frequencies; or has a sign flipped in between, "
-            "or one of the columns stood still?"
+            "frequencies only; push with more force, over more of the frequencies; or has a sign flipped in "
+            "between, or one of the columns stood still?"
         )
         return None, Check("coherence", False, text)
     f, c = impedance.frequency, impedance.coherence

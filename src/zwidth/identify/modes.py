@@ -306,8 +306,8 @@ def _fitted(
     share = explained_share(unseen_part, fitted)
     if _clipped(checks, data.sources) and share < FOLLOWED:
         reason = (
-            f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another force "
-            "acted there than is written; drive less, or write what the amplifier gave"
+            f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another "
+            "force acted there than is written; drive less, or write what the amplifier gave"
         )
         return Identification("modes", device.label, (*checks, Check("validation", False, reason)))
     text = f"{data.unseen}, predicted from its force"

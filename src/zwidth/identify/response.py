@@ -193,8 +193,8 @@ def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | 
         return None, str(error)
     if not np.isfinite(chart.stiffness_max_nominal):
         return None, (
-            "no wall with a stiffness above 0 is stable by this response; write in each row the reading and the force "
-            "sent after it, as commanded: a force that was measured, or rows that are shifted, come too late"
+            "no wall with a stiffness above 0 is stable by this response; write in each row the reading and the "
+            "force sent after it, as commanded: a force that was measured, or rows that are shifted, come too late"
         )
     return chart, f"poles at z = 1: {chart.integrators}"
 

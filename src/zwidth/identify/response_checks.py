@@ -54,7 +54,7 @@ def _gain(first: Response, other: Response) -> float:
 
 
 def _units(device: Device, f: Floats, size: Floats) -> list[Check]:
-    """Whether the response (n,) is not off by the factor of a unit from that of the file's model, where it has one."""
+    """Whether the response (n,) is not off by the factor of a unit from that of the file's model, if there is one."""
     if device.response is not None or device.missing:
         return []
     loop = device.at().loop
@@ -77,12 +77,12 @@ def check_prediction(share: float) -> list[Check]:
         return []
     if share > 0.0:
         text = (
-            f"only {100.0 * share:.3g} % of the unseen motion is predicted: noise, friction, or a device that changes; "
-            "record longer, with more force"
+            f"only {100.0 * share:.3g} % of the unseen motion is predicted: noise, friction, or a device that "
+            "changes; record longer, with more force"
         )
         return [Check("validation", False, text, warning=True)]
     text = (
-        "nothing of the unseen motion is predicted: the last third of the record is not of the device that the first "
-        "two are of; has a sign flipped, a column stood still, or something been moved in between?"
+        "nothing of the unseen motion is predicted: the last third of the record is not of the device that the "
+        "first two are of; has a sign flipped, a column stood still, or something been moved in between?"
     )
     return [Check("validation", False, text)]

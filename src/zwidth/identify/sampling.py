@@ -48,8 +48,8 @@ class Sampling:
         """The record's pieces, cut at the gaps, with two further columns.
 
         row     of each sample in the record
-        sample  its number, which leaves out one at each gap: a piece goes on where the one before has ended only if
-                its numbers do, also where rows are not there
+        sample  its number, which leaves out one at each gap: a piece goes on where the one before has ended only
+                if its numbers do, also where rows are not there
         """
         start = 0
         for piece in record.pieces():

@@ -109,8 +109,8 @@ def averaged_spectra(
     """Welch's averaged spectra of pieces of a record: Hann windows of `length` that overlap by half, each less its
     mean, none across a gap (Welch 1967).
 
-    stretches    pieces with a column "sample" that numbers the samples, as `Sampling.stretches` makes them; without
-                 it a gap lies between each two
+    stretches    pieces with a column "sample" that numbers the samples, as `Sampling.stretches` makes them;
+                 without it a gap lies between each two
     differences  channels, and how often each is differenced: a position that drifts leaks into every line
     """
     names = tuple(differences)
