@@ -10,7 +10,7 @@ from zwidth.identify.identification import Identification
 
 
 def both_ways(seed):
-    """Largest stiffness (nominal, low, high) of the sweep's own response, of the identified model; and the truth."""
+    """Largest stiffness (nominal, low, high) of the sweep's own response and of the model; and the truth."""
     rng = np.random.default_rng([41, seed])
     mass, period = rng.uniform(0.05, 0.3, 2), 1e-3
     w = 2.0 * np.pi * rng.uniform(40.0, 150.0)

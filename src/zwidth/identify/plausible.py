@@ -44,8 +44,8 @@ def check_periods(records: Sequence[Record], samplings: Sequence[Sampling], peri
             checks.append(Check("sampling period", False, f"{text}: {unit}"))
             continue
         text += (
-            "; right if another recorder wrote it. If not, all speeds and accelerations are wrong: correct time_s, "
-            "or loop.sampling_period_s"
+            "; right if another recorder wrote it. If not, all speeds and accelerations are wrong: correct "
+            "time_s, or loop.sampling_period_s"
         )
         checks.append(Check("sampling period", False, text, warning=True))
     return checks

@@ -54,7 +54,7 @@ def _gain(first: Response, other: Response) -> float:
 
 
 def _units(device: Device, f: Floats, size: Floats) -> list[Check]:
-    """Whether the response (n,) is not off by the factor of a unit from that of the file's model, if there is one."""
+    """Whether the response (n,) is off by the factor of a unit from that of the file's model."""
     if device.response is not None or device.missing:
         return []
     loop = device.at().loop
