@@ -22,6 +22,7 @@ FAR = 1e9  # how far lines are drawn, in `large_wall_scale`
 COARSE = 0.02  # distance of a coarse chord from the curve, in shares of the curve's distance from K = B = 0
 CLEAR = 0.2  # least |1 + L| / (1 + |L|) of a wall that is clear of the boundary
 LIKELY, SURE = 28, 7  # numbers of walls: counted at every angle; the clearest, whose counts must agree
+SOME_ANGLES = 1500  # at which all walls are counted, before the likely ones at every angle
 MOST = 200_000  # angles on the curve
 
 
@@ -260,6 +261,29 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Wh
     return -np.round(turn / np.pi).astype(np.int64), np.asarray(clear)
 
 
+def _clear_walls(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Floats, Floats, Whole, Floats]:
+    """The clearest of walls (n, 2), and the smallest clear ones, counted at every angle.
+
+    All are counted at some angles first. Between those a sharp resonance may turn 1 + L, so that a wall is at most
+    as clear as it seems there: smaller walls than those chosen are not clear for certain.
+
+    Returns  the walls (k, 2), their sizes (k,) relative to the smallest, their counts and how clear each is
+    """
+    size = np.max(walls / np.min(walls, axis=0), axis=1)
+    _, seeming = nyquist_count(loop, angles[:: max(1, len(angles) // SOME_ANGLES)], walls)
+    order = np.argsort(-seeming)
+    smallest = np.argsort(np.where(seeming > CLEAR, size, np.inf), kind="stable")[: np.sum(seeming > CLEAR)]
+    chosen = np.union1d(order[:LIKELY], smallest[:SURE])
+    counts, clear = nyquist_count(loop, angles, walls[chosen])
+    tried = SURE
+    while tried < len(smallest) and np.sum(clear[np.isin(chosen, smallest[:tried])] > CLEAR) < SURE:
+        more = np.setdiff1d(smallest[tried : 2 * tried], chosen)
+        more_counts, more_clear = nyquist_count(loop, angles, walls[more])
+        chosen, tried = np.concatenate([chosen, more]), 2 * tried
+        counts, clear = np.concatenate([counts, more_counts]), np.concatenate([clear, more_clear])
+    return walls[chosen], size[chosen], counts, clear
+
+
 def _with_reference(loop: MeasuredLoop, curve: Boundary) -> Boundary:
     """The boundary with a reference wall: the smallest of many walls that are clear of the boundary.
 
@@ -274,13 +298,7 @@ def _with_reference(loop: MeasuredLoop, curve: Boundary) -> Boundary:
     K = np.quantile(h, shares)[:, None] * sizes
     B = np.quantile(h / w, shares)[:, None] * sizes
     walls = np.array([(k, b) for k in K.ravel() for b in B.ravel()])
-    # all walls at some angles, and the clear ones at every angle: between few a resonance may turn 1 + L
-    _, clear = nyquist_count(loop, curve.angles[:: max(1, len(curve.angles) // 1500)], walls)
-    order, size = np.argsort(-clear), np.max(walls / np.min(walls, axis=0), axis=1)
-    small = np.argsort(np.where(clear > CLEAR, size, np.inf), kind="stable")
-    chosen = np.union1d(order[:LIKELY], small[:SURE])
-    walls, size = walls[chosen], size[chosen]
-    counts, clear = nyquist_count(loop, curve.angles, walls)
+    walls, size, counts, clear = _clear_walls(loop, curve.angles, walls)
     order = np.argsort(-clear)[:SURE]
     least = min(CLEAR, clear[order[0]]) if loop.interpolation.closed else clear[order[0]]
     enough = np.flatnonzero(clear >= least)
