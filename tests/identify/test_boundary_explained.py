@@ -1,0 +1,79 @@
+"""How often a boundary of the right model is refused, and one of another device is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.identify.boundary_cases import measured, random_device, record
+from zwidth.device import address
+from zwidth.identify.boundary_checks import check_magnitudes
+from zwidth.identify.boundary_explained import check_explained
+from zwidth.identify.boundary_fit import fit_boundary
+from zwidth.identify.boundary_model import BoundaryModel
+from zwidth.identify.boundary_parameters import BoundaryParameters
+from zwidth.identify.boundary_points import read_points
+
+DELAY = "loop.delay_samples"
+FEWEST = 12  # points on the boundary, of which a device is taken
+REFUSED, WARNED, ACCEPTED = "refused", "warned", "accepted"
+
+
+def verdict(seed, folder, other):
+    """What is said of points of one device and the delay of a model; None where the device has too few points.
+
+    other  None: the model is right;  "masses": each mass is wrong by a random factor of 1.3 to 2 either way;
+           "device": the model is another random device
+    """
+    rng = np.random.default_rng([24, seed])
+    device, chords = random_device(rng, folder)
+    columns = measured(rng, chords, 10.0 ** rng.uniform(-3.0, -1.7))
+    if len(columns["edge"]) < FEWEST:
+        return None
+    model = device
+    if other == "masses":
+        for path in ("plant.mass_kg.0.0", "plant.mass_kg.1.1"):
+            factor = rng.uniform(1.3, 2.0) ** rng.choice([-1.0, 1.0])
+            model = model.with_({path: factor * address.get(device.document, path)})
+    elif other == "device":
+        model, _ = random_device(rng, folder)
+    start = model.with_({DELAY: address.get(model.document, DELAY) * 10.0 ** rng.uniform(-0.1, 0.1)})
+    parameters, points = BoundaryParameters.of(start, start.at(), [DELAY]), read_points([record(columns)])
+    sizes = check_magnitudes(points, parameters.edge(parameters.start))
+    if not sizes.passed:
+        return REFUSED
+    model = BoundaryModel(points, parameters.edge)
+    check = check_explained(model, fit_boundary(model, parameters, profiled=False))
+    assert check.passed or "model lacks something" in check.reason or "no value of the numbers" in check.reason
+    return ACCEPTED if check.passed else WARNED if check.warning else REFUSED
+
+
+def verdicts(seeds, folder, other):
+    """Those of the devices with enough points."""
+    every = [verdict(seed, folder, other) for seed in seeds]
+    return np.array([one for one in every if one is not None])
+
+
+def test_points_of_the_right_device_are_explained(tmp_path):
+    assert verdict(0, tmp_path, None) == ACCEPTED
+
+
+def test_points_of_another_device_are_not(tmp_path):
+    assert verdict(0, tmp_path, "device") == REFUSED
+
+
+@pytest.mark.slow
+def test_of_two_hundred_right_models_at_most_two_percent_are_refused(tmp_path):
+    said = verdicts(range(200), tmp_path, None)
+    assert len(said) > 150
+    assert np.mean(said == REFUSED) <= 0.02
+    assert np.mean(said == ACCEPTED) >= 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("other", ["masses", "device"])
+def test_of_a_hundred_boundaries_of_other_devices_nearly_none_is_accepted(tmp_path, other):
+    said = verdicts(range(100), tmp_path, other)
+    assert len(said) > 75
+    assert np.mean(said == ACCEPTED) <= 0.03
+    assert np.mean(said == REFUSED) >= 0.8
