@@ -23,6 +23,7 @@ from zwidth.identify.impedance_spectra import (
     POSITION,
     MeasuredImpedance,
     OctaveBand,
+    extreme,
     low_frequency_fit,
     measured_impedance,
     octave_bands,
@@ -30,9 +31,9 @@ from zwidth.identify.impedance_spectra import (
     wall_states,
 )
 from zwidth.identify.plausible import check_periods
+from zwidth.identify.local_spectra import LocalSpectra, local_spectra, merged, segment_length
 from zwidth.identify.record import Record
 from zwidth.identify.sampling import Sampling, check_sampling
-from zwidth.identify.spectra import Spectra, averaged_spectra, merged, segment_length
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.progress import Progress
 
@@ -48,7 +49,7 @@ COLUMNS: Final = Columns(needed=("time_s", FORCES, POSITIONS), text=("wall",))
 KIND: Final = "impedance"
 FIRST_PART: Final = 2.0 / 3.0  # of the record; the rest is unseen by the fit that is validated
 COUNTS: Final = 10.0  # steps of the reading that the motion must exceed
-FEWEST_AVERAGES: Final = 4.0
+FEWEST_SEGMENTS: Final = 3
 HELD: Final = 0.01  # share of the samples at the largest force, from which on it was limited
 THOUSAND: Final = (2.3, 3.7)  # powers of ten that a forgotten thousand may look like
 FAR_OFF: Final = 2.3  # powers of ten
@@ -63,8 +64,8 @@ class _State:
     """One state of the wall: spectra of both parts, the impedance of all, and the prediction there, or None."""
 
     name: str
-    first: Spectra
-    second: Spectra
+    first: LocalSpectra
+    second: LocalSpectra
     impedance: MeasuredImpedance
     predicted: Complexes | None
 
@@ -222,22 +223,22 @@ def _state(
 ) -> tuple[_State | None, Check]:
     """The spectra of one state of the wall, and whether force and motion are coherent in it."""
 
-    def spectra_of(part: tuple[float, float], samples: int) -> Spectra:
+    def spectra_of(part: tuple[float, float]) -> LocalSpectra:
         return merged(
             [
-                averaged_spectra(
+                local_spectra(
                     stretches_of(record, sampling, _names(record), name, part),
                     sampling.period,
-                    samples,
-                    {FORCE: 0, POSITION: 1},
+                    length,
+                    (FORCE, POSITION),
                 )
                 for record, sampling in zip(records, samplings, strict=True)
             ]
         )
 
-    first, second = spectra_of((0.0, FIRST_PART), length), spectra_of((FIRST_PART, 1.0), length)
+    first, second = spectra_of((0.0, FIRST_PART)), spectra_of((FIRST_PART, 1.0))
     spectra = merged([first, second])
-    if spectra.averages < FEWEST_AVERAGES:
+    if spectra.segments < FEWEST_SEGMENTS:
         text = (
             f"{STATES[name]}: {plural(spectra.segments, 'segment')} of {length} samples; record longer, or give "
             "shorter segments"
@@ -246,7 +247,7 @@ def _state(
     half = 0.5 / spectra.period
     if point.response is None:
         half = min(half, 0.5 / point.controller.sampling_period)
-    impedance = measured_impedance(spectra, spectra_of((0.0, 1.0), length // 2), BELOW_HALF * half)
+    impedance = measured_impedance(spectra, BELOW_HALF * half)
     if len(impedance) < FEWEST_LINES:
         text = (
             f"{STATES[name]}: hand force and motion go together at {len(impedance)} of {len(spectra.frequency)} "
@@ -324,14 +325,10 @@ def _validation(states: Sequence[_State]) -> float:
     for state in states:
         if not (state.first.segments and state.second.segments):
             continue
-        Y = state.first.response(FORCE, POSITION, "H1")
-        # the position is differenced once in the spectra
-        Y = Y * (state.first.z - 1.0)
+        response, _ = state.first.fit(0, 1)
         used = np.isin(state.second.frequency, state.impedance.frequency)
-        S, cross = state.second, state.second.of(POSITION, FORCE)
-        left = S.power(POSITION) - 2.0 * np.real(np.conj(Y) * cross) + np.abs(Y) ** 2 * S.power(FORCE)
-        remains += float(np.sum(left[used]))
-        total += float(np.sum(S.power(POSITION)[used]))
+        remains += float(np.sum(state.second.left_by(response)[used]))
+        total += float(np.sum(state.second.power(1)[used])) * state.second.values
     return 1.0 - remains / total if total > 0.0 else float("nan")
 
 
@@ -339,10 +336,10 @@ def _estimates(state: _State) -> list[Estimate]:
     """Lowest and highest |Z|, and what is felt at low frequency."""
     Z, name = state.impedance, STATES[state.name]
     estimates = []
-    for what, k in (("lowest", int(np.argmin(Z.high))), ("highest", int(np.argmax(Z.low)))):
+    for what in ("lowest", "highest"):
+        k, value, low, high = extreme(Z, lowest=what == "lowest")
         its = f"{what} impedance, {name}, at {Z.frequency[k]:.4g} Hz"
-        value = float(np.abs(Z.value[k]))
-        estimates.append(Estimate(its, value, float(Z.low[k]), float(Z.high[k]), "N s/m"))
+        estimates.append(Estimate(its, value, low, high, "N s/m"))
     wall = state.name == "on"
     fit = low_frequency_fit(Z, wall=wall)
     if fit is not None:

@@ -1,19 +1,16 @@
 """The impedance at the handle from spectra of hand force and position, with the band that holds it.
 
-The admittance from force f to position x is estimated from averaged spectra in two ways,
+The response G from force f to position x is estimated by local polynomials (`local_spectra`) in two ways,
 
-    H1 = S_xf / S_ff   right where only the position is noisy, else too small:  |H1| = |Y| / (1 + N_f)
-    H2 = S_xx / S_fx   right where only the force is noisy, else too large:     |H2| = |Y| (1 + N_x)
+    H1   x on f     right where only the position is noisy, else too small:  |H1| = |G| / (1 + N_f)
+    H2   f on x     right where only the force is noisy, else too large:     |H2| = |G| (1 + N_x)
 
-N_f and N_x noise to signal in power. With noise on both that is independent of the other, Y lies between; their
-ratio is the coherence. The impedance is Z = 1/(jw Y). Its best value takes the noise in equal shares (Hv); its
-band reaches from one estimate to the other, and beyond each by the radius of the disk that holds the random error
-with 95 % at that frequency (Bendat and Piersol, known at second hand):
-
-    r^2 = |Y|^2 (1 - c)/c F_95(2, 2n - 2) / (n - 1),    c the coherence, n independent averages
-
-Segments leak: a response that turns within a line's width is blurred, with an error that falls with the square of
-the segment's length. A third of the difference from segments half as long is added to the band.
+N_f and N_x noise to signal in power. With noise on both that is independent of the other, G lies between; their
+ratio is the coherence. The impedance is Z = 1/(jw G). Its best value takes the noise in equal shares: the geometric
+mean. The error by chance has the variance v, known from n values; Z may be off by a bias of up to b towards
+either estimate. An interval that holds the truth with 95 % wherever between the two it lies is narrower than
+b + 1.96 v^(1/2): both ends are not missed at once (Imbens and Manski 2004, known at second hand; here with the
+noncentral chi-square distribution).
 """
 
 from __future__ import annotations
@@ -25,9 +22,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.identify.local_spectra import LocalSpectra, correlations, neighbours
 from zwidth.identify.record import Piece, Record
 from zwidth.identify.sampling import Sampling
-from zwidth.identify.spectra import Spectra
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -36,8 +33,10 @@ FORCE, POSITION = "force", "position"
 LEVEL: Final = 0.95
 FEWEST_LINES: Final = 8  # frequencies for a fit
 BACK: Final = 0.5  # share of the highest frequency at which a fit still holds, up to which it is made
+FAR: Final = 30.0  # bias in deviations, from which on only one end is missed
+SHIFTS: Final = 150  # between which the half width of an interval is interpolated
+LEAST: Final = 0.05  # coherence that is taken for any smaller one
 SILENT: Final = 1e-7  # share of the force's largest power, below which a line holds only what others leak
-NEIGHBOURS: Final = 1.5  # lines of a Hann window that count as one independent one
 
 
 @dataclass(frozen=True)
@@ -45,71 +44,100 @@ class MeasuredImpedance:
     """Z(jw) at the handle at (k,) frequencies at which force and position are coherent.
 
     frequency  [Hz];  value  [N s/m];  coherence
-    radius     of the disk round `value` that holds Z with 95 %, bias by noise on either end included [N s/m]
     deviation  standard deviation of the real part, and of the imaginary part, by chance alone [N s/m]
-    bias       half of the distance between the two estimates, and the error by leakage [N s/m]
+    bias       half of the distance between the two estimates [N s/m]
+    freedom    complex values from which the deviation is known
     """
 
     frequency: Floats
     value: Complexes
     coherence: Floats
-    radius: Floats
     deviation: Floats
     bias: Floats
+    freedom: float
 
     def __len__(self) -> int:
         return len(self.frequency)
 
     @property
+    def radius(self) -> Floats:
+        """Radius of the disk round `value` that holds Z with 95 % [N s/m]."""
+        return _half_width(self.deviation, self.bias, self.freedom, 2)
+
+    def half_width(self, level: float = LEVEL) -> Floats:
+        """Half width of the interval that holds |Z| with this level [N s/m]."""
+        return _half_width(self.deviation, self.bias, self.freedom, 1, level)
+
+    @property
     def low(self) -> Floats:
-        """Lower end of the band of |Z| [N s/m]."""
-        return np.maximum(np.abs(self.value) - self.radius, 0.0)
+        """Lower end of the band of |Z| (95 % at each frequency) [N s/m]."""
+        return np.maximum(np.abs(self.value) - self.half_width(), 0.0)
 
     @property
     def high(self) -> Floats:
         """Upper end of the band of |Z| [N s/m]."""
-        return np.abs(self.value) + self.radius
+        return np.abs(self.value) + self.half_width()
 
     def only(self, some: NDArray[np.bool_]) -> MeasuredImpedance:
         """Some of the frequencies."""
-        return MeasuredImpedance(**{name: values[some] for name, values in vars(self).items()})
+        parts = (self.frequency, self.value, self.coherence, self.deviation, self.bias)
+        return MeasuredImpedance(*(part[some] for part in parts), self.freedom)
 
 
-def measured_impedance(spectra: Spectra, shorter: Spectra, highest: float) -> MeasuredImpedance:
-    """The impedance at the lines below `highest` [Hz] at which the coherence is no chance.
-
-    shorter  spectra of the same records with segments half as long
-    """
+def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, level: float = LEVEL) -> Floats:
+    """What holds an error with a level: a bias of up to `bias`, and chance of a deviation in 1 or 2 components."""
+    from scipy.special import chndtrix
+    from scipy.stats import chi2
     from scipy.stats import f as fisher
 
-    n = max(spectra.averages, 1.0 + 1e-9)
-    coherence = spectra.coherence(FORCE, POSITION)
-    # so that no line of all passes by chance, with 95 %
-    chance = 1.0 - ((1.0 - LEVEL) / len(coherence)) ** (1.0 / (n - 1.0)) if n > 1.5 else 1.0
-    power = spectra.power(FORCE)
-    seen = (coherence > chance) & (spectra.frequency < highest) & (power > SILENT * np.max(power, initial=0.0))
-    c, f = coherence[seen], spectra.frequency[seen]
-    s = 2j * np.pi * f
-    Y = spectra.response(FORCE, POSITION, "Hv")[seen]
-    value = 1.0 / (s * Y)
+    shift = np.minimum(bias / np.maximum(deviation, 1e-300), FAR)
+    # at some shifts, and interpolated: each takes some time
+    at = FAR * np.linspace(0.0, 1.0, SHIFTS) ** 2
+    known = np.interp(shift, at, np.sqrt(chndtrix(level, size, at**2)))
+    # the deviation is itself estimated
+    wider = np.sqrt(size * fisher.ppf(level, size, 2.0 * max(freedom, 0.5)) / chi2.ppf(level, size))
+    far = np.maximum(bias - shift * deviation, 0.0)
+    return np.asarray(deviation * (shift + (known - shift) * wider) + far)
+
+
+def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedance:
+    """The impedance at the frequencies below `highest` [Hz] at which the response is no chance."""
+    from scipy.stats import f as fisher
+
+    (direct, variance), (inverse, _) = spectra.fit(0, 1), spectra.fit(1, 0)
+    H1, back = direct[:, 0], inverse[:, 0]
+    # so that no frequency of all passes by chance, with 95 %
+    chance = fisher.isf((1.0 - LEVEL) / max(len(H1), 1), 2.0, 2.0 * max(spectra.freedom, 1))
+    power = spectra.power(0)
+    seen = (2.0 * np.abs(H1) ** 2 > 2.0 * chance * variance) & (spectra.frequency < highest)
+    seen &= (power > SILENT * np.max(power, initial=0.0)) & (np.abs(back) > 0.0)
+    H1, back, variance, f = H1[seen], back[seen], variance[seen], spectra.frequency[seen]
+    # of the values some were fitted
+    left = np.maximum(1.0 - np.abs(H1 * back), 0.0) * spectra.values / max(spectra.freedom, 1)
+    coherence = np.maximum(1.0 - left, LEAST)
+    G = H1 / np.sqrt(coherence)
+    value = spectra.differencing[seen] / (2j * np.pi * f * G)
     size = np.abs(value)
-    # H1 and H2 lie at |Y| sqrt(c) and |Y| / sqrt(c)
-    bias = size * (1.0 / np.sqrt(c) - 1.0) + _leakage(shorter, f, Y) * size
-    relative = (1.0 - c) / c / max(n - 1.0, 1e-9)
-    chance_radius = size / np.sqrt(c) * np.sqrt(relative * fisher.ppf(LEVEL, 2.0, 2.0 * n - 2.0))
-    deviation = size * np.sqrt(0.5 * relative)
-    return MeasuredImpedance(f, value, c, bias + chance_radius, deviation, bias)
+    # where only the position is noisy |Z| is larger by this, with its error
+    far = 1.0 / np.sqrt(coherence)
+    deviation = size * far * np.sqrt(0.5 * variance) / np.abs(H1)
+    return MeasuredImpedance(f, value, coherence, deviation, size * (far - 1.0), float(spectra.freedom))
 
 
-def _leakage(shorter: Spectra, frequency: Floats, Y: Complexes) -> Floats:
-    """Relative error by leakage at the frequencies, from segments half as long; there the admittance is smooth
-    enough to be interpolated over w^2 Y, which a mass makes constant."""
-    s, at = 2j * np.pi * shorter.frequency, 2j * np.pi * frequency
-    half = s**2 * shorter.response(FORCE, POSITION, "Hv")
-    between = np.interp(frequency, shorter.frequency, half.real) + 1j * np.interp(
-        frequency, shorter.frequency, half.imag
-    )
-    return np.asarray(np.abs(between / (at**2 * Y) - 1.0) / 3.0)
+def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, float, float]:
+    """The lowest or highest |Z| of all frequencies: where, the value, and its interval (95 %) [N s/m].
+
+    Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of each is raised by
+    the number of independent ones among those whose bands reach the extreme one.
+    """
+    size = np.abs(impedance.value)
+    k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
+    rivals = impedance.low <= impedance.high[k] if lowest else impedance.high >= impedance.low[k]
+    level = 1.0 - (1.0 - LEVEL) / max(np.sum(rivals) / neighbours(), 1.0)
+    half = impedance.half_width(level)[rivals]
+    low, high = np.maximum(size[rivals] - half, 0.0), size[rivals] + half
+    best = np.min if lowest else np.max
+    return k, float(size[k]), float(best(low)), float(best(high))
 
 
 def stretches_of(
@@ -148,7 +176,7 @@ class OctaveBand:
     """The real part of the impedance in one octave.
 
     low, high     of the octave [Hz];   lines  in it
-    real          weighted mean of Re Z [N s/m];   real_low, real_high  its interval (95 %), bias included
+    real          mean of Re Z at these [N s/m];   real_low, real_high  its interval (95 %), bias included
     """
 
     low: float
@@ -182,15 +210,30 @@ def octave_bands(impedance: MeasuredImpedance) -> list[OctaveBand]:
     octave = np.floor(np.log2(impedance.frequency))
     for n in np.unique(octave).tolist():
         some = impedance.only(octave == n)
-        weight = 1.0 / np.maximum(some.deviation, 1e-12 * np.abs(some.value)) ** 2
-        mean = float(np.sum(weight * some.value.real) / np.sum(weight))
-        half = 1.96 * float(np.sqrt(NEIGHBOURS / np.sum(weight)))
+        mean = float(np.mean(some.value.real))
         # noise on either end scales the value, real part and all
-        shift = float(np.sum(weight * some.bias * np.abs(some.value.real) / np.abs(some.value)) / np.sum(weight))
-        bands.append(
-            OctaveBand(2.0**n, 2.0 ** (n + 1.0), len(some), mean, mean - half - shift, mean + half + shift)
-        )
+        shift = np.atleast_1d(abs(np.mean(some.bias * some.value.real / np.abs(some.value))))
+        half = float(_half_width(np.atleast_1d(_deviation_of_mean(some)), shift, some.freedom * len(some), 1)[0])
+        bands.append(OctaveBand(2.0**n, 2.0 ** (n + 1.0), len(some), mean, mean - half, mean + half))
     return bands
+
+
+def _deviation_of_mean(impedance: MeasuredImpedance) -> float:
+    """Standard deviation of the mean of Re Z over neighbouring frequencies, by chance alone [N s/m].
+
+    The error of Z is -Z/G times that of G, whose windows overlap (`correlations`).
+    """
+    turned = impedance.deviation * (impedance.value / np.abs(impedance.value)) ** 2
+    f, rho = impedance.frequency, correlations()
+    spacing = np.min(np.diff(f)) if len(f) > 1 else 1.0
+    place = np.round(f / spacing).astype(int)
+    total = float(np.sum(np.abs(turned) ** 2))
+    for apart in range(1, len(rho)):
+        a, b = turned[:-apart], turned[apart:]
+        distance = place[apart:] - place[:-apart]
+        near = np.where(distance < len(rho), rho[np.minimum(distance, len(rho) - 1)], 0.0)
+        total += 2.0 * float(np.sum(near * np.real(a * np.conj(b))))
+    return float(np.sqrt(max(total, 0.0))) / max(len(f), 1)
 
 
 def low_frequency_fit(impedance: MeasuredImpedance, *, wall: bool) -> tuple[Floats, Floats, float] | None:
@@ -217,11 +260,11 @@ def low_frequency_fit(impedance: MeasuredImpedance, *, wall: bool) -> tuple[Floa
         right = np.concatenate([impedance.value[some].real, impedance.value[some].imag]) / np.tile(sigma[some], 2)
         size = np.linalg.norm(rows, axis=0)
         solved, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
-        freedom = max((2 * count - rows.shape[1]) / NEIGHBOURS, 1.0)
-        remains = float(np.sum((rows / size @ solved - right) ** 2)) / NEIGHBOURS / freedom
+        freedom = max((2 * count - rows.shape[1]) / neighbours(), 1.0)
+        remains = float(np.sum((rows / size @ solved - right) ** 2)) / neighbours() / freedom
         if fits and remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):
             break
-        covariance = np.linalg.inv((rows / size).T @ (rows / size)) * NEIGHBOURS * max(remains, 1.0)
+        covariance = np.linalg.inv((rows / size).T @ (rows / size)) * neighbours() * max(remains, 1.0)
         half = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * np.sqrt(np.diag(covariance)) / size
         kept = 2 + len(columns)
         fits.append(((solved / size)[:kept], half[:kept], float(impedance.frequency[count - 1])))
