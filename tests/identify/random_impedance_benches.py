@@ -63,10 +63,8 @@ class ImpedanceBench:
         whole = np.vstack([state, *commands[:PAST], reading])
         return whole[:, :size], whole[:, size:]
 
-
     def impedance(self, frequency):
-        """Z (n,) of the sampled record [N s/m]; above a fifth of the sampling rate, what the hold's steps do at the
-        rate less f is read at f, too."""
+        """Z (n,) of the sampled record [N s/m]: what the hold's steps do at 1/T - f is read at f."""
         A, B = self.step_matrices
         T = self.device.controller.sampling_period
         w = 2.0 * np.pi * np.asarray(frequency)
@@ -79,7 +77,7 @@ class ImpedanceBench:
 
 
 def random_bench(seed):
-    """The bench of a seed: one or two masses, free or on a spring, 0.2 to 20 kHz, a wall of any damping or none."""
+    """The bench of a seed: one or two masses, free or on a spring, 0.2 to 20 kHz, some wall or none."""
     rng = np.random.default_rng([30, seed])
 
     def span(low, high):

@@ -86,10 +86,10 @@ def test_an_octave_in_which_the_handle_gives_energy_is_seen():
     f = np.arange(1.0, 16.0)
     size = np.ones(15)
     value = np.where(f < 4.0, -2.0, 2.0) + 5j
-    bands = octave_bands(MeasuredImpedance(f, value, 0.99 * size, 0.3 * size, 0.1 * size, 0.02 * size))
+    bands = octave_bands(MeasuredImpedance(f, value, 0.99 * size, 0.1 * size, 0.02 * size, 20.0))
     assert [(band.low, band.passive) for band in bands] == [(1.0, False), (2.0, False), (4.0, True), (8.0, True)]
     assert all(band.real_low < band.real < band.real_high for band in bands)
-    wide = MeasuredImpedance(f, value, 0.5 * size, 9.0 * size, 5.0 * size, 2.0 * size)
+    wide = MeasuredImpedance(f, value, 0.5 * size, 5.0 * size, 2.0 * size, 20.0)
     assert octave_bands(wide)[0].passive is None
 
 

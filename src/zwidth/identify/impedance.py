@@ -24,6 +24,7 @@ from zwidth.identify.impedance_spectra import (
     MeasuredImpedance,
     OctaveBand,
     extreme,
+    longest_stretch,
     low_frequency_fit,
     measured_impedance,
     octave_bands,
@@ -49,13 +50,18 @@ COLUMNS: Final = Columns(needed=("time_s", FORCES, POSITIONS), text=("wall",))
 KIND: Final = "impedance"
 FIRST_PART: Final = 2.0 / 3.0  # of the record; the rest is unseen by the fit that is validated
 COUNTS: Final = 10.0  # steps of the reading that the motion must exceed
-FEWEST_SEGMENTS: Final = 3
+FEWEST_SEGMENTS: Final = 2
 HELD: Final = 0.01  # share of the samples at the largest force, from which on it was limited
 THOUSAND: Final = (2.3, 3.7)  # powers of ten that a forgotten thousand may look like
 FAR_OFF: Final = 2.3  # powers of ten
 OPPOSITE: Final = -0.5  # cosine of the phase between measured and predicted, of a force with the wrong sign
 BELOW_HALF: Final = 0.95  # of half the sampling rate up to which lines are used
 CLIPPED: Final = 0.15  # share of them, from which on the force is not what acted
+LOW_FREQUENCY: Final = (
+    ("static stiffness felt", "N/m"),
+    ("damping felt at low frequency", "N s/m"),
+    ("mass felt at low frequency", "kg"),
+)
 STATES: Final = {"on": "wall on", "off": "wall off"}
 
 
@@ -88,7 +94,7 @@ def identify_impedance(
                         is given
     point               posture and direction; None: `device.at()`
     stiffness, damping  of the wall that was on [N/m], [N s/m]
-    segment             samples of a segment of the spectra; None: 15 of them in a record
+    segment             samples of a segment of the spectra; None: a third of the longest stretch
     progress            called with stage, steps done, and steps
     Raises              DeviceError  for faults of the records and of the arguments
     """
@@ -117,11 +123,11 @@ def identify_impedance(
         checks += _check_signals(record, sampling)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    length = segment_length(max(one.longest for one in samplings), segment)
     states = []
     for name in _states(records, wall):
         report(f"spectra, {STATES[name]}", 0, 0)
-        state, check = _state(name, records, samplings, length, point, wall)
+        longest = max(longest_stretch(*one, name) for one in zip(records, samplings, strict=True))
+        state, check = _state(name, records, samplings, segment_length(longest, segment), point, wall)
         checks.append(check)
         if state is not None:
             states.append(state)
@@ -140,7 +146,7 @@ def identify_impedance(
         validated_on="the last third of each record, its motion predicted from its force by the other two thirds",
         remarks=tuple(sentence for state in states for sentence in _sentences(state)),
         curves=_curves(states),
-        details=_details(states, length),
+        details=_details(states),
     )
 
 
@@ -191,8 +197,8 @@ def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
             high[name] = max(high[name], float(np.max(piece[name])))
         steps = np.abs(np.diff(piece[position]))
         step = min(step, float(np.min(steps[steps > 0.0], initial=np.inf)))
-        for extreme in (float(np.max(piece[force])), float(np.min(piece[force]))):
-            at_limit[extreme] = at_limit.get(extreme, 0) + int(np.sum(piece[force] == extreme))
+        for limit in (float(np.max(piece[force])), float(np.min(piece[force]))):
+            at_limit[limit] = at_limit.get(limit, 0) + int(np.sum(piece[force] == limit))
         total += len(piece[force])
     for name, what in ((force, "force"), (position, "position")):
         if not high[name] > low[name]:
@@ -340,14 +346,10 @@ def _estimates(state: _State) -> list[Estimate]:
         k, value, low, high = extreme(Z, lowest=what == "lowest")
         its = f"{what} impedance, {name}, at {Z.frequency[k]:.4g} Hz"
         estimates.append(Estimate(its, value, low, high, "N s/m"))
-    wall = state.name == "on"
-    fit = low_frequency_fit(Z, wall=wall)
+    fit = low_frequency_fit(Z)
     if fit is not None:
-        numbers, half, _ = fit
-        titles = [("static stiffness felt", "N/m")] if wall else []
-        titles += [("damping felt at low frequency", "N s/m"), ("mass felt at low frequency", "kg")]
-        for (title, unit), value, width in zip(titles, numbers.tolist(), half.tolist(), strict=True):
-            estimates.append(Estimate(f"{title}, {name}", value, value - width, value + width, unit))
+        for (title, unit), value, half in zip(LOW_FREQUENCY, *(part.tolist() for part in fit), strict=True):
+            estimates.append(Estimate(f"{title}, {name}", value, value - half, value + half, unit))
     return estimates
 
 
@@ -388,11 +390,11 @@ def _curves(states: Sequence[_State]) -> dict[str, list[Any]]:
     return {name: [value for part in parts for value in part[name]] for name in parts[0]}
 
 
-def _details(states: Sequence[_State], length: int) -> dict[str, Any]:
+def _details(states: Sequence[_State]) -> dict[str, Any]:
     bands: dict[str, list[OctaveBand]] = {state.name: octave_bands(state.impedance) for state in states}
     return {
-        "segment_samples": length,
-        "estimator": "Hv; the band reaches from H1 to H2 and holds each frequency by itself with 95 %",
+        "segment_samples": {state.name: state.first.length for state in states},
+        "estimator": "local polynomials; the band takes noise on either end, and holds each frequency with 95 %",
         "octaves": {name: [band.document() for band in some] for name, some in bands.items()},
         "width_dB": _width(states),
     }

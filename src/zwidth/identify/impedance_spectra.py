@@ -6,17 +6,18 @@ The response G from force f to position x is estimated by local polynomials (`lo
     H2   f on x     right where only the force is noisy, else too large:     |H2| = |G| (1 + N_x)
 
 N_f and N_x noise to signal in power. With noise on both that is independent of the other, G lies between; their
-ratio is the coherence. The impedance is Z = 1/(jw G). Its best value takes the noise in equal shares: the geometric
-mean. The error by chance has the variance v, known from n values; Z may be off by a bias of up to b towards
-either estimate. An interval that holds the truth with 95 % wherever between the two it lies is narrower than
-b + 1.96 v^(1/2): both ends are not missed at once (Imbens and Manski 2004, known at second hand; here with the
-noncentral chi-square distribution).
+ratio is the coherence. The impedance is Z = 1/(jw G). Its best value takes the noise in equal shares: the mean of
+the two estimates' logarithms. The error by chance has the variance v, known from n values; Z may be off by a bias
+of up to b towards either estimate. An interval that holds the truth with 95 % wherever between the two it lies is
+narrower than b + 1.96 v^(1/2), since both ends are not missed at once (Imbens and Manski 2004, known at second
+hand; here by the noncentral chi-square distribution).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -32,6 +33,7 @@ Complexes = NDArray[np.complex128]
 FORCE, POSITION = "force", "position"
 LEVEL: Final = 0.95
 FEWEST_LINES: Final = 8  # frequencies for a fit
+KEPT_POWERS: Final = 3  # of s, that are stated: stiffness, damping, mass
 BACK: Final = 0.5  # share of the highest frequency at which a fit still holds, up to which it is made
 FAR: Final = 30.0  # bias in deviations, from which on only one end is missed
 SHIFTS: Final = 150  # between which the half width of an interval is interpolated
@@ -86,18 +88,24 @@ class MeasuredImpedance:
 
 def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, level: float = LEVEL) -> Floats:
     """What holds an error with a level: a bias of up to `bias`, and chance of a deviation in 1 or 2 components."""
-    from scipy.special import chndtrix
     from scipy.stats import chi2
     from scipy.stats import f as fisher
 
     shift = np.minimum(bias / np.maximum(deviation, 1e-300), FAR)
-    # at some shifts, and interpolated: each takes some time
-    at = FAR * np.linspace(0.0, 1.0, SHIFTS) ** 2
-    known = np.interp(shift, at, np.sqrt(chndtrix(level, size, at**2)))
+    known = np.interp(shift, *_shifted(level, size))
     # the deviation is itself estimated
     wider = np.sqrt(size * fisher.ppf(level, size, 2.0 * max(freedom, 0.5)) / chi2.ppf(level, size))
     far = np.maximum(bias - shift * deviation, 0.0)
     return np.asarray(deviation * (shift + (known - shift) * wider) + far)
+
+
+@lru_cache(maxsize=256)
+def _shifted(level: float, size: int) -> tuple[Floats, Floats]:
+    """Shifts, and what an error of deviation 1 about each of them stays within with a level."""
+    from scipy.special import chndtrix
+
+    shifts = FAR * np.linspace(0.0, 1.0, SHIFTS) ** 2
+    return shifts, np.sqrt(chndtrix(level, size, shifts**2))
 
 
 def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedance:
@@ -127,17 +135,20 @@ def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedan
 def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, float, float]:
     """The lowest or highest |Z| of all frequencies: where, the value, and its interval (95 %) [N s/m].
 
-    Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of each is raised by
-    the number of independent ones among those whose bands reach the extreme one.
+    Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of the end towards the
+    others is raised by the number of independent ones among those whose bands reach the extreme one.
     """
     size = np.abs(impedance.value)
     k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
     rivals = impedance.low <= impedance.high[k] if lowest else impedance.high >= impedance.low[k]
     level = 1.0 - (1.0 - LEVEL) / max(np.sum(rivals) / neighbours(), 1.0)
-    half = impedance.half_width(level)[rivals]
-    low, high = np.maximum(size[rivals] - half, 0.0), size[rivals] + half
-    best = np.min if lowest else np.max
-    return k, float(size[k]), float(best(low)), float(best(high))
+    some = impedance.only(rivals)
+    raised, plain = some.half_width(level), some.half_width()
+    if lowest:
+        low, high = np.min(size[rivals] - plain), np.min(size[rivals] + raised)
+    else:
+        low, high = np.max(size[rivals] - raised), np.max(size[rivals] + plain)
+    return k, float(size[k]), max(float(low), 0.0), float(high)
 
 
 def stretches_of(
@@ -159,6 +170,19 @@ def stretches_of(
         for low, high in ends.reshape(-1, 2):
             some = slice(int(low), int(high))
             yield {FORCE: piece[names[0]][some], POSITION: piece[names[1]][some], "sample": piece["sample"][some]}
+
+
+def longest_stretch(record: Record, sampling: Sampling, state: str) -> int:
+    """Samples of the longest stretch of a state of the wall without a gap."""
+    if "wall" not in record:
+        return sampling.longest
+    longest = count = after = 0
+    names = (record.names[0], record.names[0])
+    for piece in stretches_of(record, sampling, names, state, (0.0, 1.0)):
+        rows = piece["row"]
+        count = len(rows) + (count if int(rows[0]) == after else 0)
+        longest, after = max(longest, count), int(rows[-1]) + 1
+    return longest
 
 
 ON: Final = ("on", "1", "1.0", "true", "yes", "wall")
@@ -236,38 +260,43 @@ def _deviation_of_mean(impedance: MeasuredImpedance) -> float:
     return float(np.sqrt(max(total, 0.0))) / max(len(f), 1)
 
 
-def low_frequency_fit(impedance: MeasuredImpedance, *, wall: bool) -> tuple[Floats, Floats, float] | None:
-    """What Z is like at low frequency, s = jw: K/s + B + m s + ... with a wall, B + m s + ... without; None for
-    too few lines.
+def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | None:
+    """What Z is like at low frequency, s = jw: K/s + B + m s + ...; None for too few lines, or where no such
+    numbers explain even the lowest ones.
 
-    The lines are taken from the lowest upwards, to half of where what remains is no longer scatter; two more
+    The lines are taken from the lowest upwards, to half of where what remains is no longer scatter; three more
     powers of s take up where the device begins to yield.
-    Returns  the numbers, half widths of their intervals (95 %), and the highest frequency used [Hz]
+    Returns  K, B, m, and half widths of their intervals (95 %)
     """
-    from scipy.stats import t
-
     if len(impedance) < FEWEST_LINES:
         return None
     w = 2.0 * np.pi * impedance.frequency
-    columns = [1.0 / (1j * w)] if wall else []
-    A = np.column_stack([*columns, *((1j * w) ** power for power in range(4))])
-    sigma = np.hypot(impedance.deviation, impedance.bias) + 1e-9 * np.abs(impedance.value)
-    fits = list[tuple[Floats, Floats, float]]()
+    A = np.column_stack([(1j * w) ** power for power in range(-1, 5)])
+    sigma = impedance.deviation + 1e-9 * np.abs(impedance.value)
+    # noise on either end scales all of Z
+    scaled = impedance.value * impedance.bias / np.abs(impedance.value)
+    fits = list[tuple[float, Floats, Floats, Floats]]()
     count = FEWEST_LINES
     while count <= len(w):
         some = slice(0, count)
-        rows = np.vstack([A[some].real, A[some].imag]) / np.tile(sigma[some], 2)[:, None]
-        right = np.concatenate([impedance.value[some].real, impedance.value[some].imag]) / np.tile(sigma[some], 2)
+        weight = np.tile(1.0 / sigma[some], 2)
+        rows = np.vstack([A[some].real, A[some].imag]) * weight[:, None]
+        right = np.column_stack([impedance.value[some], scaled[some]])
+        right = np.concatenate([right.real, right.imag]) * weight[:, None]
         size = np.linalg.norm(rows, axis=0)
-        solved, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
+        both, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
+        solved, shift = (both / size[:, None])[:KEPT_POWERS].T
         freedom = max((2 * count - rows.shape[1]) / neighbours(), 1.0)
-        remains = float(np.sum((rows / size @ solved - right) ** 2)) / neighbours() / freedom
-        if fits and remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):
+        remains = float(np.sum((rows / size @ both[:, 0] - right[:, 0]) ** 2)) / neighbours() / freedom
+        if remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):
             break
-        covariance = np.linalg.inv((rows / size).T @ (rows / size)) * neighbours() * max(remains, 1.0)
-        half = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * np.sqrt(np.diag(covariance)) / size
-        kept = 2 + len(columns)
-        fits.append(((solved / size)[:kept], half[:kept], float(impedance.frequency[count - 1])))
+        variance = np.diag(np.linalg.inv((rows / size).T @ (rows / size))) / size**2 * neighbours()
+        deviation = np.sqrt(variance[:KEPT_POWERS] * max(remains, 1.0))
+        fits.append((float(impedance.frequency[count - 1]), solved, deviation, np.abs(shift)))
         count = max(count + 1, int(1.2 * count))
+    if not fits:
+        return None
     # what is left out grows steeply with frequency: it is scatter's size at the last, and small at half of it
-    return next(fit for fit in reversed(fits) if fit[2] <= BACK * fits[-1][2] or fit is fits[0])
+    highest = BACK * fits[-1][0]
+    _, numbers, deviation, shift = next(fit for fit in reversed(fits) if fit[0] <= highest or fit is fits[0])
+    return numbers, _half_width(deviation, shift, impedance.freedom, 1)

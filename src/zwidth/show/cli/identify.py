@@ -321,7 +321,7 @@ class ImpedanceCommand(IdentifyCommand):
     options = (
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall that was on [N/m]."),
         click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall that was on [Ns/m]."),
-        segment_option(16, "Samples of a segment of the spectra. Default: 15 in a record."),
+        segment_option(64, "Samples of a segment of the transforms. Default: a third of the longest stretch."),
     )
     takes_point = True
 
