@@ -34,7 +34,7 @@ FORCE, POSITION = "force", "position"
 LEVEL: Final = 0.95
 FEWEST_LINES: Final = 8  # frequencies for a fit
 KEPT_POWERS: Final = 3  # of s, that are stated: stiffness, damping, mass
-BACK: Final = 0.5  # share of the highest frequency at which a fit still holds, up to which it is made
+BACK: Final = 0.45  # share of the highest frequency at which a fit still holds, up to which it is made
 FAR: Final = 30.0  # bias in deviations, from which on only one end is missed
 SHIFTS: Final = 150  # between which the half width of an interval is interpolated
 LEAST: Final = 0.05  # coherence that is taken for any smaller one
@@ -136,12 +136,14 @@ def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, 
     """The lowest or highest |Z| of all frequencies: where, the value, and its interval (95 %) [N s/m].
 
     Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of the end towards the
-    others is raised by the number of independent ones among those whose bands reach the extreme one.
+    others is raised by the number of independent ones among those whose bands reach the extreme one. The other
+    end is then missed by hardly any, and this one may be missed for both.
     """
     size = np.abs(impedance.value)
     k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
     rivals = impedance.low <= impedance.high[k] if lowest else impedance.high >= impedance.low[k]
-    level = 1.0 - (1.0 - LEVEL) / max(np.sum(rivals) / neighbours(), 1.0)
+    count = max(float(np.sum(rivals)) / neighbours(), 1.0)
+    level = 1.0 - (1.0 - LEVEL) * min(count, 2.0) / count
     some = impedance.only(rivals)
     raised, plain = some.half_width(level), some.half_width()
     if lowest:
@@ -264,7 +266,7 @@ def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | N
     """What Z is like at low frequency, s = jw: K/s + B + m s + ...; None for too few lines, or where no such
     numbers explain even the lowest ones.
 
-    The lines are taken from the lowest upwards, to half of where what remains is no longer scatter; three more
+    The lines are taken from the lowest upwards, to 0.45 of where what remains is no longer scatter; three more
     powers of s take up where the device begins to yield.
     Returns  K, B, m, and half widths of their intervals (95 %)
     """
@@ -296,7 +298,7 @@ def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | N
         count = max(count + 1, int(1.2 * count))
     if not fits:
         return None
-    # what is left out grows steeply with frequency: it is scatter's size at the last, and small at half of it
+    # what is left out grows steeply with frequency: it is scatter's size at the last, and small at 0.45 of it
     highest = BACK * fits[-1][0]
     _, numbers, deviation, shift = next(fit for fit in reversed(fits) if fit[0] <= highest or fit is fits[0])
     return numbers, _half_width(deviation, shift, impedance.freedom, 1)
