@@ -14,7 +14,7 @@ NAMES = ("force", "position")
 def summed(force, position, length, cuts=()):
     rows = np.arange(len(force))
     parts = zip(*(np.split(values, cuts) for values in (force, position, rows)), strict=True)
-    pieces = [{"force": f, "position": x, "row": r} for f, x, r in parts]
+    pieces = [{"force": f, "position": x, "sample": r} for f, x, r in parts]
     return local_spectra(pieces, PERIOD, length, NAMES)
 
 
@@ -62,7 +62,7 @@ def test_a_record_in_pieces_is_summed_as_at_once_and_none_across_a_gap(drifting)
     rows = np.concatenate([np.arange(5500), np.arange(6000, 12_000)])
     force, position = drifting
     gap = local_spectra(
-        [{"force": force[i], "position": position[i], "row": i} for i in (rows[:5500], rows[5500:])],
+        [{"force": force[i], "position": position[i], "sample": i} for i in (rows[:5500], rows[5500:])],
         PERIOD,
         1000,
         NAMES,

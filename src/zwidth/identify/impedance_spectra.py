@@ -181,9 +181,9 @@ def longest_stretch(record: Record, sampling: Sampling, state: str) -> int:
     longest = count = after = 0
     names = (record.names[0], record.names[0])
     for piece in stretches_of(record, sampling, names, state, (0.0, 1.0)):
-        rows = piece["row"]
-        count = len(rows) + (count if int(rows[0]) == after else 0)
-        longest, after = max(longest, count), int(rows[-1]) + 1
+        numbers = piece["sample"]
+        count = len(numbers) + (count if int(numbers[0]) == after else 0)
+        longest, after = max(longest, count), int(numbers[-1]) + 1
     return longest
 
 

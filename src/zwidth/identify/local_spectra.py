@@ -129,7 +129,7 @@ def neighbours() -> float:
 def local_spectra(stretches: Iterable[Piece], period: float, length: int, names: tuple[str, str]) -> LocalSpectra:
     """Sums over the segments of `length` samples that fit into pieces of a record, end to end, none across a gap.
 
-    stretches  pieces with a column "row" that numbers the samples
+    stretches  pieces with a column "sample" that numbers the samples, as `Sampling.stretches` makes them
     names      of the columns of force and position
     """
     count = max((length // 2 - 2 * HALF) // STRIDE, 0)
@@ -139,10 +139,10 @@ def local_spectra(stretches: Iterable[Piece], period: float, length: int, names:
     kept, after = np.empty((2, 0)), -1
     for piece in stretches:
         values = np.array([piece[name] for name in names])
-        rows = piece["row"]
-        joins = len(rows) > 0 and int(rows[0]) == after
+        numbers = piece["sample"]
+        joins = len(numbers) > 0 and int(numbers[0]) == after
         kept = np.concatenate([kept, values], axis=1) if joins else values
-        after = int(rows[-1]) + 1 if len(rows) else -1
+        after = int(numbers[-1]) + 1 if len(numbers) else -1
         whole = (kept.shape[1] - DIFFERENCES) // length
         several = max(1, BATCH // (2 * length))
         for first in range(0, whole, several):
