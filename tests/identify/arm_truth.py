@@ -16,7 +16,7 @@ from tests.identify.arm_benches import (
 )
 from zwidth.identify.arm import COLUMNS, identify_arm
 from zwidth.identify.arm.parameters import Parameters, base_parameters
-from zwidth.identify.record import record_of
+from zwidth.identify.records.record import record_of
 from zwidth.model.effective_parameters import effective_parameters
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import zwidth
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_crossings import EdgeChords
-from zwidth.identify.boundary import COLUMNS
-from zwidth.identify.record import record_of
+from zwidth.identify.boundary.identify import COLUMNS
+from zwidth.identify.records.record import record_of
 
 
 def random_document(rng):

@@ -16,8 +16,8 @@ from zwidth.identify.arm.channels import channels_of
 from zwidth.identify.arm.parameters import Parameters, base_parameters
 from zwidth.identify.arm.smoothing import choose_band
 from zwidth.identify.arm.stretches import TorqueTiming, smoothed
-from zwidth.identify.record import record_of
-from zwidth.identify.sampling import check_sampling
+from zwidth.identify.records.record import record_of
+from zwidth.identify.records.sampling import check_sampling
 
 SEEDS = 1000
 

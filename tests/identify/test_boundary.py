@@ -15,8 +15,8 @@ from zwidth.contact.boundary_experiment import StableExtent, measure_edges
 from zwidth.contact.stability_trial import StabilityTrial
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
-from zwidth.identify.boundary import COLUMNS, identify_boundary
-from zwidth.identify.record import read_record
+from zwidth.identify.boundary.identify import COLUMNS, identify_boundary
+from zwidth.identify.records.record import read_record
 
 DELAY = "loop.delay_samples"
 

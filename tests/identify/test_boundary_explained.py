@@ -7,12 +7,12 @@ import pytest
 
 from tests.identify.boundary_cases import measured, random_device, record
 from zwidth.device import address
-from zwidth.identify.boundary_checks import check_magnitudes
-from zwidth.identify.boundary_explained import check_explained
-from zwidth.identify.boundary_fit import fit_boundary
-from zwidth.identify.boundary_model import BoundaryModel
-from zwidth.identify.boundary_parameters import BoundaryParameters
-from zwidth.identify.boundary_points import read_points
+from zwidth.identify.boundary.checks import check_magnitudes
+from zwidth.identify.boundary.explained import check_explained
+from zwidth.identify.boundary.fit import fit_boundary
+from zwidth.identify.boundary.model import BoundaryModel
+from zwidth.identify.boundary.parameters import BoundaryParameters
+from zwidth.identify.boundary.points import read_points
 
 DELAY = "loop.delay_samples"
 FEWEST = 12  # points on the boundary, of which a device is taken

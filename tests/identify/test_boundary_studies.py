@@ -10,11 +10,11 @@ from tests.identify.boundary_cases import measured, random_device, record, toml
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device import address
-from zwidth.identify.boundary import identify_boundary
-from zwidth.identify.boundary_fit import fit_boundary
-from zwidth.identify.boundary_model import BoundaryModel
-from zwidth.identify.boundary_parameters import BoundaryParameters
-from zwidth.identify.boundary_points import read_points
+from zwidth.identify.boundary.fit import fit_boundary
+from zwidth.identify.boundary.identify import identify_boundary
+from zwidth.identify.boundary.model import BoundaryModel
+from zwidth.identify.boundary.parameters import BoundaryParameters
+from zwidth.identify.boundary.points import read_points
 from zwidth.study.experiment import measure_boundary
 from zwidth.study.experiment_plan import Plan
 

@@ -8,10 +8,10 @@ import pytest
 import zwidth
 from tests.identify.boundary_cases import record
 from zwidth.contact.stability_trial import LEVELS, LONGER, StabilityTrial, TrialError
-from zwidth.identify.boundary import identify_boundary
-from zwidth.identify.boundary_checks import check_circumstances
-from zwidth.identify.boundary_points import read_points
-from zwidth.identify.boundary_trials import TrialPlan
+from zwidth.identify.boundary.checks import check_circumstances
+from zwidth.identify.boundary.identify import identify_boundary
+from zwidth.identify.boundary.points import read_points
+from zwidth.identify.boundary.trials import TrialPlan
 from zwidth.study.experiment import measure_boundary
 from zwidth.study.experiment_plan import Plan
 

@@ -12,9 +12,9 @@ from paddle import PADDLE
 
 import zwidth
 from zwidth.device.faults import DeviceError
-from zwidth.identify.friction import COLUMNS, identify_friction
-from zwidth.identify.mass import identify_mass
-from zwidth.identify.record import record_of
+from zwidth.identify.joint.friction import COLUMNS, identify_friction
+from zwidth.identify.joint.mass import identify_mass
+from zwidth.identify.records.record import record_of
 
 JOINT = Joint(
     mass=0.12,

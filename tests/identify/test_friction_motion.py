@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.identify.friction_motion import flow, follow_windows
+from zwidth.identify.joint.motion import flow, follow_windows
 
 
 def follow(force, numbers, period=1e-3, delay=0.0, start=(0.0, 0.0), samples=None):

@@ -9,9 +9,9 @@ import pytest
 
 from tests.identify.impedance_bench import bench, pushed
 from zwidth.device.faults import DeviceError
-from zwidth.identify.impedance import COLUMNS, identify_impedance
-from zwidth.identify.impedance_spectra import MeasuredImpedance, octave_bands
-from zwidth.identify.record import record_of
+from zwidth.identify.impedance.identify import COLUMNS, identify_impedance
+from zwidth.identify.impedance.spectra import MeasuredImpedance, octave_bands
+from zwidth.identify.records.record import record_of
 from zwidth.measures.handle_impedance import free_motion_mass, static_stiffness
 
 WALL = (1500.0, 3.0)

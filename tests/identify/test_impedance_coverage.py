@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.identify.random_impedance_benches import random_bench, records_of
-from zwidth.identify.impedance import COLUMNS, identify_impedance
-from zwidth.identify.record import record_of
+from zwidth.identify.impedance.identify import COLUMNS, identify_impedance
+from zwidth.identify.records.record import record_of
 from zwidth.measures.handle_impedance import felt_impedance, static_stiffness
 
 BATCH = 100

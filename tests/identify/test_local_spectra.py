@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.identify.local_spectra import correlations, local_spectra, merged, neighbours, segment_length
+from zwidth.identify.impedance.local_spectra import correlations, local_spectra, merged, neighbours, segment_length
 
 PERIOD = 0.001
 NAMES = ("force", "position")

@@ -8,8 +8,8 @@ import pytest
 from tests.identify.modes_bench import columns, readings
 from zwidth.device.load import load
 from zwidth.identify.kinds import identify
-from zwidth.identify.record import ArrayRecord
-from zwidth.identify.sweep_blocks import SweepBlocks, SweepRange
+from zwidth.identify.records.record import ArrayRecord
+from zwidth.identify.response.sweep_blocks import SweepBlocks, SweepRange
 from zwidth.model.sweep_response import sweep_response_of_blocks
 
 PERIOD = 2e-3

@@ -12,9 +12,9 @@ from tests import systems
 from tests.identify.modes_bench import columns, quantised, random_bench, readings, two_mass_device
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
-from zwidth.identify.modes import COLUMNS, identify_modes
-from zwidth.identify.modes_model import sampled_response
-from zwidth.identify.record import record_of
+from zwidth.identify.modes.identify import COLUMNS, identify_modes
+from zwidth.identify.modes.model import sampled_response
+from zwidth.identify.records.record import record_of
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator, attach
@@ -218,7 +218,9 @@ def test_a_hand_that_the_device_hides_is_refused():
 
 def test_long_records_are_read_in_blocks(monkeypatch):
     """The same numbers where a record is read again for each pass, in many stretches."""
-    from zwidth.identify import modes, modes_source, modes_survey
+    from zwidth.identify.modes import identify as modes
+    from zwidth.identify.modes import overview as modes_survey
+    from zwidth.identify.modes import stretches as modes_source
 
     monkeypatch.setattr(modes, "KEPT", 0)
     monkeypatch.setattr(modes_source, "BLOCK", 1024)

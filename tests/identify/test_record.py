@@ -10,10 +10,10 @@ import scipy.io
 import xarray as xr
 
 from zwidth.device.faults import DeviceError
-from zwidth.identify import table_copy
-from zwidth.identify.averaged_rows import averaged_rows
-from zwidth.identify.columns import Columns
-from zwidth.identify.record import read_record, record_of
+from zwidth.identify.records import table_copy
+from zwidth.identify.records.averaged_rows import averaged_rows
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import read_record, record_of
 
 WANTED = Columns(("time_s", ("force_N", "torque_Nm")), optional=("position_m",), text=("joint",))
 

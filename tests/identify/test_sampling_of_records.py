@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.identify.columns import Columns
-from zwidth.identify.record import record_of
-from zwidth.identify.sampling import check_sampling
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import record_of
+from zwidth.identify.records.sampling import check_sampling
 
 WANTED = Columns(("time_s", "force_N"))
 

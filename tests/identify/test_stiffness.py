@@ -9,8 +9,8 @@ import zwidth
 from tests.identify.spring_bench import bench_record, bent_angles, random_bench
 from zwidth.device.faults import DeviceError
 from zwidth.identify.identification import IdentificationError
-from zwidth.identify.spring_fit import fit_spring
-from zwidth.identify.strokes import resolution_of, strokes_of, turning_points
+from zwidth.identify.stiffness.spring_fit import fit_spring
+from zwidth.identify.stiffness.strokes import resolution_of, strokes_of, turning_points
 
 DRIVE = "mechanism.drives.motor-right"
 STEP = 2.0 * np.pi / 8192

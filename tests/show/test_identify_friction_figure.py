@@ -10,7 +10,7 @@ from identify.test_friction_joint import JOINT, record
 from identify.virtual_joint import records_of
 
 import zwidth
-from zwidth.identify.friction import identify_friction
+from zwidth.identify.joint.friction import identify_friction
 from zwidth.show.figures.identify_friction import draw_friction
 from zwidth.show.figures.style import figure
 

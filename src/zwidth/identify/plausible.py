@@ -7,8 +7,8 @@ from math import isfinite
 from typing import Final
 
 from zwidth.identify.identification import Check
-from zwidth.identify.record import Record
-from zwidth.identify.sampling import SAME_PERIOD, Sampling, unit_of_time
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import SAME_PERIOD, Sampling, unit_of_time
 
 NEAR: Final = 2.0  # by which a ratio may differ from that of two units
 UNLIKELY: Final = 20.0  # times the file's mass, either way, that is remarked

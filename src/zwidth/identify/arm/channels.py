@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail
-from zwidth.identify.columns import Columns
-from zwidth.identify.record import Piece, Record
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import Piece, Record
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import pack
 

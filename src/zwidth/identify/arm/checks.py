@@ -14,7 +14,7 @@ from zwidth.device.faults import comma_list
 from zwidth.identify.arm.channels import Channels
 from zwidth.identify.arm.smoothing import convolved
 from zwidth.identify.identification import Check
-from zwidth.identify.record import Piece
+from zwidth.identify.records.record import Piece
 
 Floats = NDArray[np.float64]
 

@@ -51,8 +51,8 @@ from zwidth.identify.arm.smoothing import Band, choose_band
 from zwidth.identify.arm.stretches import Stretch, TorqueTiming, smoothed
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.plausible import check_mass_in_file, check_periods
-from zwidth.identify.record import Record
-from zwidth.identify.sampling import Sampling, check_sampling
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import Sampling, check_sampling
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.progress import Progress

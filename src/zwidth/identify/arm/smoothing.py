@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.identify.sampling import Sampling
+from zwidth.identify.records.sampling import Sampling
 
 Floats = NDArray[np.float64]
 

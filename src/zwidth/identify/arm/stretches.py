@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from zwidth.identify.arm.channels import Channels
 from zwidth.identify.arm.smoothing import Band, convolved
-from zwidth.identify.record import Record
-from zwidth.identify.sampling import Sampling
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import Sampling
 from zwidth.memory_limit import check_memory
 
 Floats = NDArray[np.float64]

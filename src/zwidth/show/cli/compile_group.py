@@ -100,7 +100,7 @@ def identify_friction_of_a_step() -> None:
     """Friction of a short record: a mass that a square wave moves to and fro."""
     import numpy as np
 
-    from zwidth.identify.friction_fit import Numbers, Windows, predict
+    from zwidth.identify.joint.fit import Numbers, Windows, predict
 
     force, one = np.repeat([1.0, -1.0], 20), np.array([40])
     windows = Windows(force, force, np.array([0]), one, np.array([0.001]), np.zeros(1), np.zeros(1, int), True)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from zwidth.identify.friction import JointIdentification
+from zwidth.identify.joint.friction import JointIdentification
 from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION, label, legend_above
 from zwidth.show.units import quantity
 

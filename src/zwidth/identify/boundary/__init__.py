@@ -1,0 +1,1 @@
+"""Numbers of a device from a measured stability boundary."""

@@ -1,0 +1,289 @@
+"""Numbers of a device that bring its exact chart nearest to a measured boundary, with their intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.boundary.model import BoundaryModel, Deviations, Scatter
+from zwidth.identify.boundary.parameters import BoundaryParameters
+from zwidth.identify.boundary.points import EDGE, LOWER, TIP, UPPER, BoundaryPoints
+from zwidth.identify.profile_likelihood import Fit, fit_least_squares
+
+Floats = NDArray[np.float64]
+
+FIRST_SCATTER: Final = 0.02  # share of the measured range that the scatter is taken for at first
+LEAST_SCATTER: Final = 1e-9  # share of the measured range; less would be the rounding of the chart
+ENOUGH: Final = 6  # points of a kind from which on their scatter is estimated from them alone
+ROUNDS: Final = 4  # of fitting, and of estimating the scatter from what remains
+SAME_SCATTER: Final = 0.02  # relative change of the scatter at which the rounds end
+STARTS: Final = 4  # fits from different vectors, at most, of which the best is kept
+SAME_MINIMUM: Final = 0.01  # relative difference of sums of squares of two fits that have found the same
+CLOSE: Final = 1.0  # mean square in units of the first scatter, below which no other start is tried
+MOST_CROSSED: Final = 2  # numbers whose starts are all combined
+COARSE: Final = 1e-3  # relative change of the sum of squares: a fortieth of a standard deviation and less
+FINE: Final = 1e-8  # the same where intervals are taken
+COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
+
+
+@dataclass(frozen=True)
+class BoundaryFit:
+    """A fit of a boundary.
+
+    parameters  what was varied
+    fit         vector of the numbers, ends of their intervals, and what remains in units of the scatter
+    scatter     standard deviations that remain
+    deviations  of the points on the boundary
+    freedom     (p,) degrees of freedom by which the scatter is known that each number hangs on
+    """
+
+    parameters: BoundaryParameters
+    fit: Fit
+    scatter: Scatter
+    deviations: Deviations
+    freedom: Floats
+
+    @property
+    def vector(self) -> Floats:
+        """The numbers (p,) as they vary."""
+        return self.fit.values
+
+    def ends(self, i: int) -> tuple[float, float, float]:
+        """A number and the ends of its interval; the bound that the file sets where the data set none."""
+        low, high = self.fit.low.copy(), self.fit.high.copy()
+        given = self.parameters
+        limited = ~given.positive & np.isfinite(given.lower) & np.isneginf(low)
+        low = np.where(limited, given.lower, low)
+        columns = (given.values(np.where(np.isnan(x), 0.0, x)) for x in (self.fit.values, low, high))
+        value, least, most = (float(column[i]) for column in columns)
+        return value, least, most
+
+
+def ranges(points: BoundaryPoints) -> Scatter:
+    """How far the measured points reach: in stiffness, in damping, in frequency; each above 0."""
+    edges = points[points.on_edge]
+    frequency = edges.frequency[edges.frequency > 0.0]
+    reach = [
+        float(np.ptp(values)) or float(np.max(np.abs(values), initial=0.0)) or 1.0 if len(values) else 1.0
+        for values in (edges.stiffness, edges.damping, frequency)
+    ]
+    return Scatter(*reach)
+
+
+def first_scatter(points: BoundaryPoints) -> Scatter:
+    """The scatter that a fit begins with."""
+    return Scatter(*(FIRST_SCATTER * one for one in ranges(points)))
+
+
+def fit_boundary(
+    model: BoundaryModel, parameters: BoundaryParameters, *, start: Floats | None = None, profiled: bool = True
+) -> BoundaryFit:
+    """Fit the numbers to the points of a model, and estimate the scatter from what remains.
+
+    The scatter along damping, along stiffness and of the frequency are each estimated from the points that have
+    it; where there are few, it is taken to be at least in the same proportion to the measured range as the others.
+
+    start     vector to begin with; None: the best of several
+    profiled  False: intervals by the curvature alone
+    Raises    ValueError  for fewer points on the boundary than numbers
+    """
+    reach, x = ranges(model.points), start
+    scatter = first_scatter(model.points)
+    if x is None:
+        x = _best_start(model, parameters, scatter)
+    step = COARSE_STEP if model.interpolated(x) else None
+    for _ in range(ROUNDS):
+        fit = _fit(model, parameters, scatter, x, step, tolerance=COARSE, profiled=False)
+        x, before = fit.values, scatter
+        scatter = _scatter(model, fit, scatter, reach)
+        if all(abs(a / b - 1.0) < SAME_SCATTER for a, b in zip(scatter, before, strict=True)):
+            break
+    freedom, widening = _freedom(model, x, scatter)
+    fit = _fit(
+        model, parameters, scatter, x, step, profiled=profiled, freedom=freedom, widening=widening, tolerance=FINE
+    )
+    return BoundaryFit(parameters, fit, scatter, model.deviations(fit.values, scatter), freedom)
+
+
+def _fit(
+    model: BoundaryModel,
+    parameters: BoundaryParameters,
+    scatter: Scatter,
+    start: Floats,
+    step: float | None,
+    *,
+    profiled: bool,
+    tolerance: float,
+    freedom: Floats | None = None,
+    widening: Floats | float = 1.0,
+) -> Fit:
+    return fit_least_squares(
+        lambda vector: model.residuals(vector, scatter),
+        start,
+        lower=parameters.lower,
+        upper=parameters.upper,
+        known_scale=True,
+        scale_freedom=freedom,
+        widening=widening,
+        diff_step=step,
+        tolerance=tolerance,
+        profiled=profiled,
+    )
+
+
+def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: Scatter) -> Floats:
+    """The best of the fits that begin at the nearest of several vectors.
+
+    The sum of the deviations' sizes is compared, not of their squares: far from the truth one point would rule.
+    """
+
+    def size(vector: Floats) -> float:
+        return float(np.sum(np.abs(model.residuals(vector, scatter))))
+
+    begin = parameters.start
+    values = [np.append(begin[i], parameters.other_starts(i)) for i in range(len(begin))]
+    if len(begin) <= MOST_CROSSED:
+        tried = [np.array(one) for one in product(*values)]
+    else:
+        tried = [begin]
+        for i, others in enumerate(values):
+            tried += [np.where(np.arange(len(begin)) == i, one, begin) for one in others[1:]]
+    for i in range(len(begin)):
+        tried += [np.where(np.arange(len(begin)) == i, one, begin) for one in parameters.near_starts(i)]
+    order = np.argsort([size(one) for one in tried], kind="stable")
+    step = COARSE_STEP if model.interpolated(begin) else None
+    fits = list[Fit]()
+    several = len(begin) > 1  # several numbers have other minima near the points, too
+    for k in order[:STARTS]:
+        fits.append(_fit(model, parameters, scatter, tried[k], step, tolerance=COARSE, profiled=False))
+        sums = sorted(fit.sum_of_squares for fit in fits)
+        close = sums[0] < CLOSE * len(fits[0].residuals)
+        twice = len(sums) > 1 and sums[1] < (1.0 + SAME_MINIMUM) * sums[0]
+        if twice if several else close:
+            break
+    return min(fits, key=lambda fit: fit.sum_of_squares).values
+
+
+def _parts(model: BoundaryModel) -> dict[str, NDArray[np.bool_]]:
+    """Which residuals (m,) are of points along damping, along stiffness, of unknown edges, of frequencies."""
+    edges = model.points[model.points.on_edge]
+    seen = int(np.sum(edges.frequency > 0.0))
+    total = len(edges) + seen + int(np.sum(~model.points.on_edge))
+    place = np.arange(total)
+
+    def of(*kinds: str) -> NDArray[np.bool_]:
+        return np.append(edges.of(*kinds), np.zeros(total - len(edges), dtype=bool))
+
+    return {
+        "stiffness": of(TIP),
+        "damping": of(LOWER, UPPER),
+        "frequency": (place >= len(edges)) & (place < len(edges) + seen),
+        "distance": of(EDGE),
+    }
+
+
+def _scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) -> Scatter:
+    """Standard deviations of what remains, of each kind of points.
+
+    Of a kind with few points it is at least in the same proportion to the measured range as those of the others:
+    few points that happen to lie well would rule the fit.
+    """
+    freedom, parts = _freedom_by_kind(model, fit.values, before), _parts(model)
+    own = dict[str, float]()
+    for name, most, now in zip(Scatter._fields, reach, before, strict=True):
+        part = parts[name] | (parts["distance"] if name == "damping" else False)
+        if part.any():
+            nu = max(freedom[name] + (freedom["distance"] if name == "damping" else 0.0), 0.5)
+            own[name] = max(now * float(np.sqrt(np.sum(fit.residuals[part] ** 2) / nu)) / most, LEAST_SCATTER)
+    counts = {name: int(np.sum(parts[name])) for name in own}
+    known = [own[name] for name in own if counts[name] >= ENOUGH] or list(own.values())
+    usual = float(np.sqrt(np.mean(np.square(known))))
+    if "stiffness" in own and counts["stiffness"] < ENOUGH and "damping" in own:
+        usual = own["damping"]
+    shares = [
+        own.get(name, usual) if counts.get(name, 0) >= ENOUGH else max(own.get(name, usual), usual)
+        for name in Scatter._fields
+    ]
+    return Scatter(*(share * most for share, most in zip(shares, reach, strict=True)))
+
+
+def _shares(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, Floats]:
+    """In which shares (p,) the kinds of points tell each number; 0 of a number that they do not tell."""
+    jacobian = derivatives(model, vector, scatter)
+    parts = _parts(model)
+    information = jacobian[np.any(list(parts.values()), axis=0)]
+    inverse = np.linalg.pinv(information.T @ information)
+    size = np.maximum(np.diag(inverse), 1e-300)
+    return {
+        name: np.diag(inverse @ jacobian[part].T @ jacobian[part] @ inverse) / size for name, part in parts.items()
+    }
+
+
+def _freedom_by_kind(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, float]:
+    """Number of points of each kind, less the numbers that are told by them."""
+    shares, parts = _shares(model, vector, scatter), _parts(model)
+    return {name: float(np.sum(part)) - float(np.sum(shares[name])) for name, part in parts.items()}
+
+
+def _freedom(model: BoundaryModel, vector: Floats, scatter: Scatter) -> tuple[Floats, Floats]:
+    """Degrees of freedom (p,) by which the scatter is known (Satterthwaite), and the factors (p,) by which the
+    intervals are wider since the points' weights were estimated, too.
+
+    The variance of a number is made of the variances of the kinds of points in the shares p_k of their
+    information. With weights from variances of nu_k degrees of freedom it is larger, and what the weights say of
+    it smaller, than with known ones: together 1 + 4 sum p_k (1 - p_k) / (nu_k + 2) to first order (Sinha 1985,
+    known at second hand, for a common mean). Few tips have the weight of the points along damping: one kind.
+    """
+    shares, by_kind = _shares(model, vector, scatter), _freedom_by_kind(model, vector, scatter)
+    nu = {name: max(value, 0.5) for name, value in by_kind.items()}
+    spread = sum(shares[name] ** 2 / nu[name] for name in nu)
+    known = np.divide(1.0, spread, out=np.full(len(vector), np.inf), where=np.asarray(spread) > 0.0)
+    joined = dict(shares)
+    if np.sum(_parts(model)["stiffness"]) < ENOUGH:
+        joined["damping"] = joined["damping"] + joined.pop("stiffness")
+    wider = 1.0 + 4.0 * sum(np.clip(p * (1.0 - p), 0.0, None) / (nu[name] + 2.0) for name, p in joined.items())
+    return np.maximum(np.minimum(sum(by_kind.values()), known), 1.0), np.sqrt(wider)
+
+
+def derivatives(model: BoundaryModel, vector: Floats, scatter: Scatter) -> Floats:
+    """Change (m, p) of what remains per change of each number, by central differences."""
+    columns = []
+    for i, value in enumerate(vector.tolist()):
+        ends, step = [], COARSE_STEP * max(abs(value), 1e-3)
+        for side in (-1.0, 1.0):
+            moved = vector.copy()
+            moved[i] += side * step
+            ends.append(model.residuals(moved, scatter))
+        columns.append((ends[1] - ends[0]) / (2.0 * step))
+    return np.column_stack(columns)
+
+
+def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, int]:
+    """Minus twice the logarithm of the largest likelihood, up to what all models of the same points share; the
+    number of points and frequencies; and the number of standard deviations that were estimated.
+
+    Each kind of points has its own standard deviation, of which the likelihood is largest at what remains:
+    sum n ln(SS / n); tried walls add -2 ln Phi(d).
+    """
+    reach, residuals = ranges(model.points), fit.fit.residuals
+    total, count, kinds, used = 0.0, 0, 0, np.zeros(len(residuals), dtype=bool)
+    for name, part in _parts(model).items():
+        if part.any():
+            its = "damping" if name == "distance" else name
+            size = getattr(fit.scatter, its) / getattr(reach, its)
+            mean = float(np.mean(residuals[part] ** 2)) * size**2
+            total += float(np.sum(part)) * float(np.log(max(mean, LEAST_SCATTER**2)))
+            count, kinds, used = count + int(np.sum(part)), kinds + 1, used | part
+    return total + float(np.sum(residuals[~used] ** 2)), count, kinds
+
+
+def without(points: BoundaryPoints, every: int = 3) -> NDArray[np.bool_]:
+    """Which points (n,) are kept where every third on the boundary is left out, along each edge."""
+    order = np.lexsort((points.chosen, points.kind, ~points.on_edge))
+    keep = np.ones(len(points), dtype=bool)
+    keep[order[: int(points.on_edge.sum())][1::every]] = False
+    return keep

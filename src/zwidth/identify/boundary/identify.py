@@ -1,0 +1,301 @@
+"""Numbers of a device from a measured stability boundary: damping, delay, operator, whichever are named.
+
+The points are compared with the exact chart (`boundary_model`); where dry friction makes the boundary hang on the
+amplitude, with trials on the simulated device (`boundary_trials`). The scatter is estimated from what remains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.edge_crossings import EdgeChords
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, comma_list, fail, plural
+from zwidth.identify.boundary.checks import (
+    check_circumstances,
+    check_magnitudes,
+    check_points,
+    complete_points,
+)
+from zwidth.identify.boundary.damping import DampingComparison, compare_models
+from zwidth.identify.boundary.damping_models import models_of
+from zwidth.identify.boundary.explained import check_explained, share_of_points
+from zwidth.identify.boundary.fit import BoundaryFit, derivatives, first_scatter, fit_boundary, without
+from zwidth.identify.boundary.model import BoundaryModel
+from zwidth.identify.boundary.parameters import BoundaryParameters
+from zwidth.identify.boundary.points import COLUMNS, BoundaryPoints, read_points
+from zwidth.identify.boundary.trials import TrialModel, TrialPlan, model_by_trials, needs_trials
+from zwidth.identify.identification import Check, Estimate, Identification, refused
+from zwidth.identify.records.record import Record
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.progress import Progress
+
+__all__ = ["COLUMNS", "identify_boundary"]
+
+Floats = NDArray[np.float64]
+
+KIND: Final = "boundary"
+ROUTES: Final = (None, "chart", "experiment")
+ALIKE: Final = 0.95  # correlation of two numbers, from which on a reader must know of it
+NOTHING: Final = 1e-9  # change of the points, in units of the scatter, that a number without effect makes
+OUTLIER: Final = 4.0  # standard deviations
+ROUNDING: Final = 1e-6  # standard deviations, below which nothing is an outlier
+FEWEST_VALIDATED: Final = 6  # points on the boundary
+MOST_NAMED: Final = 3
+MOST_LOST_NAMED: Final = 12  # points without an edge in trials
+
+
+def identify_boundary(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    point: OperatingPoint | None = None,
+    paths: Sequence[str] = (),
+    damping_models: str | Sequence[str] = (),
+    through: str | None = None,
+    disturbance: float | None = None,
+    visible: float | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Fit numbers of a device to a stability boundary that was measured on it.
+
+    records         with the columns of `COLUMNS`; what `zwidth experiment --output FILE.csv` writes is one
+    point           posture, direction and who holds the device; None: `device.at()`
+    paths           of the numbers to fit, as `--set` takes them
+    damping_models  names of `damping_models.NUMBERS`, or "all": each is fitted, with the numbers of `paths`, in
+                    place of the device's own damping, and they are compared; the estimates are those of the best
+    through         "chart", "experiment": what the points are compared with; None: the chart, and trials on the
+                    simulated device where it has dry friction or an estimate of velocity that is not linear
+    disturbance     of those trials [m]; None: each point's own perturbation_N over its stiffness, or 1 mm
+    visible         amplitude up to which a vibration counts as none in those trials [m]; None: each point's own
+                    amplitude_m, or three encoder steps
+    progress        called with stage, steps done, and steps
+    Raises          DeviceError  for faults of the records and of the arguments, and where the device has no chart
+    """
+    if not records:
+        raise fail(device.label, "", "no record was given; give a CSV file with points of the boundary")
+    if through not in ROUTES:
+        raise fail(device.label, "through", f"must be chart, experiment or nothing, got {through!r}")
+    point = device.at() if point is None else point
+    if point.operator != device.operator:
+        device = device.held_by(point.operator or "none")
+    if not paths and not damping_models:
+        text = "name the numbers to fit, such as loop.delay_samples, or a damping model, or all of them"
+        raise fail(device.label, "paths", text)
+    report = progress or (lambda stage, done, of: None)
+    report("reading the points", 0, 0)
+    points, checks = complete_points(read_points(records), records)
+    models = models_of(damping_models, device, point) if damping_models else []
+    choices = [BoundaryParameters.of(device, point, paths, model) for model in models]
+    choices = choices or [BoundaryParameters.of(device, point, paths)]
+    count = max(len(one.start) for one in choices)
+    checks += check_points(points, count)
+    if (nothing := refused(KIND, device.label, checks)) is not None:
+        return nothing
+    simulated = needs_trials(point, through)
+    checks += [check_magnitudes(points, _own_edge(choices[0], point)), *check_circumstances(points, simulated)]
+    if (nothing := refused(KIND, device.label, checks)) is not None:
+        return nothing
+    plan = TrialPlan.of(points, point, disturbance, visible) if simulated else None
+    checks.append(_route(point, plan))
+    fits = [(_model(points, one, plan, report), one) for one in choices]
+    checks += [*_without_edge(fits, records), _apart(fits[0][0], fits[0][1])]
+    if (nothing := refused(KIND, device.label, checks)) is not None:
+        return nothing
+    comparison = compare_models(fits, report)
+    model, fit = comparison.model, comparison.best
+    checks += [*_alike(fit), check_explained(model, fit)]
+    if (nothing := refused(KIND, device.label, checks)) is not None:
+        return nothing
+    report("validating", 0, 0)
+    share, sentence = _validate(model, fit)
+    return Identification(
+        kind=KIND,
+        label=device.label,
+        checks=tuple(checks),
+        estimates=_estimates(fit),
+        validation=share,
+        validated_on=sentence,
+        remarks=(*_remarks(model, fit, records), *comparison.sentences),
+        curves=_curves(model, fit),
+        details=_details(model, fit, comparison, plan),
+    )
+
+
+def _own_edge(parameters: BoundaryParameters, point: OperatingPoint) -> EdgeChords:
+    """The edge of the file's own chart. Raises DeviceError where the device has none."""
+    try:
+        return parameters.edge(parameters.start)
+    except DeviceError:
+        raise
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        raise fail(parameters.device.label, "", f"has no chart to compare the points with: {error}") from None
+
+
+def _route(point: OperatingPoint, plan: TrialPlan | None) -> Check:
+    """What the points are compared with, and why."""
+    if plan is not None:
+        return Check("compared with", True, plan.sentence)
+    omitted = point.contact_loop.nonlinear.kinds if point.response is None else ()
+    text = "the exact chart of the linear device"
+    if omitted:
+        return Check("compared with", False, f"{text}, which leaves out {comma_list(omitted)}", warning=True)
+    return Check("compared with", True, f"{text}, as nothing of it makes the boundary hang on the amplitude")
+
+
+def _model(
+    points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan | None, report: Progress
+) -> BoundaryModel:
+    model = BoundaryModel(points, parameters.edge)
+    return model if plan is None else model_by_trials(model, parameters, plan, report)
+
+
+def _without_edge(
+    fits: Sequence[tuple[BoundaryModel, BoundaryParameters]], records: Sequence[Record]
+) -> list[Check]:
+    """A warning that names the points at which the trials of a model have no edge, so that they do not count."""
+    checks = list[Check]()
+    for model, parameters in fits:
+        lost = model.lost if isinstance(model, TrialModel) else None
+        if lost is not None and len(lost):
+            places = [
+                f"{records[lost.record[i]].place(int(lost.row[i]))} of {records[lost.record[i]].label}"
+                for i in range(len(lost))
+            ]
+            of = f" with {parameters.damping.title} damping" if parameters.damping is not None else ""
+            text = (
+                f"the simulated device{of} has no edge at {plural(len(lost), 'point')}, or loses it as a number "
+                f"moves; left out of the fit: {comma_list(places, MOST_LOST_NAMED)}"
+            )
+            checks.append(Check("trials", False, text, warning=True))
+    return checks
+
+
+def _apart(model: BoundaryModel, parameters: BoundaryParameters) -> Check:
+    """Whether each number moves the boundary at all, at the values of the file."""
+    J = derivatives(model, parameters.start, first_scatter(model.points))
+    names = [what for what, _, _ in parameters.named]
+    still = [name for name, column in zip(names, J.T, strict=True) if np.max(np.abs(column)) < NOTHING]
+    if still:
+        text = (
+            f"{comma_list(still)}: the boundary does not move with it in this posture, held as the device is; "
+            "leave it out"
+        )
+        return Check("numbers", False, text)
+    return Check("numbers", True, f"the boundary moves with {comma_list(names)}")
+
+
+def _alike(fit: BoundaryFit) -> list[Check]:
+    """A warning for each pair of numbers of which the points tell little more than a combination."""
+    names = [what for what, _, _ in fit.parameters.named]
+    C = fit.fit.covariance
+    size = np.sqrt(np.diag(C))
+    checks = list[Check]()
+    for i in range(len(names)):
+        for j in range(i):
+            if not (np.isfinite(size[[i, j]]).all() and size[i] * size[j] > 0.0):
+                continue
+            alike = float(C[i, j] / (size[i] * size[j]))
+            if abs(alike) > ALIKE:
+                text = (
+                    f"{names[j]} and {names[i]} change the boundary in nearly the same way (correlation "
+                    f"{alike:.3f}): their combination is known better than either; measure the frequencies, or "
+                    "points on the other edge, or fix one"
+                )
+                checks.append(Check("told apart", False, text, warning=True))
+    unknown = [name for name, its in zip(names, size, strict=True) if not np.isfinite(its)]
+    if unknown:
+        checks.append(Check("told apart", False, f"the points do not tell {comma_list(unknown)} from the others"))
+    return checks
+
+
+def _validate(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, str]:
+    """Share of the spread of every third point that a fit to the others explains."""
+    edges = int(model.points.on_edge.sum())
+    kept = without(model.points)
+    left = int(np.sum(kept & model.points.on_edge))
+    if edges < FEWEST_VALIDATED or left < len(fit.vector) + 1:
+        return float("nan"), f"nothing: {plural(edges, 'point')} on the boundary are too few to leave some out"
+    again = fit_boundary(model.only(kept), fit.parameters, start=fit.vector, profiled=False)
+    unseen = model.only(~kept)
+    deviations = unseen.deviations(again.vector, fit.scatter)
+    share = share_of_points(unseen.points, deviations.value, fit.scatter)
+    return share, (
+        f"{edges - left} of {edges} points on the boundary, every third along each edge, predicted by a fit to "
+        "the others; the numbers are of all points"
+    )
+
+
+def _estimates(fit: BoundaryFit) -> tuple[Estimate, ...]:
+    ends = [fit.ends(i) for i in range(len(fit.vector))]
+    return tuple(
+        Estimate(what, *its, unit, path)
+        for (what, unit, path), its in zip(fit.parameters.named, ends, strict=True)
+    )
+
+
+def _remarks(model: BoundaryModel, fit: BoundaryFit, records: Sequence[Record]) -> list[str]:
+    """Points that lie far from the others' scatter."""
+    edges = model.points[model.points.on_edge]
+    normalised = fit.deviations.value / model.units(fit.scatter)
+    typical = 1.4826 * float(np.median(np.abs(normalised)))
+    far = np.abs(normalised) > OUTLIER * typical if typical > ROUNDING else np.zeros(len(edges), dtype=bool)
+    places = [
+        f"{records[edges.record[i]].place(int(edges.row[i]))} of {records[edges.record[i]].label}"
+        for i in np.flatnonzero(far)
+    ]
+    if not places:
+        return []
+    return [
+        f"{plural(len(places), 'point lies', 'points lie')} more than {OUTLIER:g} standard deviations from the "
+        f"fitted edge: {comma_list(places, MOST_NAMED)}; all points count in the fit"
+    ]
+
+
+def _curves(model: BoundaryModel, fit: BoundaryFit) -> dict[str, list[Any]]:
+    """The points with what was fitted to them, one a row."""
+    points, on_edge = model.points, model.points.on_edge
+    columns: dict[str, list[Any]] = {
+        "stiffness_N_per_m": points.stiffness.tolist(),
+        "damping_Ns_per_m": points.damping.tolist(),
+        "kind": points.kind.tolist(),
+        "frequency_Hz": points.frequency.tolist(),
+    }
+    for name, values in (
+        ("fitted_stiffness_N_per_m", fit.deviations.exact[:, 0]),
+        ("fitted_damping_Ns_per_m", fit.deviations.exact[:, 1]),
+        ("deviation", fit.deviations.value / model.units(fit.scatter)),
+        ("frequency_deviation_Hz", fit.deviations.frequency),
+    ):
+        column = np.full(len(points), np.nan)
+        column[on_edge] = values
+        columns[name] = column.tolist()
+    return columns
+
+
+def _details(
+    model: BoundaryModel, fit: BoundaryFit, comparison: DampingComparison, plan: TrialPlan | None
+) -> dict[str, Any]:
+    def outline(vector: Floats) -> list[dict[str, list[float]]]:
+        try:
+            arcs = fit.parameters.chart(vector).boundary
+        except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+            return []
+        return [
+            {"stiffness_N_per_m": arc.stiffness.tolist(), "damping_Ns_per_m": arc.damping.tolist()} for arc in arcs
+        ]
+
+    return {
+        "compared_with": "chart" if plan is None else "experiment",
+        "scatter_N_per_m": fit.scatter.stiffness,
+        "scatter_Ns_per_m": fit.scatter.damping,
+        "scatter_Hz": fit.scatter.frequency if (model.points.frequency > 0.0).any() else None,
+        "explained": share_of_points(model.points, fit.deviations.value, fit.scatter),
+        "damping_models": comparison.document(),
+        "boundary_before": outline(fit.parameters.start),
+        "boundary": outline(fit.vector),
+    }

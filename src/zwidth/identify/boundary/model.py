@@ -1,0 +1,168 @@
+"""The boundary that a device has on its exact chart, beside the points that were measured of it.
+
+A point on a lower or an upper edge is compared along damping, at its stiffness; a tip along stiffness, at its
+damping, as they were bisected. A point of which it is not known on which edge it lies is compared by its shortest
+distance, in units of the scatter. A wall that was tried and found stable, or unstable, is an inequality: with
+scatter of the edge the probability of that verdict is Phi(d), d the wall's distance inside (outside) the edge in
+units of the scatter, so that
+
+    r = sqrt(-2 ln Phi(d))
+
+has the sum of squares that the likelihood asks for: 0 far on the right side, |d| far on the wrong one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.edge_crossings import EdgeChords, EdgeKind
+from zwidth.identify.boundary.points import EDGE, LOWER, STABLE, TIP, UNSTABLE, UPPER, BoundaryPoints
+from zwidth.identify.boundary.weights import relative_scatter
+
+Floats = NDArray[np.float64]
+EdgeOf = Callable[[Floats], EdgeChords]
+
+NO_EDGE: Final = EdgeChords(np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2)))
+
+
+class Scatter(NamedTuple):
+    """Standard deviation of what was measured.
+
+    stiffness [N/m] of tips;  damping [N s/m] of lower and upper edges;  frequency [Hz]
+    """
+
+    stiffness: float
+    damping: float
+    frequency: float
+
+
+class Deviations(NamedTuple):
+    """Measured less exact, of the points on the boundary (n,) and of those with a frequency.
+
+    value      along what was bisected [N s/m], [N/m]; in units of the scatter for a point of an unknown edge
+    missing    (n,) whether the chart has no such edge on the point's line; value is then the distance to where it
+               comes nearest, in the same unit
+    exact      (n, 2) the wall on the exact edge [N/m, N s/m]; the nearest one where there is none
+    frequency  (n,) measured less exact [Hz]; nan where it was not measured
+    """
+
+    value: Floats
+    missing: NDArray[np.bool_]
+    exact: Floats
+    frequency: Floats
+
+
+@dataclass
+class BoundaryModel:
+    """Points beside the exact edges of a device whose numbers vary.
+
+    points    on the boundary, and walls that were tried
+    edge_of   exact edge of the device with a vector of numbers; raises ValueError where there is none
+    """
+
+    points: BoundaryPoints
+    edge_of: EdgeOf
+    _edges: dict[bytes, EdgeChords] = field(default_factory=dict, repr=False)
+
+    def chords(self, vector: Floats) -> EdgeChords:
+        """The chart's edge; none where there is no such device, or where its chart cannot be closed."""
+        key = np.asarray(vector, dtype=float).tobytes()
+        if key not in self._edges:
+            if len(self._edges) > 64:
+                self._edges.clear()
+            try:
+                self._edges[key] = self.edge_of(vector)
+            except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+                self._edges[key] = NO_EDGE
+        return self._edges[key]
+
+    def interpolated(self, vector: Floats) -> bool:
+        """Whether the chart's edge is interpolated, so that it is not exact to rounding."""
+        return self.chords(vector).curve is None
+
+    def deviations(self, vector: Floats, scatter: Scatter) -> Deviations:
+        """The points on the boundary beside the exact edge; where there is none, beside the origin."""
+        chords = self.chords(vector)
+        points = self.points[self.points.on_edge]
+        value, frequency = np.full(len(points), np.nan), np.full(len(points), np.nan)
+        exact = np.column_stack([points.stiffness, points.damping])
+        missing = np.zeros(len(points), dtype=bool)
+        for edge in (LOWER, UPPER, TIP):
+            some = points.of(edge)
+            if some.any():
+                kind: EdgeKind = edge  # type: ignore[assignment]
+                along = 0 if edge == TIP else 1
+                at, there = chords.crossings(points.chosen[some], points.bisected[some], kind)
+                lost = np.isnan(at)
+                place = exact[some]
+                place[:, along] = at
+                place[lost] = _nearest_walls(chords, points.chosen[some][lost], edge)
+                exact[some], frequency[some], missing[some] = place, there, lost
+                value[some] = points.bisected[some] - place[:, along]
+                across = 1 - along
+                units = (scatter.stiffness, scatter.damping)
+                gap = (points.chosen[some] - place[:, across]) / units[across] * units[along]
+                value[some] = np.where(lost, np.hypot(value[some], gap), value[some])
+        some = points.of(EDGE)
+        if some.any():
+            K, B = points.stiffness[some], points.damping[some]
+            depth, frequency[some], exact[some] = chords.nearest(K, B, (scatter.stiffness, scatter.damping))
+            value[some] = -depth
+        return Deviations(value, missing, exact, points.frequency - frequency)
+
+    def residuals(self, vector: Floats, scatter: Scatter) -> Floats:
+        """What remains (m,) of points on the boundary, of their frequencies, and of walls that were tried, in
+        units of the scatter. Where there is no chart: what remains where nothing is stable."""
+        edges = self.points[self.points.on_edge]
+        deviations = self.deviations(vector, scatter)
+        # an edge that is not there vibrates at 0 Hz
+        frequency = np.where(np.isnan(deviations.frequency), edges.frequency, deviations.frequency)
+        seen = edges.frequency > 0.0
+        value = deviations.value / self.units(scatter)
+        return np.concatenate([value, frequency[seen] / scatter.frequency, self._inequalities(vector, scatter)])
+
+    def units(self, scatter: Scatter) -> Floats:
+        """The scatter (n,) of each point on the boundary, in the unit of its deviation: that of its kind, larger
+        or smaller where its own trials say so."""
+        edges = self.points[self.points.on_edge]
+        usual = np.where(edges.kind == TIP, scatter.stiffness, np.where(edges.kind == EDGE, 1.0, scatter.damping))
+        return np.asarray(usual * self.relative)
+
+    @cached_property
+    def relative(self) -> Floats:
+        """See `relative_scatter`, (n,) of the points on the boundary."""
+        return relative_scatter(self.points[self.points.on_edge])
+
+    def _inequalities(self, vector: Floats, scatter: Scatter) -> Floats:
+        """sqrt(-2 ln Phi(d)) of the walls that were tried."""
+        from scipy.special import log_ndtr
+
+        if not self.points.of(STABLE, UNSTABLE).any():
+            return np.empty(0)
+        return np.asarray(np.sqrt(-2.0 * log_ndtr(self.depths(vector, scatter))))
+
+    def depths(self, vector: Floats, scatter: Scatter) -> Floats:
+        """How far (m,) the walls that were tried lie on the right side of the edge, in units of the scatter."""
+        tried = self.points[self.points.of(STABLE, UNSTABLE)]
+        chords = self.chords(vector)
+        depth, *_ = chords.nearest(tried.stiffness, tried.damping, (scatter.stiffness, scatter.damping))
+        return np.where(tried.kind == STABLE, depth, -depth)
+
+    def only(self, some: NDArray[np.bool_]) -> BoundaryModel:
+        """The model with some of its points (n,)."""
+        return replace(self, points=self.points[some], _edges={})
+
+
+def _nearest_walls(chords: EdgeChords, chosen: Floats, edge: str) -> Floats:
+    """Where the edge comes nearest to lines that it does not cross (m, 2); the origin where there is no edge."""
+    across = 1 if edge == TIP else 0
+    if not len(chords):
+        return np.zeros((len(chosen), 2))
+    vertex = np.argmin(np.abs(chords.first[:, across] - chosen[:, None]), axis=1)
+    return np.asarray(chords.first[vertex])

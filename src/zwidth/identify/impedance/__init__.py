@@ -1,0 +1,1 @@
+"""What the handle feels like over frequency."""

@@ -1,0 +1,304 @@
+"""The impedance at the handle from spectra of hand force and position, with the band that holds it.
+
+The response G from force f to position x is estimated by local polynomials (`local_spectra`) in two ways,
+
+    H1   x on f     right where only the position is noisy, else too small:  |H1| = |G| / (1 + N_f)
+    H2   f on x     right where only the force is noisy, else too large:     |H2| = |G| (1 + N_x)
+
+N_f and N_x noise to signal in power. With noise on both that is independent of the other, G lies between; their
+ratio is the coherence. The impedance is Z = 1/(jw G). Its best value takes the noise in equal shares: the mean of
+the two estimates' logarithms. The error by chance has the variance v, known from n values; Z may be off by a bias
+of up to b towards either estimate. An interval that holds the truth with 95 % wherever between the two it lies is
+narrower than b + 1.96 v^(1/2), since both ends are not missed at once (Imbens and Manski 2004, known at second
+hand; here by the noncentral chi-square distribution).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbours
+from zwidth.identify.records.record import Piece, Record
+from zwidth.identify.records.sampling import Sampling
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+FORCE, POSITION = "force", "position"
+LEVEL: Final = 0.95
+FEWEST_LINES: Final = 8  # frequencies for a fit
+KEPT_POWERS: Final = 3  # of s, that are stated: stiffness, damping, mass
+BACK: Final = 0.45  # share of the highest frequency at which a fit still holds, up to which it is made
+FAR: Final = 30.0  # bias in deviations, from which on only one end is missed
+SHIFTS: Final = 150  # between which the half width of an interval is interpolated
+LEAST: Final = 0.05  # coherence that is taken for any smaller one
+SILENT: Final = 1e-7  # share of the force's largest power, below which a line holds only what others leak
+
+
+@dataclass(frozen=True)
+class MeasuredImpedance:
+    """Z(jw) at the handle at (k,) frequencies at which force and position are coherent.
+
+    frequency  [Hz];  value  [N s/m];  coherence
+    deviation  standard deviation of the real part, and of the imaginary part, by chance alone [N s/m]
+    bias       half of the distance between the two estimates [N s/m]
+    freedom    complex values from which the deviation is known
+    """
+
+    frequency: Floats
+    value: Complexes
+    coherence: Floats
+    deviation: Floats
+    bias: Floats
+    freedom: float
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+    @property
+    def radius(self) -> Floats:
+        """Radius of the disk round `value` that holds Z with 95 % [N s/m]."""
+        return _half_width(self.deviation, self.bias, self.freedom, 2)
+
+    def half_width(self, level: float = LEVEL) -> Floats:
+        """Half width of the interval that holds |Z| with this level [N s/m]."""
+        return _half_width(self.deviation, self.bias, self.freedom, 1, level)
+
+    @property
+    def low(self) -> Floats:
+        """Lower end of the band of |Z| (95 % at each frequency) [N s/m]."""
+        return np.maximum(np.abs(self.value) - self.half_width(), 0.0)
+
+    @property
+    def high(self) -> Floats:
+        """Upper end of the band of |Z| [N s/m]."""
+        return np.abs(self.value) + self.half_width()
+
+    def only(self, some: NDArray[np.bool_]) -> MeasuredImpedance:
+        """Some of the frequencies."""
+        parts = (self.frequency, self.value, self.coherence, self.deviation, self.bias)
+        return MeasuredImpedance(*(part[some] for part in parts), self.freedom)
+
+
+def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, level: float = LEVEL) -> Floats:
+    """What holds an error with a level: a bias of up to `bias`, and chance of a deviation in 1 or 2 components."""
+    from scipy.stats import chi2
+    from scipy.stats import f as fisher
+
+    shift = np.minimum(bias / np.maximum(deviation, 1e-300), FAR)
+    known = np.interp(shift, *_shifted(level, size))
+    # the deviation is itself estimated
+    wider = np.sqrt(size * fisher.ppf(level, size, 2.0 * max(freedom, 0.5)) / chi2.ppf(level, size))
+    far = np.maximum(bias - shift * deviation, 0.0)
+    return np.asarray(deviation * (shift + (known - shift) * wider) + far)
+
+
+@lru_cache(maxsize=256)
+def _shifted(level: float, size: int) -> tuple[Floats, Floats]:
+    """Shifts, and what an error of deviation 1 about each of them stays within with a level."""
+    from scipy.special import chndtrix
+
+    shifts = FAR * np.linspace(0.0, 1.0, SHIFTS) ** 2
+    return shifts, np.sqrt(chndtrix(level, size, shifts**2))
+
+
+def measured_impedance(spectra: LocalSpectra, highest: float) -> MeasuredImpedance:
+    """The impedance at the frequencies below `highest` [Hz] at which the response is no chance."""
+    from scipy.stats import f as fisher
+
+    (direct, variance), (inverse, _) = spectra.fit(0, 1), spectra.fit(1, 0)
+    H1, back = direct[:, 0], inverse[:, 0]
+    # so that no frequency of all passes by chance, with 95 %
+    chance = fisher.isf((1.0 - LEVEL) / max(len(H1), 1), 2.0, 2.0 * max(spectra.freedom, 1))
+    power = spectra.power(0)
+    seen = (2.0 * np.abs(H1) ** 2 > 2.0 * chance * variance) & (spectra.frequency < highest)
+    seen &= (power > SILENT * np.max(power, initial=0.0)) & (np.abs(back) > 0.0)
+    H1, back, variance, f = H1[seen], back[seen], variance[seen], spectra.frequency[seen]
+    # of the values some were fitted
+    left = np.maximum(1.0 - np.abs(H1 * back), 0.0) * spectra.values / max(spectra.freedom, 1)
+    coherence = np.maximum(1.0 - left, LEAST)
+    G = H1 / np.sqrt(coherence)
+    value = spectra.differencing[seen] / (2j * np.pi * f * G)
+    size = np.abs(value)
+    # where only the position is noisy |Z| is larger by this, with its error
+    far = 1.0 / np.sqrt(coherence)
+    deviation = size * far * np.sqrt(0.5 * variance) / np.abs(H1)
+    return MeasuredImpedance(f, value, coherence, deviation, size * (far - 1.0), float(spectra.freedom))
+
+
+def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, float, float]:
+    """The lowest or highest |Z| of all frequencies: where, the value, and its interval (95 %) [N s/m].
+
+    Of many frequencies at which |Z| is about the same one is lowest by chance. So the level of the end towards the
+    others is raised by the number of independent ones among those whose bands reach the extreme one. The other
+    end is then missed by hardly any, and this one may be missed for both.
+    """
+    size = np.abs(impedance.value)
+    k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
+    rivals = impedance.low <= impedance.high[k] if lowest else impedance.high >= impedance.low[k]
+    count = max(float(np.sum(rivals)) / neighbours(), 1.0)
+    level = 1.0 - (1.0 - LEVEL) * min(count, 2.0) / count
+    some = impedance.only(rivals)
+    raised, plain = some.half_width(level), some.half_width()
+    if lowest:
+        low, high = np.min(size[rivals] - plain), np.min(size[rivals] + raised)
+    else:
+        low, high = np.max(size[rivals] - raised), np.max(size[rivals] + plain)
+    return k, float(size[k]), max(float(low), 0.0), float(high)
+
+
+def stretches_of(
+    record: Record, sampling: Sampling, names: tuple[str, str], state: str, part: tuple[float, float]
+) -> Iterator[Piece]:
+    """Pieces of a record without gaps, under the channel names of the spectra.
+
+    names   of the columns of force and position
+    state   on or off: of the column wall, where the record has it; "": all of it
+    part    shares of the rows between which they are taken
+    """
+    first, last = (round(share * sampling.rows) for share in part)
+    for piece in sampling.stretches(record):
+        row = piece["row"]
+        kept = (row >= first) & (row < last)
+        if state and "wall" in record:
+            kept &= wall_states(piece["wall"]) == state
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(int), [0]])))
+        for low, high in ends.reshape(-1, 2):
+            some = slice(int(low), int(high))
+            yield {FORCE: piece[names[0]][some], POSITION: piece[names[1]][some], "sample": piece["sample"][some]}
+
+
+def longest_stretch(record: Record, sampling: Sampling, state: str) -> int:
+    """Samples of the longest stretch of a state of the wall without a gap."""
+    if "wall" not in record:
+        return sampling.longest
+    longest = count = after = 0
+    names = (record.names[0], record.names[0])
+    for piece in stretches_of(record, sampling, names, state, (0.0, 1.0)):
+        numbers = piece["sample"]
+        count = len(numbers) + (count if int(numbers[0]) == after else 0)
+        longest, after = max(longest, count), int(numbers[-1]) + 1
+    return longest
+
+
+ON: Final = ("on", "1", "1.0", "true", "yes", "wall")
+OFF: Final = ("off", "0", "0.0", "false", "no", "free", "none")
+
+
+def wall_states(words: NDArray[np.str_]) -> NDArray[np.str_]:
+    """on, off, or "" for what is neither."""
+    plain = np.char.lower(np.char.strip(words.astype(str)))
+    return np.where(np.isin(plain, ON), "on", np.where(np.isin(plain, OFF), "off", ""))
+
+
+@dataclass(frozen=True)
+class OctaveBand:
+    """The real part of the impedance in one octave.
+
+    low, high     of the octave [Hz];   lines  in it
+    real          mean of Re Z at these [N s/m];   real_low, real_high  its interval (95 %), bias included
+    """
+
+    low: float
+    high: float
+    lines: int
+    real: float
+    real_low: float
+    real_high: float
+
+    @property
+    def passive(self) -> bool | None:
+        """Whether the handle takes energy there; None where the interval holds 0."""
+        return True if self.real_low > 0.0 else False if self.real_high < 0.0 else None
+
+    def document(self) -> dict[str, float | int | bool | None]:
+        """The band by key and unit."""
+        return {
+            "low_Hz": self.low,
+            "high_Hz": self.high,
+            "lines": self.lines,
+            "real_Ns_per_m": self.real,
+            "real_low_Ns_per_m": self.real_low,
+            "real_high_Ns_per_m": self.real_high,
+            "passive": self.passive,
+        }
+
+
+def octave_bands(impedance: MeasuredImpedance) -> list[OctaveBand]:
+    """The real part in octaves from 2^n Hz to 2^(n + 1) Hz."""
+    bands = []
+    octave = np.floor(np.log2(impedance.frequency))
+    for n in np.unique(octave).tolist():
+        some = impedance.only(octave == n)
+        mean = float(np.mean(some.value.real))
+        # noise on either end scales the value, real part and all
+        shift = np.atleast_1d(abs(np.mean(some.bias * some.value.real / np.abs(some.value))))
+        half = float(_half_width(np.atleast_1d(_deviation_of_mean(some)), shift, some.freedom * len(some), 1)[0])
+        bands.append(OctaveBand(2.0**n, 2.0 ** (n + 1.0), len(some), mean, mean - half, mean + half))
+    return bands
+
+
+def _deviation_of_mean(impedance: MeasuredImpedance) -> float:
+    """Standard deviation of the mean of Re Z over neighbouring frequencies, by chance alone [N s/m].
+
+    The error of Z is -Z/G times that of G, whose windows overlap (`correlations`).
+    """
+    turned = impedance.deviation * (impedance.value / np.abs(impedance.value)) ** 2
+    f, rho = impedance.frequency, correlations()
+    spacing = np.min(np.diff(f)) if len(f) > 1 else 1.0
+    place = np.round(f / spacing).astype(int)
+    total = float(np.sum(np.abs(turned) ** 2))
+    for apart in range(1, len(rho)):
+        a, b = turned[:-apart], turned[apart:]
+        distance = place[apart:] - place[:-apart]
+        near = np.where(distance < len(rho), rho[np.minimum(distance, len(rho) - 1)], 0.0)
+        total += 2.0 * float(np.sum(near * np.real(a * np.conj(b))))
+    return float(np.sqrt(max(total, 0.0))) / max(len(f), 1)
+
+
+def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | None:
+    """What Z is like at low frequency, s = jw: K/s + B + m s + ...; None for too few lines, or where no such
+    numbers explain even the lowest ones.
+
+    The lines are taken from the lowest upwards, to 0.45 of where what remains is no longer scatter; three more
+    powers of s take up where the device begins to yield.
+    Returns  K, B, m, and half widths of their intervals (95 %)
+    """
+    if len(impedance) < FEWEST_LINES:
+        return None
+    w = 2.0 * np.pi * impedance.frequency
+    A = np.column_stack([(1j * w) ** power for power in range(-1, 5)])
+    sigma = impedance.deviation + 1e-9 * np.abs(impedance.value)
+    # noise on either end scales all of Z
+    scaled = impedance.value * impedance.bias / np.abs(impedance.value)
+    fits = list[tuple[float, Floats, Floats, Floats]]()
+    count = FEWEST_LINES
+    while count <= len(w):
+        some = slice(0, count)
+        weight = np.tile(1.0 / sigma[some], 2)
+        rows = np.vstack([A[some].real, A[some].imag]) * weight[:, None]
+        right = np.column_stack([impedance.value[some], scaled[some]])
+        right = np.concatenate([right.real, right.imag]) * weight[:, None]
+        size = np.linalg.norm(rows, axis=0)
+        both, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
+        solved, shift = (both / size[:, None])[:KEPT_POWERS].T
+        freedom = max((2 * count - rows.shape[1]) / neighbours(), 1.0)
+        remains = float(np.sum((rows / size @ both[:, 0] - right[:, 0]) ** 2)) / neighbours() / freedom
+        if remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):
+            break
+        variance = np.diag(np.linalg.inv((rows / size).T @ (rows / size))) / size**2 * neighbours()
+        deviation = np.sqrt(variance[:KEPT_POWERS] * max(remains, 1.0))
+        fits.append((float(impedance.frequency[count - 1]), solved, deviation, np.abs(shift)))
+        count = max(count + 1, int(1.2 * count))
+    if not fits:
+        return None
+    # what is left out grows steeply with frequency: it is scatter's size at the last, and small at 0.45 of it
+    highest = BACK * fits[-1][0]
+    _, numbers, deviation, shift = next(fit for fit in reversed(fits) if fit[0] <= highest or fit is fits[0])
+    return numbers, _half_width(deviation, shift, impedance.freedom, 1)

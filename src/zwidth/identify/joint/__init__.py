@@ -1,0 +1,1 @@
+"""Friction and mass of one joint from its motion."""

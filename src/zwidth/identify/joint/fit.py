@@ -1,0 +1,484 @@
+"""Friction and mass of one joint by output error: the motion predicted in windows, each from its own start.
+
+Within a window the motion follows from the recorded force alone; position and velocity at the window's first
+sample are parameters too (multiple shooting). What an encoder's steps add to slow motion is correlated over many
+samples, so the intervals do not come from the residuals' size but from blocks of consecutive samples: what each of
+them adds to the numbers, and how that differs from block to block.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.joint.motion import follow_windows
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEVEL: Final = 0.95
+MASS, STIFFNESS = 0, 5  # indices among the numbers
+DELAY: Final = 6  # index of the force's delay behind the six numbers of the motion
+STEP: Final = 1e-6  # of a derivative, of parameters in units of their effect
+MOST_STEPS: Final = 400  # of the optimiser: in a narrow bent valley, as of a joint that hardly slides, it creeps
+ARRIVED: Final = 1e-8  # relative fall of the sum of squares that ends it
+RIDGES: Final = (0.0, 1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4)  # of Levenberg and Marquardt, tried in this order
+GROWTH: Final = 5.0  # logarithm of it, within a window
+LONGEST_DELAY: Final = (-1.0, 6.0)  # of the force, samples
+BLOCKS: Final = 24  # of consecutive samples, of all windows together, at least
+SHARES: Final = (1.0, 0.3, 0.0)  # of a step that a window's start may take
+LEVERAGE: Final = 1e-9  # short of 1, from which one block alone determines a direction
+LEAST_SHARE: Final = 1e-3  # of a variance that must be seen in the blocks' changes
+LEAST_MASS: Final = 1e-3  # times b T: a mass that stops within a thousandth of a sample
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Stretches of records, with some samples before and after each so that a delayed force is known.
+
+    position, force  (n,) readings [m or rad], force or torque [N or N m]; the force is 0 where nothing drives
+    first, length    (W,) row of each window's first sample, and their number
+    period           (W,) sampling period [s]
+    time             (W,) time of the first sample [s]
+    run              (W,) number of the stretch without a gap, over all records, that a window belongs to
+    driven           whether a force was recorded
+    """
+
+    position: Floats
+    force: Floats
+    first: Ints
+    length: Ints
+    period: Floats
+    time: Floats
+    run: Ints
+    driven: bool
+
+    def chosen(self, which: NDArray[np.bool_]) -> Windows:
+        """Some of the windows."""
+        names = ("first", "length", "period", "time", "run")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
+
+    def cut(self, parts: int) -> Windows:
+        """Each window cut into so many, one behind the other."""
+        edges = [np.linspace(0, n, min(parts, max(n // 8, 1)) + 1).astype(np.int64) for n in self.length]
+        many = np.array([len(e) - 1 for e in edges])
+        offsets = np.concatenate([e[:-1] for e in edges])
+        return replace(
+            self,
+            first=np.repeat(self.first, many) + offsets,
+            length=np.concatenate([np.diff(e) for e in edges]),
+            period=np.repeat(self.period, many),
+            time=np.repeat(self.time, many) + np.repeat(self.period, many) * offsets,
+            run=np.repeat(self.run, many),
+        )
+
+    @cached_property
+    def rows(self) -> Ints:
+        """Rows of all samples in windows, window by window."""
+        return np.concatenate([np.arange(a, a + n) for a, n in zip(self.first, self.length, strict=True)])
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What the motion hangs on.
+
+    values   (7,) m, b forward and backward, F forward and backward, k, and the force's delay [s]
+    free     those that are fitted
+    tied     index of each number that follows another instead: backward ones where the joint never slid backward
+    """
+
+    values: Floats
+    free: tuple[int, ...]
+    tied: tuple[tuple[int, int], ...] = ()
+
+    def with_free(self, some: Floats) -> Numbers:
+        """With other values of the free numbers."""
+        values = self.values.copy()
+        values[list(self.free)] = some
+        for number, other in self.tied:
+            values[number] = values[other]
+        return replace(self, values=values)
+
+    @property
+    def free_values(self) -> Floats:
+        """The values that are fitted."""
+        return self.values[list(self.free)]
+
+
+def predict(windows: Windows, values: Floats, starts: Floats) -> Floats:
+    """Positions at `windows.rows` [m or rad], from the starts (W, 2) of position and velocity."""
+    out = np.zeros(len(windows.position))
+    follow_windows(
+        windows.force,
+        windows.first,
+        windows.length,
+        windows.period,
+        np.ascontiguousarray(values[:DELAY]),
+        float(values[DELAY]),
+        starts,
+        out,
+    )
+    return out[windows.rows]
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Sums over blocks of consecutive samples, of the linearised prediction.
+
+    gram      (G, p + 2, p + 2) of the derivatives by the free numbers and by the window's start
+    gradient  (G, p + 2) of the derivatives times what remains
+    squares   (G,) of what remains
+    window    (G,) the window that a block lies in
+    """
+
+    gram: Floats
+    gradient: Floats
+    squares: Floats
+    window: Ints
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Numbers of a joint that predict its motion best.
+
+    numbers     fitted
+    starts      (W, 2) of the windows
+    covariance  (p, p) of the free numbers' errors by the blocks' spread; inf on the diagonal where the data tell
+                nothing
+    working     (p, p) the same if the residuals were independent, of size 1
+    residuals   (n,) at `windows.rows`
+    changes     (G, p) of the numbers by each block's residuals, enlarged for what the fit takes from them
+    weights     (G, p, G, p) covariances of these changes if the residuals were independent, of size 1
+    converged   whether the optimiser arrived
+    """
+
+    windows: Windows
+    numbers: Numbers
+    starts: Floats
+    covariance: Floats
+    working: Floats
+    residuals: Floats
+    changes: Floats
+    weights: Floats
+    converged: bool
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of what remains."""
+        return float(np.sum(self.residuals**2))
+
+    def combination(self, weights: Floats) -> tuple[float, float, float]:
+        """Value, standard error and quantile of a sum over the numbers, weights (7,).
+
+        The quantile is Student's with the degrees of freedom by Satterthwaite's rule, from the variances and
+        covariances that the blocks' changes would have if the residuals were independent (Bell and McCaffrey 2002,
+        known at second hand).
+        """
+        from scipy.stats import t
+
+        c = np.asarray(weights, dtype=float).copy()
+        value = float(c @ self.numbers.values)
+        for number, other in self.numbers.tied:
+            c[other] += c[number]
+        c = c[list(self.numbers.free)]
+        known = c != 0.0
+        if np.any(~np.isfinite(np.diag(self.covariance)[known])):
+            return value, np.inf, np.inf
+        spread = np.einsum("i,gihj,j->gh", c, self.weights, c)
+        expected = float(np.trace(spread))
+        if not expected > LEAST_SHARE * float(c @ self.working @ c):
+            return value, np.inf, np.inf
+        error = float(np.sqrt(np.sum((self.changes @ c) ** 2)))
+        freedom = expected**2 / float(np.sum(spread**2))
+        return value, error, float(t.ppf(0.5 + 0.5 * LEVEL, max(freedom, 1.0)))
+
+    def interval(self, weights: Floats) -> tuple[float, float, float]:
+        """Value and ends of the interval of a sum over the numbers, weights (7,)."""
+        value, error, quantile = self.combination(weights)
+        half = error * quantile if np.isfinite(error) else np.inf
+        return value, value - half, value + half
+
+
+class _Search:
+    """Levenberg and Marquardt over the free numbers and the windows' starts."""
+
+    def __init__(self, windows: Windows, numbers: Numbers, starts: Floats, blocks: int) -> None:
+        self.windows, self.numbers, self.starts = windows, numbers, starts
+        self.cut = windows.cut(max(-(-blocks // len(windows.first)), 1)) if blocks else windows
+        self.of_window = np.searchsorted(windows.first, self.cut.first, side="right") - 1
+        self.reading = windows.position[windows.rows]
+        self.where = np.repeat(np.arange(len(windows.first)), windows.length)
+        self.edges = np.concatenate([[0], np.cumsum(self.cut.length)])
+        self.scales = scales(windows)
+
+    def linearised(self) -> tuple[Blocks, Floats]:
+        """Sums over the blocks at the present numbers, and what remains."""
+        p = len(self.numbers.free)
+        base = predict(self.windows, self.numbers.values, self.starts)
+        columns = np.empty((len(base), p + 2))
+        x = self.numbers.free_values
+        for i, number in enumerate(self.numbers.free):
+            moved = x.copy()
+            step = STEP * self.scales[number]
+            moved[i] += step
+            columns[:, i] = (
+                predict(self.windows, self.numbers.with_free(moved).values, self.starts) - base
+            ) / step
+        for j in range(2):
+            starts = self.starts.copy()
+            step = STEP * self.scales[7 + j]
+            starts[:, j] += step
+            columns[:, p + j] = (predict(self.windows, self.numbers.values, starts) - base) / step
+        left = self.reading - base
+        pairs = [(columns[a:b], left[a:b]) for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
+        return (
+            Blocks(
+                np.array([A.T @ A for A, _ in pairs]),
+                np.array([A.T @ r for A, r in pairs]),
+                np.array([float(r @ r) for _, r in pairs]),
+                self.of_window,
+            ),
+            left,
+        )
+
+    def run(self, most: int = MOST_STEPS) -> tuple[Blocks, Floats, bool]:
+        """Search until the sum of squares falls no more."""
+        ridge = 1
+        for _ in range(most):
+            blocks, left = self.linearised()
+            least = float(left @ left)
+            arrow = Arrow.of(blocks, len(self.starts))
+            for tried in range(max(ridge - 1, 0), len(RIDGES)):
+                ridge = tried
+                numbers, starts, squares = self._best_step(*arrow.solved(RIDGES[ridge], self.floor))
+                if squares < least:
+                    break
+            else:
+                return blocks, left, True
+            self.numbers, self.starts = numbers, starts
+            if least - squares <= ARRIVED * least:
+                blocks, left = self.linearised()
+                return blocks, left, True
+        return *self.linearised(), False
+
+    def _best_step(self, step: Floats, along: Floats) -> tuple[Numbers, Floats, float]:
+        """The numbers a step further; each window's start as far along its step as predicts it best."""
+        numbers = self._moved(step)
+        guesses = [self.starts + share * along for share in SHARES]
+        squares = np.array([squares_of(self.windows, numbers, guess) for guess in guesses])
+        best = np.argmin(squares, axis=0)
+        starts = np.array(guesses)[best, np.arange(len(best))]
+        return numbers, starts, float(np.sum(squares[best, np.arange(len(best))]))
+
+    @property
+    def floor(self) -> Floats:
+        """Least squares (2,) of the derivatives by a window's start: starts of windows in which nothing moves
+        change nothing, and must not run away."""
+        samples = float(np.mean(self.windows.length))
+        span = samples * float(np.mean(self.windows.period))
+        return 1e-3 * samples * np.array([1.0, span**2])
+
+    def _moved(self, step: Floats) -> Numbers:
+        """The numbers a step further, within bounds that keep the motion from running away."""
+        values = self.numbers.with_free(self.numbers.free_values + step).values
+        values[MASS] = max(values[MASS], 0.1 * self.numbers.values[MASS])
+        return self.numbers.with_free(bounded(values, self.windows)[list(self.numbers.free)])
+
+
+def bounded(values: Floats, windows: Windows) -> Floats:
+    """The seven numbers within what can be meant: a mass above 0, a delay of a few samples, and no friction or
+    spring that drives the joint so that its motion grows by more than some orders within a window."""
+    T, span = float(np.mean(windows.period)), float(np.max(windows.length * windows.period))
+    least = max(LEAST_MASS * max(abs(values[1]), abs(values[2])) * T, 1e-6 * scales(windows)[MASS])
+    m = max(float(values[MASS]), least)
+    after = values.copy()
+    after[MASS] = m
+    after[1:3] = np.maximum(after[1:3], -GROWTH * m / span)
+    after[STIFFNESS] = max(float(after[STIFFNESS]), -m * (GROWTH / span) ** 2)
+    after[DELAY] = np.clip(after[DELAY], LONGEST_DELAY[0] * T, LONGEST_DELAY[1] * T)
+    return after
+
+
+def scales(windows: Windows) -> Floats:
+    """Sizes (9,) of the seven numbers and of a start by what the record has of force, motion and time."""
+    y, T = windows.position, float(np.mean(windows.period))
+    x = max(
+        float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300
+    )
+    length = float(np.mean(windows.length)) * T
+    v = x / (0.25 * length)
+    a = v / (0.25 * length)
+    f = float(np.std(windows.force)) if windows.driven else a
+    f = f if f > 0.0 else a
+    return np.array([f / a, f / v, f / v, f, f, f / x, T, x, v])
+
+
+def assembled(blocks: Blocks, count: int) -> Floats:
+    """Normal matrix of the free numbers and the starts of all windows."""
+    p = blocks.gram.shape[-1] - 2
+    whole = np.zeros((p + 2 * count, p + 2 * count))
+    for gram, w in zip(blocks.gram, blocks.window, strict=True):
+        at = np.append(np.arange(p), [p + 2 * w, p + 2 * w + 1])
+        whole[np.ix_(at, at)] += gram
+    return whole
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """Normal equations of the free numbers and of the starts, which meet only within their windows.
+
+    own      (p, p) of the numbers;     slope   (p,)
+    mixed    (W, p, 2) of both
+    starts   (W, 2, 2) of the starts;   slopes  (W, 2)
+    """
+
+    own: Floats
+    slope: Floats
+    mixed: Floats
+    starts: Floats
+    slopes: Floats
+
+    @classmethod
+    def of(cls, blocks: Blocks, count: int) -> Arrow:
+        """Of so many windows."""
+        p = blocks.gram.shape[-1] - 2
+        mixed, starts, slopes = np.zeros((count, p, 2)), np.zeros((count, 2, 2)), np.zeros((count, 2))
+        np.add.at(mixed, blocks.window, blocks.gram[:, :p, p:])
+        np.add.at(starts, blocks.window, blocks.gram[:, p:, p:])
+        np.add.at(slopes, blocks.window, blocks.gradient[:, p:])
+        own, slope = np.sum(blocks.gram[:, :p, :p], axis=0), np.sum(blocks.gradient[:, :p], axis=0)
+        return cls(own, slope, mixed, starts, slopes)
+
+    def solved(self, ridge: float, floor: Floats) -> tuple[Floats, Floats]:
+        """Steps (p,) of the numbers and (W, 2) of the starts: (N + ridge diag N)^-1 g.
+
+        floor  (2,) least diagonal of the starts, of which the ridge is a share
+        """
+        own = np.sqrt(np.maximum(np.diag(self.own), 1e-300))
+        size = np.sqrt(np.maximum(np.diagonal(self.starts, axis1=1, axis2=2), floor))
+        more = 1.0 + ridge + 1e-12
+        N = self.own / np.outer(own, own) + (more - 1.0) * np.eye(len(own))
+        starts = self.starts / (size[:, :, None] * size[:, None, :]) + (more - 1.0) * np.eye(2)
+        mixed = self.mixed / (own[:, None] * size[:, None, :])
+        back = np.linalg.solve(starts, np.swapaxes(mixed, 1, 2))  # (W, 2, p)
+        rest = np.linalg.solve(starts, (self.slopes / size)[:, :, None])[:, :, 0]
+        inner = N - np.einsum("wpi,wiq->pq", mixed, back)
+        slope = self.slope / own - np.einsum("wpi,wi->p", mixed, rest)
+        x = np.linalg.lstsq(inner, slope, rcond=1e-12)[0] if len(slope) else slope
+        return x / own, (rest - back @ x) / size
+
+
+def squares_of(windows: Windows, numbers: Numbers, starts: Floats) -> Floats:
+    """Sum of squares (W,) of what the numbers leave in each window; inf where the prediction runs away."""
+    edges = np.cumsum(windows.length) - windows.length
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = windows.position[windows.rows] - predict(windows, numbers.values, starts)
+        sums = np.add.reduceat(left**2, edges)
+    return np.where(np.isfinite(sums), sums, np.inf)
+
+
+def explained(windows: Windows, squares: Floats) -> float:
+    """1 less the squares (W,) that remain over those that the best straight line leaves in each window.
+
+    The start of each window is its own, and a line is what a start alone explains.
+    """
+    total = 0.0
+    for first, length in zip(windows.first, windows.length, strict=True):
+        y, t = windows.position[first : first + length], np.arange(length) - 0.5 * (length - 1)
+        y = y - np.mean(y)
+        total += float(y @ y - (y @ t) ** 2 / (t @ t))
+    return 1.0 - float(np.sum(squares)) / max(total, 1e-300)
+
+
+def approach(windows: Windows, numbers: Numbers, starts: Floats, most: int) -> tuple[Numbers, Floats, Floats]:
+    """A few steps of the search, for a better guess: numbers, starts (W, 2), and sums of squares (W,)."""
+    search = _Search(windows, numbers, starts, 0)
+    search.run(most)
+    return search.numbers, search.starts, squares_of(windows, search.numbers, search.starts)
+
+
+def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int = BLOCKS) -> JointFit:
+    """The free numbers that predict the motion in the windows best, from a guess close to them."""
+    search = _Search(windows, numbers, starts, blocks)
+    sums, left, converged = search.run()
+    spread = block_spread(sums, len(search.starts), len(search.numbers.free))
+    covariance, working, changes, weights = spread
+    return JointFit(windows, search.numbers, search.starts, covariance, working, left, changes, weights, converged)
+
+
+def bias_of_windows(fit: JointFit) -> tuple[Floats, Floats]:
+    """By how much the bias in each window differs from that of all, the other numbers as they are fitted.
+
+    Returns  (W,) differences, linearised, and (W,) the squares that they rest on: their weights
+    """
+    numbers = replace(fit.numbers, free=(3, 4), tied=())
+    sums, _ = _Search(fit.windows, numbers, fit.starts, 0).linearised()
+    turn = np.zeros((4, 3))  # bias alone: less of the level forward, more of that backward; and the start
+    turn[0, 0], turn[1, 0], turn[2, 1], turn[3, 2] = -1.0, 1.0, 1.0, 1.0
+    gram, slope = turn.T @ sums.gram @ turn, sums.gradient @ turn
+    back = np.linalg.pinv(gram[:, 1:, 1:], rcond=1e-12, hermitian=True) @ gram[:, 1:, :1]
+    weight = gram[:, 0, 0] - np.einsum("wi,wij->w", gram[:, 0, 1:], back)
+    score = slope[:, 0] - np.einsum("wi,wij->w", slope[:, 1:], back)
+    felt = weight > 1e-9 * np.max(gram[:, 0, 0])
+    return np.where(felt, score / np.where(felt, weight, 1.0), 0.0), np.where(felt, weight, 0.0)
+
+
+def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Spread of the free numbers by what each block of a linearised fit adds to them.
+
+    With N = sum of S_g = A_g^T A_g over the blocks and P_g the part of N^-1 that a block sees, block g adds
+    N^-1 (1 - S_g P_g)^-1/2 A_g^T r_g  to the numbers. The root makes up for what the fit has taken from the
+    residuals: the sum of squares then has the right mean where they are independent (Bell and McCaffrey 2002,
+    known at second hand), and it holds for any correlation within blocks. Leaving blocks out one by one, a
+    jackknife, has the power -1 in its place, too wide with the degrees of freedom of `JointFit.combination`.
+    Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
+    """
+    whole = assembled(blocks, count)
+    size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    inverse, lost = _inverse(whole / np.outer(size, size))
+    G = len(blocks.window)
+    columns = np.concatenate(
+        [np.tile(np.arange(free), (G, 1)), free + 2 * blocks.window[:, None] + [0, 1]], axis=1
+    )
+    scale = size[columns]
+    S = blocks.gram / (scale[:, :, None] * scale[:, None, :])
+    grown = _enlarged(S, inverse[columns[:, :, None], columns[:, None, :]])
+    to = inverse[:free][:, columns].transpose(1, 0, 2) @ grown  # (G, p, q)
+    changes = np.einsum("gpq,gq->gp", to, blocks.gradient / scale) / size[:free]
+    covariance = changes.T @ changes
+    for i in np.flatnonzero(lost[:free]):
+        covariance[i, i] = np.inf
+    rows = np.zeros((G, free, len(whole)))
+    taken = to @ S
+    np.put_along_axis(rows, np.broadcast_to(columns[:, None, :], taken.shape), taken, axis=2)
+    weights = -np.einsum("gia,ab,hjb->gihj", rows, inverse, rows, optimize=True)
+    weights[np.arange(G), :, np.arange(G), :] += taken @ np.swapaxes(to, 1, 2)
+    weights /= size[:free][None, :, None, None] * size[:free][None, None, None, :]
+    working = inverse[:free, :free] / np.outer(size[:free], size[:free])
+    return covariance, working, changes, weights
+
+
+def _enlarged(S: Floats, P: Floats) -> Floats:
+    """(1 - S P)^-1/2 (G, q, q), through the symmetric matrix R S R with R the root of P."""
+    values, vectors = np.linalg.eigh(P)
+    root = np.sqrt(np.maximum(values, 0.0))
+    R = (vectors * root[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    back = np.divide(1.0, root, out=np.zeros_like(root), where=root > 1e-9 * np.max(root))
+    inverse_root = (vectors * back[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    leverage, axes = np.linalg.eigh(R @ S @ R)
+    # a direction that one block alone determines leaves no residual there to be enlarged
+    factor = np.where(leverage < 1.0 - LEVERAGE, 1.0 / np.sqrt(np.maximum(1.0 - leverage, LEVERAGE)), 1.0)
+    return np.asarray(inverse_root @ ((axes * factor[:, None, :]) @ np.swapaxes(axes, 1, 2)) @ R)
+
+
+def _inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Inverse of a normal matrix, and which parameters it leaves undetermined."""
+    values, vectors = np.linalg.eigh(scaled)
+    felt = values > 1e-11
+    inverse = (vectors[:, felt] / values[felt]) @ vectors[:, felt].T
+    lost = np.any(np.abs(vectors[:, ~felt]) > 1e-3, axis=1)
+    return inverse, lost

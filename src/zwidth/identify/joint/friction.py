@@ -1,0 +1,341 @@
+"""Dry and viscous friction of one joint, from free, coasting or driven motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.identify.identification import Check, Estimate, Identification, refused
+from zwidth.identify.joint.command import ALIKE, compare_with_command
+from zwidth.identify.joint.fit import DELAY, MASS, STIFFNESS, bias_of_windows
+from zwidth.identify.joint.identification import FittedJoint, fitted_joint
+from zwidth.identify.joint.joint import COLUMNS as COLUMNS
+from zwidth.identify.joint.joint import Joint
+from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
+from zwidth.identify.plausible import check_mass_in_file
+from zwidth.identify.records.record import Record
+from zwidth.progress import Progress
+
+Floats = NDArray[np.float64]
+
+ALIKE_SPEEDS: Final = 0.98  # correlation of dry and viscous friction from which one speed is seen
+UNKNOWN_MASS: Final = 0.5  # half the interval over the mass, from which the mass is not known
+DRIFTING: Final = 4.0  # standard errors of a drift that is told
+FEWEST_FOR_DRIFT: Final = 8  # windows
+DRIFT_SHARE: Final = 0.05  # of the dry friction that it must have
+MASS_IN_FILE: Final = 0.5, 2.0  # ratios to the file's mass within which the two agree
+
+
+@dataclass(frozen=True, repr=False)
+class JointIdentification(Identification):
+    """Friction and mass of a joint, with what their figure shows.
+
+    angular   whether the joint turns
+    velocity  (s,) mean velocities in segments that were measured [m/s or rad/s]
+    friction  (s,) mean friction there: force less what accelerates the mass and bends the spring [N or N m]
+    lines     (2, 2) level and viscous friction, forward and backward; nan where the joint did not slide so
+    """
+
+    angular: bool = False
+    velocity: Floats = field(default_factory=lambda: np.zeros(0))
+    friction: Floats = field(default_factory=lambda: np.zeros(0))
+    lines: Floats = field(default_factory=lambda: np.full((2, 2), np.nan))
+
+
+def identify_friction(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    joint: str | int | None = None,
+    spring: bool | None = None,
+    mass_from_file: bool = False,
+    progress: Progress | None = None,
+) -> Identification:
+    """Friction of one joint, from its position and what drove it.
+
+    The joint is one mass under m x'' = f(t - delay) + bias - C sign(x') - b x' - k x, with levels and viscous
+    friction of their own forward and backward, standing where the force does not overcome the level. A constant
+    force and levels that differ cannot be told apart by any motion: forward the level is C - bias, backward
+    C + bias, and C is their mean.
+
+    records         with columns time_s, position_m or angle_rad, and what drove the joint: force_N or torque_Nm as
+                    measured, current_A, or else force_command_N or torque_command_Nm; none of them in free motion,
+                    which tells friction over mass
+    joint           name of a drive (read at its motor) or of a link (read at its joint), number of a plant's
+                    coordinate; None for a device of one
+    spring          whether a spring holds the joint; None: where the data show one
+    mass_from_file  in free motion, friction by the mass that the device file gives
+    Raises          DeviceError  for a joint that the device has not, columns that are not the joint's, cells that
+                    are no numbers
+    """
+    checks, fitted = fitted_joint(device, records, joint, spring, mass_from_file, progress)
+    if fitted is None:
+        return refused("friction", device.label, checks) or Identification("friction", device.label, checks)
+    estimates = [*friction_estimates(fitted), *mass_estimates(fitted)]
+    checks += (check_speeds(fitted), *([check_mass(fitted)] if fitted.motion.driven else []), *check_drift(fitted))
+    checks += (*mass_in_file(fitted),)
+    if (nothing := refused("friction", device.label, checks)) is not None:
+        return nothing
+    return identification("friction", device, fitted, checks, estimates)
+
+
+def identification(
+    kind: str, device: Device, fitted: FittedJoint, checks: Sequence[Check], estimates: Sequence[Estimate]
+) -> JointIdentification:
+    """What was fitted of a joint as a result."""
+    time, measured, predicted = fitted.unseen_motion
+    velocity, friction = friction_points(fitted)
+    v = fitted.fit.numbers.values
+    lines = np.array([[v[3], v[1]], [v[4], v[2]]])
+    lines[[not fitted.forward, not fitted.backward]] = np.nan
+    position = fitted.joint.position
+    remarks, details = remarks_of(fitted)
+    curves: dict[str, Any] = {"time_s": time, position: measured}
+    curves[position.replace("_", "_predicted_")] = predicted
+    return JointIdentification(
+        kind,
+        device.label,
+        tuple(checks),
+        tuple(estimates),
+        fitted.explained,
+        f"position in {len(fitted.unseen.first)} windows that were not fitted, each from its own position and "
+        "velocity at the beginning; the share of what a straight line leaves there",
+        tuple(remarks),
+        curves,
+        details,
+        fitted.joint.angular,
+        velocity,
+        friction,
+        lines,
+    )
+
+
+def _estimate(
+    fitted: FittedJoint, name: str, quantity: str, weights: Any, *, key: str = "", least: float = -np.inf
+) -> Estimate:
+    """A sum over the numbers as an estimate, in the file's key where it has one; no less than `least`."""
+    value, low, high = fitted.fit.interval(np.asarray(weights, dtype=float))
+    path, factor = fitted.joint.paths.get(key, ("", 1.0))
+    unit = fitted.joint.unit(quantity)
+    if fitted.unit_mass:
+        path, factor, name = "", 1.0, f"{name} over mass"
+        acceleration = f"{fitted.joint.unit('position')}/s^2"
+        unit = {"force": acceleration, "damping": "1/s", "stiffness": "1/s^2"}[quantity]
+    ends = sorted((max(low, least) * factor, max(high, least) * factor))
+    return Estimate(name, max(value, least) * factor, ends[0], ends[1], unit, path)
+
+
+def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
+    """Dry and viscous friction: what the file holds, then both directions, the bias, and a spring."""
+    both = fitted.forward and fitted.backward
+    estimates = []
+    if both:
+        estimates = [
+            _estimate(fitted, "dry friction", "force", [0, 0, 0, 0.5, 0.5, 0, 0], key="coulomb", least=0.0),
+            _estimate(fitted, "viscous friction", "damping", [0, 0.5, 0.5, 0, 0, 0, 0], key="damping", least=0.0),
+            _estimate(fitted, "bias", "force", [0, 0, 0, -0.5, 0.5, 0, 0]),
+        ]
+    else:
+        one = [0, 1, 0, 0, 0, 0, 0] if fitted.forward else [0, 0, 1, 0, 0, 0, 0]
+        estimates = [_estimate(fitted, "viscous friction", "damping", one, key="damping", least=0.0)]
+    for there, way, level, damping in ((fitted.forward, "forward", 3, 1), (fitted.backward, "backward", 4, 2)):
+        if not there:
+            continue
+        speed = usual_speed(fitted, 1.0 if way == "forward" else -1.0)
+        unit = fitted.joint.unit("position")
+        # one letter: numbers of the joint themselves, never over a factor of the file
+        estimates += [
+            _estimate(fitted, f"level {way}", "force", np.eye(7)[level]),
+            _estimate(fitted, f"viscous friction {way}", "damping", np.eye(7)[damping]),
+            _estimate(
+                fitted,
+                f"friction {way} at {speed:.3g} {unit}/s",
+                "force",
+                np.eye(7)[level] + speed * np.eye(7)[damping],
+            ),
+        ]
+    if STIFFNESS in fitted.fit.numbers.free:
+        spring = _estimate(fitted, "spring", "stiffness", np.eye(7)[STIFFNESS], key="stiffness")
+        estimates.append(spring if spring.value > 0.0 else replace(spring, path=""))
+    return estimates
+
+
+def mass_estimates(fitted: FittedJoint) -> list[Estimate]:
+    """The mass and the delay of the force, which driven motion tells."""
+    if not fitted.motion.driven:
+        return []
+    delay = fitted.fit.interval(np.eye(7)[DELAY])
+    return [
+        _estimate(fitted, fitted.joint.mass_name, "mass", np.eye(7)[MASS], key="mass", least=0.0),
+        Estimate("delay of the force", *delay, "s"),
+    ]
+
+
+def usual_speed(fitted: FittedJoint, side: float) -> float:
+    """Median speed at which the joint slides to a side, in the fitted windows [m/s or rad/s]."""
+    windows, resolution = fitted.fit.windows, fitted.motion.resolution
+    speeds = list[Floats]()
+    for first, length, T in zip(windows.first, windows.length, windows.period, strict=True):
+        y = windows.position[first : first + length]
+        reach = max(int(length) // 40, 1)
+        moved = side * (y[reach:] - y[:-reach])
+        speeds.append(moved[moved > 1.5 * resolution] / (reach * T))
+    joined = np.concatenate(speeds)
+    return float(np.median(joined)) if len(joined) else 0.0
+
+
+def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
+    """Mean velocity (s,) and friction (s,) in segments in which the joint slides one way throughout."""
+    windows, v = fitted.fit.windows, fitted.fit.numbers.values
+    size = int(max(np.median(windows.length) // 8, SHORTEST))
+    delay = max(round(float(v[DELAY]) / float(np.mean(windows.period))), 0)
+    A, force = weighted_balance(windows, size, fitted.motion.resolution, [delay], 1.0)
+    whole = float(np.sum(weighting(size)[0]))
+    one_way = np.abs(A[:, 2] + A[:, 3]) > 0.999 * whole
+    A, force = A[one_way], force[one_way, 0]
+    return A[:, 1] / whole, (force - v[MASS] * A[:, 0] - v[STIFFNESS] * A[:, 4]) / whole
+
+
+def check_speeds(fitted: FittedJoint) -> Check:
+    """Whether viscous and dry friction can be told apart: at one speed only their sum is seen."""
+    alike, known = list[str](), list[str]()
+    for there, way, level, damping in ((fitted.forward, "forward", 3, 1), (fitted.backward, "backward", 4, 2)):
+        free = fitted.fit.numbers.free
+        if there:
+            pair = [free.index(level), free.index(damping)]
+            spread = fitted.fit.covariance[np.ix_(pair, pair)]
+            sizes = np.sqrt(np.diag(spread))
+            speed = usual_speed(fitted, 1.0 if way == "forward" else -1.0)
+            known.append(f"{way} mostly at {speed:.3g} {fitted.joint.unit('position')}/s")
+            if not np.all(np.isfinite(sizes)) or abs(spread[0, 1]) > ALIKE_SPEEDS * sizes[0] * sizes[1]:
+                alike.append(way)
+    text = " and ".join(known)
+    if not alike:
+        return Check("speeds", True, f"the joint slides {text}")
+    return Check(
+        "speeds",
+        False,
+        f"the joint slides {text}, {' and '.join(alike)} at speeds too much alike: viscous and dry friction are "
+        "hardly told apart, while their sum at that speed is; record slow and fast motion",
+        warning=True,
+    )
+
+
+def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
+    """Whether the motion tells the mass: what damps heavily hides it, and a delay looks like it.
+
+    needed  the mass is what was asked for: without it the data are refused
+    """
+    name, unit = fitted.joint.mass_name, fitted.joint.unit("mass")
+    value, low, high = fitted.fit.interval(np.eye(7)[MASS])
+    if isfinite(high) and high - value < UNKNOWN_MASS * value:
+        return Check("acceleration", True, f"{name} is told to {100.0 * (high - value) / value:.2g} %")
+    upper = f"only below {high:.3g} {unit}" if isfinite(high) else "not at all"
+    useless = not (isfinite(high) and low > 0.0)
+    return Check(
+        "acceleration",
+        False,
+        f"{name} is told {upper}: friction or a delay of the force hide it; record faster changes of a larger "
+        "force, such as steps in both directions",
+        warning=not (needed and useless),
+    )
+
+
+def mass_in_file(fitted: FittedJoint) -> list[Check]:
+    """Whether the mass is of the size that the file gives; [] in free motion, which tells none."""
+    if not fitted.motion.driven:
+        return []
+    joint, value = fitted.joint, float(fitted.fit.numbers.values[MASS])
+    return check_mass_in_file(joint.mass_name, value, joint.mass, joint.unit("mass"), turns=joint.angular)
+
+
+def check_drift(fitted: FittedJoint) -> list[Check]:
+    """Whether the bias drifts: a warning, or nothing."""
+    windows = fitted.fit.windows
+    if not (fitted.forward and fitted.backward) or len(windows.first) < FEWEST_FOR_DRIFT:
+        return []
+    difference, weight = bias_of_windows(fitted.fit)
+    time = windows.time - np.average(windows.time, weights=weight)
+    spread = float(weight @ time**2)
+    if not spread > 0.0:
+        return []
+    slope = float((weight * time) @ difference) / spread
+    error = float(np.sqrt(np.sum((weight * time * (difference - slope * time)) ** 2))) / spread
+    level = 0.5 * abs(float(fitted.fit.numbers.values[3] + fitted.fit.numbers.values[4]))
+    drift = slope * float(np.ptp(time))
+    if abs(slope) < DRIFTING * error or abs(drift) < DRIFT_SHARE * level:
+        return []
+    unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s^2"
+    text = f"the bias drifts by about {drift:.3g} {unit} over {np.ptp(time):.4g} s"
+    return [
+        Check(
+            "drift",
+            False,
+            f"{text}; the numbers are those of its mean: let amplifier and sensor warm up",
+            warning=True,
+        )
+    ]
+
+
+def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
+    """Sentences beside the numbers, and further keys of the result."""
+    joint, motion = fitted.joint, fitted.motion
+    used = _force_text(joint, motion.force_name if motion.driven else "")
+    remarks = [*joint.remarks, used]
+    details: dict[str, Any] = {
+        "measured_at": joint.place,
+        "force": motion.force_name if motion.driven else None,
+        "sampling_period_s": fitted.sampling.period,
+        "reference_" + joint.position: motion.reference,
+        "residual_over_noise": fitted.misfit if isfinite(fitted.misfit) else None,
+    }
+    if fitted.forward and fitted.backward:
+        remarks.append(
+            "a constant force and a friction that differs forward and backward are the same in every motion: dry "
+            "friction is the mean of both levels, the bias half their difference"
+        )
+    if STIFFNESS in fitted.fit.numbers.free:
+        remarks.append(
+            f"the bias is that at {joint.position} = {motion.reference:.6g}, and the spring acts from there"
+        )
+    if motion.driven and joint.mass > 0.0:
+        ratio = float(fitted.fit.numbers.values[MASS]) / joint.mass
+        low, high = MASS_IN_FILE
+        agrees = "agrees with" if low < ratio < high else "is far from"
+        remarks.append(
+            f"{joint.mass_name} {agrees} the {joint.mass:.4g} {joint.unit('mass')} of the file, {ratio:.3g} of it"
+        )
+    seen = compare_with_command(motion)
+    if seen is not None:
+        details |= {"command_gain": seen.gain, "command_lag_s": seen.lag, "command_correlation": seen.correlation}
+        if seen.correlation < ALIKE:
+            remarks.append(
+                f"{joint.command} and {motion.force_name} are hardly alike, correlation {seen.correlation:.2f}"
+            )
+        else:
+            remarks.append(
+                f"{motion.force_name} is {seen.gain:.4g} times {joint.command}, {1e3 * seen.lag:.3g} ms later"
+            )
+    return remarks, details
+
+
+def _force_text(joint: Joint, name: str) -> str:
+    """Which force was used, and what that means."""
+    if not name:
+        return "free motion: friction follows only as a ratio to the mass"
+    if name == "current_A":
+        return (
+            f"used is current_A times the motor's torque constant, {joint.per_ampere:.4g} per ampere {joint.place}"
+        )
+    if name == joint.command:
+        return (
+            f"used is {name}, a command: an amplifier's gain and offset are in all numbers; record "
+            f"{joint.measured} too to see them"
+        )
+    return f"used is {name} as measured"

@@ -1,0 +1,264 @@
+"""From records of one joint's motion to its mass and friction: checks, fit, validation; shared by two kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.device.faults import fail
+from zwidth.identify.identification import Check
+from zwidth.identify.joint.checks import checks_of, directions
+from zwidth.identify.joint.fit import (
+    DELAY,
+    MASS,
+    STIFFNESS,
+    JointFit,
+    Numbers,
+    Windows,
+    approach,
+    explained,
+    fit_joint,
+    predict,
+)
+from zwidth.identify.joint.joint import Joint, joint_of
+from zwidth.identify.joint.record import Motion, read_motion, windows_of
+from zwidth.identify.joint.reversed_sense import reason_of_misfit
+from zwidth.identify.joint.start import first_starts, search_guess
+from zwidth.identify.plausible import check_periods
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import Sampling, check_sampling
+from zwidth.progress import Progress
+
+Floats = NDArray[np.float64]
+
+UNSEEN: Final = 3  # of so many windows one is kept for validation
+OUTLYING: Final = 6.0  # times the usual deviation, from which a window does not follow the model
+MOST_OUTLYING: Final = 0.25  # share of the windows that may be left out for it
+LEAST_EXPLAINED: Final = 0.7  # of the unseen motion
+WELL_EXPLAINED: Final = 0.99  # of it, below which other causes are tried
+POOR: Final = 5.0  # times the readings' noise, which then remains
+SHOWN: Final = 3.0  # standard errors by which the data show a spring
+
+
+@dataclass(frozen=True)
+class FittedJoint:
+    """What the data say of a joint.
+
+    joint, motion  where it was measured, and what;   sampling  of the first record
+    checks         that were passed, those after the fit included
+    fit            on one part of the windows;   unseen, unseen_starts  the others, with their starts (W, 2)
+    forward, backward  whether the joint slid so
+    explained      share of the unseen windows' motion that is predicted
+    outlying       times of the windows that were left out, as their motion follows no such model [s]
+    unit_mass      the mass is not known, and all numbers are those over it
+    """
+
+    joint: Joint
+    motion: Motion
+    sampling: Sampling
+    checks: tuple[Check, ...]
+    fit: JointFit
+    unseen: Windows
+    unseen_starts: Floats
+    forward: bool
+    backward: bool
+    explained: float
+    outlying: tuple[float, ...]
+    unit_mass: bool
+
+    @property
+    def misfit(self) -> float:
+        """Deviation of what remains over that of the readings' noise."""
+        deviation = float(np.sqrt(np.mean(self.fit.residuals**2)))
+        noise = self.motion.deviation
+        return deviation / noise if noise > 0.0 else np.inf
+
+    @property
+    def unseen_motion(self) -> tuple[Floats, Floats, Floats]:
+        """Time, measured and predicted position of the unseen windows, window by window."""
+        windows = self.unseen
+        predicted = predict(windows, self.fit.numbers.values, self.unseen_starts)
+        measured = windows.position[windows.rows]
+        parts = zip(windows.time, windows.length, windows.period, strict=True)
+        time = np.concatenate([t + T * np.arange(n) for t, n, T in parts])
+        return time, measured + self.motion.reference, predicted + self.motion.reference
+
+
+def fitted_joint(
+    device: Device,
+    records: Sequence[Record],
+    name: str | int | None,
+    spring: bool | None,
+    mass_from_file: bool,
+    progress: Progress | None,
+) -> tuple[tuple[Check, ...], FittedJoint | None]:
+    """All checks, and what was fitted; None where a check refuses the data.
+
+    spring          whether a spring holds the joint; None: where the file has one, or the data show one
+    mass_from_file  free motion tells friction over mass: take the mass of the file
+    Raises          DeviceError  for a joint that the device has not, columns that are not the joint's, cells that
+                    are no numbers, and no mass in the file
+    """
+    if not records:
+        raise fail(
+            device.label, "", "there is no record; give at least one file with columns time_s and position_m"
+        )
+    joint = joint_of(device, name)
+    for record in records:
+        joint.force_column(record)  # columns are wrong before samples are
+    report = progress or (lambda stage, done, of: None)
+    steps = len(records) + 4
+    checks, samplings = list[Check](), list[Sampling]()
+    for n, record in enumerate(records):
+        report("reading records", n, steps)
+        sampling, check = check_sampling(record)
+        checks.append(check)
+        samplings += [] if sampling is None else [sampling]
+    if len(samplings) < len(records):
+        return tuple(checks), None
+    report("reading records", len(records), steps)
+    motion = read_motion(records, samplings, joint)
+    checks += _enough(motion, samplings)
+    if any(not check.passed for check in checks):
+        return tuple(checks), None
+    checks += check_periods(records, samplings, device.controller.sampling_period)
+    motion = _limited(motion, joint)
+    windows = windows_of(motion)
+    checks += checks_of(motion, windows, joint)
+    if any(not (check.passed or check.warning) for check in checks):
+        return tuple(checks), None
+    mass = 1.0
+    if mass_from_file and not motion.driven:
+        mass = joint.mass
+        if not mass > 0.0:
+            raise fail(
+                device.label, "", f"gives no mass that moves {joint.place}; set it, or record a driven motion"
+            )
+    report("fitting", steps - 3, steps)
+    forward, backward = directions(windows, motion)
+    numbers = _numbers(motion, forward, backward, mass, spring is not False)
+    fit, outlying = _fit(windows, motion, numbers, spring)
+    report("validating", steps - 1, steps)
+    unseen = windows.chosen(_unseen(windows))
+    starts = first_starts(unseen, fit.numbers.values)
+    _, starts, squares = approach(unseen, replace(fit.numbers, free=(), tied=()), starts, 20)
+    kept = squares <= OUTLYING**2 * _mean_square(fit, motion) * unseen.length
+    kept |= np.mean(~kept) > MOST_OUTLYING  # then it is the model that is wrong
+    share = explained(unseen.chosen(kept), squares[kept])
+    unit_mass = not motion.driven and not mass_from_file
+    outlying += tuple(unseen.time[~kept].tolist())
+    fitted = FittedJoint(
+        joint, motion, samplings[0], (), fit, unseen, starts, forward, backward, share, outlying, unit_mass
+    )
+    checks.append(_check_model(fitted, windows, numbers, records))
+    if (checks[-1].passed or checks[-1].warning) and not fit.converged:
+        checks.append(_no_minimum(fit))  # a model that is wrong is the better reason
+    fitted = replace(fitted, checks=tuple(checks))
+    return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
+
+
+def _enough(motion: Motion, samplings: Sequence[Sampling]) -> list[Check]:
+    """That there are stretches without a gap that are long enough to be cut into windows."""
+    if motion.sections:
+        return []
+    longest = max(sampling.longest for sampling in samplings)
+    reason = f"no stretch without a gap is longer than {longest} samples; record without losing samples"
+    return [Check("gaps", False, reason)]
+
+
+def _limited(motion: Motion, joint: Joint) -> Motion:
+    """The motion with forces as the drive limits them, where they are commands."""
+    if not np.isfinite(joint.limit) or motion.force_name not in ("current_A", joint.command):
+        return motion
+    limit = joint.limit
+    sections = [replace(one, force=np.clip(one.force, -limit, limit)) for one in motion.sections]
+    return replace(motion, sections=tuple(sections))
+
+
+def _numbers(motion: Motion, forward: bool, backward: bool, mass: float, spring: bool) -> Numbers:
+    """Which numbers are fitted: those of a direction only where the joint slides so."""
+    free: tuple[int, ...] = (MASS, DELAY) if motion.driven else ()
+    free += (1, 3) if forward else ()
+    free += (2, 4) if backward else ()
+    free += (STIFFNESS,) if spring else ()
+    tied = () if forward and backward else ((2, 1), (4, 3)) if forward else ((1, 2), (3, 4))
+    return Numbers(np.array([mass, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), tuple(sorted(free)), tied)
+
+
+def _unseen(windows: Windows) -> NDArray[np.bool_]:
+    """Every third window."""
+    return np.asarray(np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1)
+
+
+def _mean_square(fit: JointFit, motion: Motion) -> float:
+    """Usual square of what remains, at least that of the noise."""
+    edges = np.cumsum(fit.windows.length) - fit.windows.length
+    means = np.add.reduceat(fit.residuals**2, edges) / fit.windows.length
+    return max(float(np.median(means)), motion.deviation**2)
+
+
+def _fit(
+    windows: Windows, motion: Motion, numbers: Numbers, spring: bool | None
+) -> tuple[JointFit, tuple[float, ...]]:
+    """The fit, without windows that follow no such model, and with a spring where there is one."""
+    seen = windows.chosen(~_unseen(windows))
+    guess, starts = search_guess(seen, numbers, motion.resolution, motion.deviation)
+    fit = fit_joint(seen, guess, starts)
+    edges = np.cumsum(seen.length) - seen.length
+    means = np.add.reduceat(fit.residuals**2, edges) / seen.length
+    bad = means > OUTLYING**2 * _mean_square(fit, motion)
+    if bad.any() and np.mean(bad) <= MOST_OUTLYING:
+        fit = fit_joint(seen.chosen(~bad), fit.numbers, fit.starts[~bad])
+    else:
+        bad[:] = False
+    if spring is None and STIFFNESS in numbers.free:
+        value, error, _ = fit.combination(np.eye(7)[STIFFNESS])
+        if not abs(value) > SHOWN * error:
+            free = tuple(i for i in numbers.free if i != STIFFNESS)
+            plain = replace(
+                fit.numbers, free=free, values=np.where(np.arange(7) == STIFFNESS, 0.0, fit.numbers.values)
+            )
+            fit = fit_joint(fit.windows, plain, fit.starts)
+    return fit, tuple(seen.time[bad].tolist())
+
+
+def _no_minimum(fit: JointFit) -> Check:
+    """What failed where the search has not ended: intervals hold about the best numbers only."""
+    count = len(fit.windows.first)
+    return Check(
+        "search",
+        False,
+        f"the numbers that predict {count} windows best were not found, as where the joint hardly slides, at "
+        "one speed only, or under another force than the one recorded (saturated, or late): record a larger force "
+        "that changes in size and sign, as it acts",
+    )
+
+
+def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, records: Sequence[Record]) -> Check:
+    """That one mass with friction predicts the windows that were not fitted; else why not."""
+    count = len(windows.first)
+    text = f"{100.0 * max(fitted.explained, 0.0):.4g} % of the motion in unseen windows is predicted"
+    times = ", ".join(f"{t:.4g}" for t in sorted(fitted.outlying)[:5])
+    if fitted.outlying and len(fitted.outlying) > MOST_OUTLYING * count:
+        text += f", and {len(fitted.outlying)} of {count} windows do not follow the rest"
+    poor = fitted.explained < LEAST_EXPLAINED or len(fitted.outlying) > MOST_OUTLYING * count
+    doubtful = fitted.explained < WELL_EXPLAINED and fitted.misfit > POOR
+    cause = reason_of_misfit(windows, fitted.motion, numbers, records) if poor or doubtful else ""
+    if poor or cause:
+        other = (
+            "no mass with friction moves so under this force; another one, as of a hand or an end stop, may act"
+        )
+        return Check("model", False, f"{text}: {cause or other}")
+    if fitted.outlying:
+        return Check(
+            "model",
+            False,
+            f"{text}; the windows at {times} s do not follow the rest: an end stop, a hand, a saturated stretch?",
+            warning=True,
+        )
+    return Check("model", True, text)

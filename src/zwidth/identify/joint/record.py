@@ -1,0 +1,218 @@
+"""The motion of a joint out of its records: sections of long ones, cut into windows to fit and to validate on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.joint.fit import Windows
+from zwidth.identify.joint.joint import Joint
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import Sampling
+
+Floats = NDArray[np.float64]
+
+MOST: Final = 300_000  # samples that are fitted or validated on; of a longer record sections all over it
+SECTIONS: Final = 48  # of a longer record
+BEFORE: Final = 8  # samples before a window, from which a delayed force comes
+FEWEST: Final = 40  # samples in a window
+MANY: Final = (36, 27, 18, 12, 6)  # windows of all records, as many as bend enough
+BEND: Final = 40.0  # steps of the encoder by which the motion in a window leaves a straight line
+SHORTEST_STEP: Final = 1e-9  # share of the travel below which a difference is rounding
+WHOLE: Final = 0.02  # by which a difference may miss a whole number of steps
+STANDING: Final = 3.0  # steps within which a window that stands moves
+
+
+@dataclass(frozen=True)
+class Section:
+    """Consecutive samples without a gap.
+
+    time of the first [s];  period [s];  record, run  numbers of the record, and of the stretch over all records
+    position, force, command  (n,); force of zeros where nothing drives, command empty where there is none
+    """
+
+    time: float
+    period: float
+    record: int
+    run: int
+    position: Floats
+    force: Floats
+    command: Floats
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is fitted, from all records.
+
+    sections    samples
+    driven      whether a force or torque is known
+    force_name  the column that drives, which may be 0 throughout; "" where there is none
+    reference   reading that counts as position 0 of the fit [m or rad]
+    step        of the encoder as seen in the readings [m or rad]; 0 where no step is seen
+    noise       standard deviation of the readings' noise, steps included [m or rad]
+    """
+
+    sections: tuple[Section, ...]
+    driven: bool
+    force_name: str
+    reference: float
+    step: float
+    noise: float
+
+    @property
+    def resolution(self) -> float:
+        """Step of the encoder, or of what its noise amounts to [m or rad]."""
+        return max(self.step, self.noise * float(np.sqrt(12.0)))
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of a reading, an even error within the encoder's steps included [m or rad]."""
+        return max(self.step / float(np.sqrt(12.0)), self.noise)
+
+    @property
+    def positions(self) -> Floats:
+        """All readings that are kept."""
+        return np.concatenate([one.position for one in self.sections])
+
+    @property
+    def forces(self) -> Floats:
+        """All forces that are kept."""
+        return np.concatenate([one.force for one in self.sections])
+
+
+def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint: Joint) -> Motion:
+    """The motion in all records, each read once more; of more than 300 000 samples sections all over them.
+
+    Raises DeviceError  for columns that are not the joint's
+    """
+    total = sum(int(np.sum(np.diff(sampling.runs, axis=1))) for sampling in samplings)
+    columns = [joint.force_column(record) for record in records]
+    names = sorted({name for name, _ in columns})
+    if len(names) > 1:
+        listed = " and ".join(name or "no force" for name in names)
+        raise records[0].fault(
+            f"and the other records differ in what drives the joint, {listed}; give records alike"
+        )
+    sections, run = list[Section](), 0
+    for n, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
+        name, factor = columns[n]
+        beside = joint.command if name not in ("", joint.command) and joint.command in record else ""
+        planned = planned_sections(sampling.runs, total)
+        parts: list[list[tuple[Floats, ...]]] = [[] for _ in planned]
+        for piece in sampling.stretches(record):
+            row = piece["row"]
+            for k, (low, high, _) in enumerate(planned):
+                inside = slice(*np.searchsorted(row, [low, high]))
+                if inside.stop > inside.start:
+                    zero = np.zeros(inside.stop - inside.start)
+                    force = factor * piece[name][inside] if name else zero
+                    command = piece[beside][inside] if beside else zero
+                    parts[k].append((piece["time_s"][inside], piece[joint.position][inside], force, command))
+        for (_, _, stretch), some in zip(planned, parts, strict=True):
+            time, position, force, command = (np.concatenate(one) for one in zip(*some, strict=True))
+            kept = command if beside else np.zeros(0)
+            sections.append(Section(float(time[0]), sampling.period, n, run + stretch, position, force, kept))
+        run += len(sampling.runs)
+    name = columns[0][0]
+    driven = bool(name) and any(np.any(one.force != 0.0) for one in sections)
+    y = np.concatenate([one.position for one in sections])
+    step = encoder_step([one.position for one in sections])
+    reference = 0.5 * float(np.min(y) + np.max(y))
+    return Motion(tuple(sections), driven, name, reference, step, noise_of(sections))
+
+
+def planned_sections(runs: NDArray[np.int64], total: int) -> list[tuple[int, int, int]]:
+    """First row, the one behind the last, and the stretch of each section that is kept of one record."""
+    long = [(int(a), int(b), n) for n, (a, b) in enumerate(runs) if b - a >= FEWEST + BEFORE]
+    if total <= MOST:
+        return long
+    length = MOST // SECTIONS
+    planned = []
+    for a, b, n in long:
+        many = max(1, round((b - a) * SECTIONS / total))
+        if (b - a) * SECTIONS < 0.5 * total and n % max(1, round(len(long) / SECTIONS)):
+            continue
+        for start in np.linspace(a, max(b - length, a), many).astype(int):
+            planned.append((int(start), int(min(start + length, b)), n))
+    return planned
+
+
+def encoder_step(readings: Sequence[Floats]) -> float:
+    """The step of which all differences of consecutive readings are whole multiples; 0 where there is none."""
+    steps = np.abs(np.concatenate([np.diff(one) for one in readings]))
+    least = SHORTEST_STEP * max(
+        float(np.max(steps, initial=0.0)), max(float(np.max(np.abs(one))) for one in readings) * 1e-3
+    )
+    steps = steps[steps > least]
+    if not len(steps):
+        return 0.0
+    step = float(np.min(steps))
+    few = steps[steps < 50.0 * step]
+    step = float(np.median(few / np.rint(few / step)))
+    few = steps[steps < 20.0 * step] / step
+    whole = np.mean(np.abs(few - np.rint(few)) < WHOLE)
+    return step if len(few) >= 5 and whole > 0.98 else 0.0
+
+
+def noise_of(sections: Sequence[Section]) -> float:
+    """Standard deviation of what the readings have beside smooth motion [m or rad], by their sixth differences.
+
+    Those of motion at a fortieth of the sampling frequency are a millionth of it; the median passes over the
+    instants at which the force jumps.
+    """
+    sixths = np.concatenate([np.diff(one.position, 6) for one in sections])
+    return float(np.median(np.abs(sixths)) / (0.6745 * np.sqrt(924.0))) if len(sixths) else 0.0
+
+
+def windows_of(motion: Motion) -> Windows:
+    """The motion cut into windows: as many as still bend enough, those without motion left out."""
+    lengths = [len(one.position) - (BEFORE if motion.driven else 0) for one in motion.sections]
+    total = sum(lengths)
+    windows = None
+    for many in MANY:
+        windows = _cut(motion, max(total // many, FEWEST))
+        bends = [_bend(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)]
+        moves = np.array(
+            [np.ptp(windows.position[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)]
+        )
+        moving = moves > STANDING * motion.resolution
+        if moving.any() and np.median(np.array(bends)[moving]) >= BEND * motion.resolution:
+            break
+    assert windows is not None
+    return windows.chosen(moving)
+
+
+def _bend(y: Floats) -> float:
+    """By how much a motion leaves the straight line between its ends, at most [m or rad]."""
+    return float(np.max(np.abs(y - np.linspace(y[0], y[-1], len(y)))))
+
+
+def _cut(motion: Motion, length: int) -> Windows:
+    first, lengths, period, time, run = list[int](), list[int](), list[float](), list[float](), list[int]()
+    row, before = 0, BEFORE if motion.driven else 0
+    for one in motion.sections:
+        samples = len(one.position) - before
+        many = max(1, round(samples / length))
+        edges = np.linspace(before, before + samples, many + 1).astype(int)
+        for a, b in pairwise(edges):
+            first.append(row + a)
+            lengths.append(b - a)
+            period.append(one.period)
+            time.append(one.time + a * one.period)
+            run.append(one.run)
+        row += len(one.position)
+    return Windows(
+        motion.positions - motion.reference,
+        motion.forces,
+        np.array(first, dtype=np.int64),
+        np.array(lengths, dtype=np.int64),
+        np.array(period),
+        np.array(time),
+        np.array(run, dtype=np.int64),
+        motion.driven,
+    )

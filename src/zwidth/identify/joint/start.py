@@ -1,0 +1,238 @@
+"""First guess of a joint's mass and friction: force balance weighted with smooth functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.joint.fit import MASS, STIFFNESS, Numbers, Windows, approach, bounded, predict, scales
+
+Floats = NDArray[np.float64]
+
+SHORTEST: Final = 12  # samples of a weighting function
+MOVING: Final = 0.7  # share of it that must be motion
+PARTS: Final = (8, 2, 1)
+TRIES: Final = 3
+OUTLYING: Final = 9.0
+PARTLY: Final = 0.2  # the same where nothing moves for longer
+FEWEST_ROWS: Final = 8
+GOOD: Final = 1.5  # times the noise, that the right numbers leave
+LEVELS: Final = (0.3, 0.6, 0.85)  # shares of the forces below which a joint may stand
+MOST_GUESSES: Final = 8
+ALIKE: Final = 0.01  # relative difference of two sums of squares that are one
+DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A first guess.
+
+    values     (7,) as `friction_fit.Numbers` has them
+    explained  share of the weighted force that is explained
+    error      standard error of the mass over the mass; inf where it is no positive number
+    """
+
+    values: Floats
+    explained: float
+    error: float
+
+
+def weighted_balance(
+    windows: Windows, size: int, step: float, delays: Sequence[int], moving: float = MOVING
+) -> tuple[Floats, Floats]:
+    """Rows of the force balance in segments of so many samples, half of each in the next.
+
+    With w(t) = (1 - t^2)^3 on a segment, integrated by parts:
+        m int w'' x - b int w' x + F_f int w [x' > 0] - F_b int w [x' < 0] + k int w x = int w f
+    step     of the encoder [m or rad]: what moves by less within an eighth of a segment counts as standing
+    delays   (D,) of the force, samples
+    moving   share of a segment that must be motion for its row to count
+    Returns  (s, 5) of m, b, F forward and backward, and k, and (s, D) of the force
+    """
+    weight, slope, bend = weighting(size)
+    reach = max(size // 8, 1)
+    starts = [
+        np.arange(first, first + length - size + 1, max(size // 2, 1))
+        for first, length in zip(windows.first, windows.length, strict=True)
+    ]
+    T = np.repeat(windows.period, [len(some) for some in starts])
+    at = np.concatenate(starts)[:, None] + np.arange(size)
+    last = len(windows.position) - 1
+    moved = windows.position[np.minimum(at + reach, last)] - windows.position[np.maximum(at - reach, 0)]
+    side = np.where(np.abs(moved) > 1.5 * step, np.sign(moved), 0.0)
+    kept = np.mean(side != 0.0, axis=1) >= moving
+    at, side, T = at[kept], side[kept], T[kept]
+    place = windows.position[at]
+    y = place - place[:, :1]
+    rows = [
+        y @ bend / T**2,
+        -(y @ slope) / T,
+        (side > 0.0) @ weight,
+        -((side < 0.0) @ weight),
+        place @ weight,
+    ]
+    # a force is held from its sample to the next: its mean about a sample is that of two
+    forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
+    right = [forces[np.clip(at - delay, 0, last)] @ weight for delay in delays]
+    return np.stack(rows, axis=1), np.stack(right, axis=1)
+
+
+def weighting(size: int) -> tuple[Floats, Floats, Floats]:
+    """w(t) = (1 - t^2)^3 at so many samples in [-1, 1], its slope and its bend per sample.
+
+    Slope and bend are differences of the samples, not derivatives: summed by parts they give the second
+    differences of a position, which are exactly what a force held from sample to sample causes in a free mass.
+    """
+    w = (1.0 - np.linspace(-1.0, 1.0, size) ** 2) ** 3
+    around = np.concatenate([[0.0], w, [0.0]])
+    return w, 0.5 * (around[2:] - around[:-2]), around[2:] - 2.0 * w + around[:-2]
+
+
+def first_guess(
+    windows: Windows, size: int, step: float, *, spring: bool = False, moving: float = MOVING
+) -> Guess | None:
+    """The numbers that balance the weighted forces best, over delays of the force; None of too few segments.
+
+    Of free motion all numbers are those over the mass.
+    """
+    delays = DELAYS if windows.driven else DELAYS[:1]
+    A, forces = weighted_balance(windows, size, step, delays, moving)
+    if len(A) < FEWEST_ROWS:
+        return None
+    A = A if spring else A[:, :4]
+    T = float(np.mean(windows.period))
+    if not windows.driven:
+        return _balanced(A[:, 1:], -A[:, 0], False, 0.0)
+    guesses = [_balanced(A, f, True, delay * T) for delay, f in zip(delays, forces.T, strict=True)]
+    return max(guesses, key=lambda guess: guess.explained)
+
+
+def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
+    norms = np.linalg.norm(A, axis=0)
+    used = norms > 0.0
+    scaled = A[:, used] / norms[used]
+    x = np.linalg.lstsq(scaled, f, rcond=1e-10)[0]
+    left, total = f - scaled @ x, float(f @ f)
+    explained = 1.0 - float(left @ left) / total if total > 0.0 else 0.0
+    numbers = np.zeros(A.shape[1])
+    numbers[used] = x / norms[used]
+    error = 0.0
+    if driven:
+        deviation = np.sqrt(2.0 * float(left @ left) / max(len(f) - A.shape[1], 1))  # segments overlap by half
+        spread = np.sqrt(np.diag(np.linalg.pinv(scaled.T @ scaled))[0]) / norms[used][0]
+        error = float(deviation * spread / abs(numbers[0])) if numbers[0] != 0.0 else np.inf
+    else:
+        numbers = np.append(1.0, numbers)
+    m, b, forward, backward = numbers[:4]
+    stiffness = float(numbers[4]) if len(numbers) > 4 else 0.0
+    return Guess(np.array([m, b, b, forward, backward, stiffness, delay]), explained, error)
+
+
+def first_starts(windows: Windows, values: Floats, starts: Floats | None = None) -> Floats:
+    """Position and velocity (W, 2) at each window's first sample: of several guesses that which predicts it best.
+
+    The guesses are at rest, lines and parabolas through the first samples, and the given starts.
+    """
+    here = windows.position[windows.first]
+    guesses = [np.stack([here, np.zeros(len(here))], axis=1)]
+    reaches = [np.full(len(here), n) for n in (1, 2, 4, 8, 16)] + [windows.length // n for n in (3, 6, 12, 24)]
+    for reach in reaches:
+        n = np.minimum(np.maximum(reach, 1), (windows.length - 1) // 2)
+        middle, end = windows.position[windows.first + n], windows.position[windows.first + 2 * n]
+        span = 2.0 * np.maximum(n, 1) * windows.period
+        for rise in (end - here, 4.0 * middle - 3.0 * here - end):
+            guesses.append(np.stack([here, rise / span], axis=1))
+    if starts is not None:
+        guesses.append(np.where(np.isfinite(starts), starts, guesses[0]))
+    edges = np.cumsum(windows.length) - windows.length
+    reading = windows.position[windows.rows]
+    with np.errstate(over="ignore", invalid="ignore"):
+        costs = [np.add.reduceat((reading - predict(windows, values, guess)) ** 2, edges) for guess in guesses]
+    best = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=0)
+    return np.asarray(np.array(guesses)[best, np.arange(len(here))])
+
+
+def search_guess(
+    windows: Windows, numbers: Numbers, step: float, noise: float, most: int = MOST_GUESSES
+) -> tuple[Numbers, Floats]:
+    """Numbers and starts close to those that predict the motion best.
+
+    Short windows forgive a wrong guess, for the start of each is its own; the longer ones then begin where those
+    have led. Of several first guesses that which does best in short windows is followed first, the others only
+    where it leaves more than the noise.
+    numbers  which are free and which are tied; those that are fixed keep their values
+    step     of the encoder;   noise  standard deviation of the readings' noise, steps included [m or rad]
+    most     guesses that are followed
+    """
+    short = windows.cut(PARTS[0])
+    enough = (GOOD * noise) ** 2 * float(np.sum(windows.length))
+    best: tuple[Numbers, Floats, Floats] | None = None
+    for one in islice(_guesses(windows, numbers, step), most):
+        found = _followed(windows, short, approach(short, one, first_starts(short, one.values), 6))
+        squares = float(np.sum(found[2]))
+        again = best is not None and abs(squares / float(np.sum(best[2])) - 1.0) < ALIKE
+        if best is None or squares < np.sum(best[2]):
+            best = found
+        if again or squares <= enough:  # two guesses that lead to one place need no third
+            break
+    assert best is not None
+    return best[0], best[1]
+
+
+def _followed(
+    windows: Windows, short: Windows, begun: tuple[Numbers, Floats, Floats]
+) -> tuple[Numbers, Floats, Floats]:
+    """From short windows to the whole ones; windows that are badly predicted then begin anew."""
+    numbers, starts, squares = begun
+    before = short
+    for parts in PARTS[1:]:
+        now = windows.cut(parts) if parts > 1 else windows
+        at = np.minimum(np.searchsorted(before.first, now.first), len(starts) - 1)
+        numbers, starts, squares = approach(now, numbers, first_starts(now, numbers.values, starts[at]), 10)
+        before = now
+    for _ in range(TRIES):
+        means = squares / windows.length
+        if not np.any(means > OUTLYING * np.median(means)):
+            break
+        fresh = first_starts(windows, numbers.values, starts)
+        numbers, starts, squares = approach(windows, numbers, fresh, 10)
+    return numbers, starts, squares
+
+
+def _guesses(windows: Windows, numbers: Numbers, step: float) -> Iterator[Numbers]:
+    """First guesses: by segments of several lengths, the best first; then, for motion in short bursts, by segments
+    that are partly motion, and by levels below which the joint may stand."""
+    sizes = scales(windows)
+    size, spring = int(np.median(windows.length)), STIFFNESS in numbers.free
+    lengths = [n for n in dict.fromkeys((size, size // 2, size // 4, size // 8, 2 * SHORTEST)) if n >= SHORTEST]
+    found = [first_guess(windows, n, step, spring=spring) for n in lengths]
+    sure = sorted((one for one in found if one is not None), key=lambda one: -one.explained)
+    partly = [first_guess(windows, n, step, moving=PARTLY) for n in (SHORTEST, 2 * SHORTEST)]
+    values = [one.values for one in (*sure, *partly) if one is not None]
+    values += [_in_bursts(windows, share) for share in LEVELS] if windows.driven else []
+    for given in values or [np.eye(len(sizes))[MASS] * sizes]:
+        one = given[: len(numbers.values)].copy()
+        one[MASS] = max(one[MASS], 1e-3 * sizes[MASS])
+        one[1:3] = np.maximum(one[1:3], 0.0)
+        one[3:5] += max(-0.5 * float(np.sum(one[3:5])), 0.0)
+        yield numbers.with_free(bounded(one, windows)[list(numbers.free)])
+
+
+def _in_bursts(windows: Windows, share: float) -> Floats:
+    """Numbers of a joint that stands until the force is above this share of all forces, and then moves in bursts
+    of half a period of the force."""
+    sizes = np.abs(windows.force[windows.rows])
+    level, most = float(np.quantile(sizes, share)), float(np.max(sizes))
+    signs = np.sign(windows.force[windows.rows] - np.mean(windows.force[windows.rows]))
+    turns = max(int(np.sum(signs[1:] != signs[:-1])), 1)
+    T = float(np.mean(windows.period))
+    burst = 0.5 * len(signs) / turns * T
+    short = windows.cut(max(int(np.median(windows.length) * T / (2.0 * burst)), 1))
+    way = np.array([np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)])
+    moved = max(float(np.quantile(way, 0.8)), 1e-300)
+    return np.array([max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T])

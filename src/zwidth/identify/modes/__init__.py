@@ -1,0 +1,1 @@
+"""Modes and the device's own numbers from force and position."""

@@ -1,0 +1,275 @@
+"""What a record must be before modes are fitted to it, each said with what was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.faults import plural
+from zwidth.identify.identification import Check
+from zwidth.identify.modes.modal_fit import ModalFit
+from zwidth.identify.modes.spectra import Spectra
+from zwidth.identify.modes.stretches import Levels, Source
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+COUNTS: Final = 10.0  # steps of the encoder that a motion must have
+EXCITED: Final = 1e-6  # power of the force, over its largest, below which a line was not excited
+FEWEST_LINES: Final = 10  # excited
+AT_LIMIT: Final = 0.02  # share of the samples at the largest force, beyond which it is suspected to be clipped
+RELATED: Final = 2.0  # times as large as that of unrelated columns the mean coherence must be
+LOST: Final = 0.3  # coherence below which a line says little
+TRUSTED: Final = 0.6  # coherence above which a line's phase is believed
+RISING: Final = 0.7  # exponent of |P| over frequency, above which force and position are taken for swapped
+LOWEST: Final = slice(3, 19)  # lines, above those of a window, at which feedback shows
+CONSTANT: Final = 0.3  # by which the force may differ from that of a spring, in the middle
+FLIPPED: Final = -0.3  # times as far as the first stretch, below which the sign of another one is turned
+EARLY: Final = -0.05  # delay [samples], below which the position comes before the force
+EXPLAINED: Final = 2.0  # misfit with which modes explain a response
+IMPLAUSIBLE: Final = 20.0  # ratio of the response to the device's, either way, that is remarked
+FACTORS_LINEAR: Final = {1e3: "millimetres", 1e6: "micrometres", 1e-3: "kilometres, or the force in millinewtons"}
+FACTORS_TURN: Final = {180.0 / np.pi: "degrees", 1e3: "milliradians", 1e-3: "the torque in millinewton metres"}
+NEAR: Final = 1.6  # by which a ratio may differ from such a factor
+
+
+def level_checks(source: Source, levels: Levels, step: float, given_step: float, limit: float) -> list[Check]:
+    """Checks of the values in the columns: constant ones, motion, saturation, drift.
+
+    step        of the encoder as the positions show it; 0 for none
+    given_step  of the encoder as the device file gives it; 0 for none
+    limit       largest force that the device commands
+    """
+    names, label = source.channels, source.record.label
+    force, position = levels.span
+    checks = list[Check]()
+    if force == 0.0:
+        reason = (
+            f"{names.force} of {label} is {levels.high[0]:.6g} all the time; excite the device by noise or a sweep"
+        )
+        return [Check("excitation", False, reason)]
+    if position == 0.0:
+        reason = (
+            f"{names.position} of {label} is {levels.high[1]:.6g} all the time; is the encoder connected, and "
+            "read?"
+        )
+        return [Check("motion", False, reason)]
+    steps = max(step, given_step)
+    if steps:
+        counts = position / steps
+        from_where = "as the positions show" if step >= given_step else "by the device file"
+        reason = f"{names.position} of {label} moves by {counts:.3g} steps of {steps:.3g} ({from_where})"
+        if counts < COUNTS:
+            reason += f"; at least {COUNTS:.0f} are needed: drive the device harder, or at lower frequencies"
+        checks.append(Check("motion", bool(counts >= COUNTS), reason))
+    share = levels.at_limit / levels.count
+    beyond = float(np.max(np.abs([levels.low[0], levels.high[0]])))
+    if beyond > limit * (1.0 + 1e-9):
+        reason = (
+            f"{names.force} of {label} reaches {beyond:.4g}, but the device commands {limit:.4g} at most: what "
+            "moved it is not what is written; drive it less"
+        )
+        checks.append(Check("saturation", False, reason))
+    elif share > AT_LIMIT:
+        reason = (
+            f"{100.0 * share:.3g} % of the samples of {label} have the largest or the least {names.force}, "
+            f"{levels.high[0]:.4g} or {levels.low[0]:.4g}: right for steps and binary noise; if an amplifier "
+            "clipped it there, write the force that was commanded as command_ and the measured one beside it, "
+            "or drive less"
+        )
+        checks.append(Check("saturation", False, reason, warning=True))
+    else:
+        checks.append(Check("saturation", True, f"{100.0 * share:.2g} % of the samples are at the largest force"))
+    drift = levels.drift / position
+    reason = f"a straight line through {names.position} makes {100.0 * drift:.3g} % of its span"
+    checks.append(Check("drift", True, reason + "; the position is differenced twice, so that it does not count"))
+    return checks
+
+
+def excitation_check(spectra: Spectra, label: str) -> tuple[Check, NDArray[np.bool_]]:
+    """Which lines are excited, and whether they are enough."""
+    power = spectra.power("force")
+    excited = power > EXCITED * max(float(power.max(initial=0.0)), 1e-300)
+    f = spectra.frequency[excited]
+    if len(f) < FEWEST_LINES:
+        reason = (
+            f"{plural(len(f), 'frequency', 'frequencies')} of {label} with force; record noise, a sweep or a "
+            "multisine that covers the resonances"
+        )
+        return Check("excitation", False, reason), excited
+    reason = f"{len(f)} lines of {label} from {f[0]:.4g} to {f[-1]:.4g} Hz carry force"
+    return Check("excitation", True, reason), excited
+
+
+def coherence_check(spectra: Spectra, excited: NDArray[np.bool_], closed: bool) -> tuple[Check, float]:
+    """Above which frequency the coherence has collapsed for good [Hz], inf where it has not."""
+    into = "reference" if closed else "force"
+    coherence = np.where(excited, spectra.coherence(into, "position"), 0.0)
+    smooth = np.convolve(coherence, np.ones(9) / 9.0, mode="same") if len(coherence) > 20 else coherence
+    good = np.flatnonzero((smooth > LOST) & excited)
+    f = spectra.frequency
+    by_chance = 1.0 / spectra.averages  # that of unrelated columns
+    if not len(good) or coherence[excited].mean() < RELATED * by_chance:
+        reason = (
+            f"the coherence is {coherence[excited].mean():.2g} in the mean, as of unrelated columns: the "
+            "position does not follow the force; are the columns of one run, and of one time, has a sign flipped "
+            "in between, or one of them stood still?"
+        )
+        return Check("coherence", False, reason), 0.0
+    top, last = float(f[good[-1]]), float(f[excited][-1])
+    middle = float(np.median(coherence[excited & (f <= top)]))
+    if top < 0.8 * last:
+        reason = (
+            f"{middle:.3g} in the middle up to {top:.4g} Hz; above, up to {last:.4g} Hz, it has collapsed, and "
+            "what is there is not used: drive harder there to know more"
+        )
+        return Check("coherence", False, reason, warning=True), top
+    return Check("coherence", True, f"{middle:.3g} in the middle of {f[excited][0]:.4g} to {last:.4g} Hz"), np.inf
+
+
+def slope_of(spectra: Spectra) -> tuple[float, float]:
+    """Exponent of |P| over frequency where the coherence is good, and the ratio of the frequencies that it is
+    taken over."""
+    value, coherence = spectra.response("force", "position"), spectra.coherence("force", "position")
+    good = (coherence > TRUSTED) & (np.abs(value) > 0.0)
+    f = spectra.frequency[good]
+    if len(f) < 8:
+        return 0.0, 1.0
+    weight = 1.0 / np.sqrt(f)  # lines crowd at high frequencies: alike for each octave
+    return float(np.polyfit(np.log(f), np.log(np.abs(value[good])), 1, w=weight)[0]), float(f[-1] / f[0])
+
+
+def order_check(slope: float, ratio: float, names: tuple[str, str]) -> Check:
+    """Whether force and position are not swapped: a response falls over frequency, its inverse rises."""
+    swapped = slope > RISING and ratio > 4.0
+    reason = f"the response goes with frequency to the power {slope:.2g}"
+    if swapped:
+        reason += f"; that of a mass falls, with the power -2: are the columns {names[0]} and {names[1]} swapped?"
+    return Check("causality", not swapped, reason)
+
+
+def feedback_check(force: Floats, position: Floats, period: float, free: bool) -> Check:
+    """Whether the force does not follow the position, as that of a centring spring does.
+
+    Where nothing else excites the device, such a force leaves U/Y = -k, whatever the device is: a constant,
+    against the position. No device without feedback has this at the lowest frequencies: a free mass has -m w^2,
+    which grows with the square of the frequency, a spring to the ground has +k. A device on a spring is not
+    checked.
+
+    force, position  (n,) a stretch;   free  whether the device has a motion without a spring
+    """
+    window = np.hanning(len(force))
+    U, Y = (np.fft.rfft((values - values.mean()) * window)[LOWEST] for values in (force, position))
+    passed = Check("feedback", True, "the force does not follow the position at the lowest frequencies")
+    if not free or len(U) < 8 or np.any(Y == 0.0):
+        return passed
+    against = -U / Y
+    k = float(np.median(against.real))
+    f = np.array([LOWEST.start, LOWEST.stop - 1]) / (len(force) * period)
+    if k > 0.0 and np.median(np.abs(against / k - 1.0)) < CONSTANT:
+        reason = (
+            f"from {f[0]:.3g} to {f[1]:.3g} Hz the force follows the position as that of a spring of {k:.3g} N/m "
+            "does: a loop centres the device, and the noise that it feeds back would be taken for the device "
+            "(H1 is biased then); record what was added to the loop's command, as reference_N or reference_Nm"
+        )
+        return Check("feedback", False, reason)
+    return passed
+
+
+def sign_and_unit_checks(
+    spectra: Spectra, excited: NDArray[np.bool_], value: Complexes, own: Complexes, turns: bool
+) -> list[Check]:
+    """The response against that of the device as its file has it: its sign, and whether the units are plausible.
+
+    own  (n,) response of the device at the spectra's frequencies
+    """
+    coherence = spectra.coherence("force", "position")
+    good = np.flatnonzero(excited & (coherence > TRUSTED) & (np.abs(value) > 0.0))
+    if len(good) < 4:
+        return []
+    lowest = good[: max(4, len(good) // 8)]
+    ratio = value[lowest] / own[lowest]
+    size = float(np.median(np.abs(ratio)))
+    turned = float(np.median(np.cos(np.angle(ratio))))
+    f = spectra.frequency[lowest]
+    where = f"from {f[0]:.3g} to {f[-1]:.3g} Hz"
+    checks = []
+    if turned < -0.7:
+        reason = f"{where} the position moves against the force; turn the sign of one of the columns"
+        checks.append(Check("sign", False, reason))
+    else:
+        checks.append(Check("sign", True, f"{where} the position moves with the force, as the device's does"))
+    for factor, unit in (FACTORS_TURN if turns else FACTORS_LINEAR).items():
+        if max(size / factor, factor / size) < NEAR:
+            reason = (
+                f"{where} the response is {size:.4g} times that of the device file: is the position in {unit}?"
+            )
+            if not unit.endswith("s"):
+                reason = f"{where} the response is {size:.4g} times that of the device file: is {unit}?"
+            checks.append(Check("units", False, reason + " Columns are in N, m, N m, rad."))
+            return checks
+    reason = f"{where} the response is {size:.3g} times that of the device file"
+    far = max(size, 1.0 / max(size, 1e-300)) > IMPLAUSIBLE
+    if far:
+        reason += ": check the units of both columns, and the masses in the file"
+    checks.append(Check("units", not far, reason, warning=far))
+    return checks
+
+
+def flip_check(gains: Sequence[tuple[str, float]]) -> Check:
+    """Whether stretches of a record, and records, have one sign.
+
+    gains  what each stretch is, and how many times as far as by the first one's response it moves
+    """
+    turned = [(what, g) for what, g in gains if g < FLIPPED]
+    if turned:
+        what, g = turned[0]
+        reason = (
+            f"{what} moves {g:.2g} times as far as the first one does under the same force: the sign of force or "
+            "position was turned between the runs; turn it back, or leave the run out"
+        )
+        return Check("runs agree", False, reason)
+    least, most = (f(g for _, g in gains) for f in (min, max))
+    reason = (
+        f"all {plural(len(gains), 'stretch', 'stretches')} move as the first does, {least:.3g} to {most:.3g} "
+        "times as far"
+    )
+    return Check("runs agree", True, reason)
+
+
+def shift_check(low: float, high: float, misfit: float) -> Check:
+    """Whether the position does not move before the force is commanded.
+
+    low, high  interval of the delay [samples]
+    misfit     of the modes it is from, in standard deviations: where they do not explain the response, as that of
+               a device with friction, a small shift says nothing
+    """
+    early = high < (EARLY if misfit < EXPLAINED else -1.0)
+    reason = f"the position follows the force after {low:.3g} to {high:.3g} samples"
+    if early:
+        reason = (
+            f"the position moves {-high:.3g} to {-low:.3g} samples before the force is commanded: the rows of "
+            "both columns are shifted against each other; write in each row the reading and the force sent "
+            "after it"
+        )
+    return Check("delay", not early, reason)
+
+
+def resolution_check(fit: ModalFit, line: float) -> Check:
+    """Whether each resonance is wider than what a stretch tells apart, `line` [Hz]."""
+    f, width = fit.rates / (2.0 * np.pi), 2.0 * fit.ratios * fit.rates / (2.0 * np.pi)
+    narrow = np.flatnonzero(width < 2.0 * line)
+    if not len(f):
+        return Check("resolution", True, f"lines are {line:.3g} Hz apart")
+    if len(narrow):
+        i = int(narrow[np.argmin(width[narrow])])
+        reason = (
+            f"the resonance at {f[i]:.4g} Hz is {width[i]:.2g} Hz wide, lines are {line:.2g} Hz apart: its "
+            f"damping is known from few lines; record {2.0 / max(width[i], 1e-12):.3g} s without a gap, or more"
+        )
+        return Check("resolution", False, reason, warning=True)
+    reason = f"the narrowest resonance is {width.min():.3g} Hz wide, lines are {line:.2g} Hz apart"
+    return Check("resolution", True, reason)

@@ -1,0 +1,377 @@
+"""Natural frequencies, damping, and the numbers of a device, from a record of force and position.
+
+Noise, a sweep, a multisine or steps: whatever moves the device over the frequencies of its resonances. What is
+fitted is the response of the device's own sampled loop, with hold, delay and lag, to the lines of the record's
+transform, in which nothing leaks (`modes_local`); Welch's averaged spectra are for the checks and the figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.device.faults import fail
+from zwidth.identify.identification import Check, Identification, refused
+from zwidth.identify.modes.amplitude import amplitude_check
+from zwidth.identify.modes.checks import (
+    coherence_check,
+    excitation_check,
+    feedback_check,
+    flip_check,
+    level_checks,
+    order_check,
+    resolution_check,
+    shift_check,
+    sign_and_unit_checks,
+    slope_of,
+)
+from zwidth.identify.modes.data import FittedData
+from zwidth.identify.modes.hand import hand_check
+from zwidth.identify.modes.local_response import (
+    LocalResponse,
+    explained_share,
+    local_response,
+)
+from zwidth.identify.modes.modal_fit import ModalFit, against_hysteresis, fit_modes, modal_intervals, modes_of
+from zwidth.identify.modes.model import SampledModel, model_of, sampled_response
+from zwidth.identify.modes.numbers import device_estimates, modal_estimates
+from zwidth.identify.modes.overview import Survey, survey_of
+from zwidth.identify.modes.periodic_force import periodic_lines
+from zwidth.identify.modes.physical_fit import PhysicalFit, fit_model
+from zwidth.identify.modes.spectra import Spectra, averaged_spectra
+from zwidth.identify.modes.stretches import KEPT, Channels, Source, channels_of, quantum
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import check_sampling
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.modes import undamped_modes
+from zwidth.progress import Progress
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Estimator = Literal["H1", "H2", "Hv", "joint"]
+Fitted = Literal["device", "modes"]
+
+COLUMNS: Final = Columns(
+    ("time_s", ("force_N", "torque_Nm"), ("position_m", "angle_rad")),
+    ("reference_N", "reference_Nm", "command_N", "command_Nm"),
+)
+MOST_ROUNDS: Final = 4
+STRONG: Final = 10.0  # difference of the information criterion that is clear (Kass and Raftery 1995)
+SHIFTED: Final = -0.5  # samples of delay, below which nothing more is fitted
+MISFIT: Final = 1.5  # by which residuals may exceed the noise before a model is said to miss something
+FOLLOWED: Final = 0.97  # share of the unseen motion that follows a force with flat tops, if it is what acted
+FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
+LEVELS_READ: Final = 100_000  # samples in which they are counted
+CURVE: Final = 2000  # points of a curve at most
+
+
+def identify_modes(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    point: OperatingPoint | None = None,
+    paths: Sequence[str] = (),
+    fitted: Fitted = "device",
+    estimator: Estimator | None = None,
+    segment: int | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Modes, and numbers of the device file, from records of the force that was commanded and the position read.
+
+    records    with columns time_s, force_N or torque_Nm, position_m or angle_rad; one row per sample of the
+               device's loop, each with the reading and the force sent after it. Optional: command_N, where
+               force_N was measured; reference_N, what was added to the command of a loop that centres the device
+    point      where the device is linearised, and who holds it; with an operator the hand's numbers are
+               identified, and the device's are held
+    paths      of the numbers to identify; (): masses, springs, dampers and delay of a [plant], stiffness of the
+               drives, damping ratio and delay of a mechanism, the five numbers of a hand
+    fitted     "device": its numbers, and the modes; "modes": the modes alone
+    estimator  of the response that is drawn: H1, H2, Hv, or joint with a reference; None: H1, or joint
+    segment    samples in a segment of the averaged spectra; None: 15 segments, or the period of the force
+    Returns    what each check saw; the numbers with their intervals where none refuses
+    Raises     DeviceError  for columns or options that do not go together, cells that are no numbers
+    """
+    point = device.at() if point is None else point
+    _check_options(device, records, fitted, estimator, segment)
+    numbers = model_of(device, point, paths) if fitted == "device" else None
+    sources, checks = _sources(device, point, records)
+    if result := refused("modes", device.label, checks):
+        return result
+    survey = survey_of(sources, segment, progress)
+    seen = _saw(device, point, sources, survey, estimator)
+    checks += seen.checks
+    if result := refused("modes", device.label, checks):
+        return result
+    data = FittedData(sources, survey, seen.top, progress)
+    pilot = data.pilot()
+    if pilot is None:
+        reason = (
+            f"the longest stretch has {survey.longest} samples: too few for its lines to be told apart; record "
+            "longer"
+        )
+        return Identification("modes", device.label, (*checks, Check("duration", False, reason)))
+    if pilot.vector[0] < SHIFTED and pilot.misfit < MISFIT:
+        checks.append(shift_check(float(pilot.vector[0]), float(pilot.vector[0]), 1.0))
+        return Identification("modes", device.label, tuple(checks))
+    check, data.dropped = amplitude_check(data.by_record(pilot), sources, survey.levels)
+    checks.append(check)
+    return _fitted(device, point, numbers, data, pilot, checks, survey, seen)
+
+
+def _check_options(
+    device: Device, records: Sequence[Record], fitted: str, estimator: str | None, segment: int | None
+) -> None:
+    if not records:
+        raise fail(device.label, "records", "are none; give at least one")
+    if fitted not in get_args(Fitted):
+        raise fail(device.label, "fitted", f"must be device or modes, got {fitted!r}")
+    if estimator is not None and estimator not in get_args(Estimator):
+        raise fail(device.label, "estimator", f"must be H1, H2, Hv or joint, got {estimator!r}")
+    if segment is not None and segment < 64:
+        raise fail(device.label, "segment", f"must be at least 64 samples, got {segment}")
+    referenced = [any(name.startswith("reference_") for name in record.names) for record in records]
+    if any(referenced) != all(referenced):
+        raise records[referenced.index(False)].fault(
+            "has no reference column, and another record has; give both one"
+        )
+    if any(referenced) and estimator in ("H1", "H2", "Hv"):
+        text = f"{estimator} is biased where a loop centres the device: use joint, or leave the reference out"
+        raise fail(device.label, "estimator", text)
+    if estimator == "joint" and not any(referenced):
+        raise fail(device.label, "estimator", "joint needs a column reference_N or reference_Nm")
+
+
+def _sources(device: Device, point: OperatingPoint, records: Sequence[Record]) -> tuple[list[Source], list[Check]]:
+    sources, checks = list[Source](), list[Check]()
+    for record in records:
+        sampling, check = check_sampling(record, point.loop.period)
+        checks.append(check)
+        if sampling is not None:
+            sources.append(
+                Source(record, replace(sampling, period=point.loop.period), channels_of(device, point, record))
+            )
+    if sum(one.sampling.rows for one in sources) <= KEPT:
+        for one in sources:
+            one.keep()
+    return sources, checks
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The checks of the survey, the response by averaged spectra, and the highest frequency to use [Hz]."""
+
+    checks: list[Check]
+    estimator: str
+    value: Complexes
+    coherence: Floats
+    excited: NDArray[np.bool_]
+    top: float
+
+
+def _saw(
+    device: Device, point: OperatingPoint, sources: Sequence[Source], survey: Survey, estimator: Estimator | None
+) -> _Seen:
+    checks = list[Check]()
+    nothing = np.zeros(0)
+    given = device.document.get("loop", {}).get("encoder", {}).get("resolution_m", 0.0)
+    given = float(given) if point.given_plant is not None and isinstance(given, int | float) else 0.0
+    limit = float(point.loop.nonlinear.force_limit)
+    for source, levels in zip(sources, survey.levels, strict=True):
+        if not levels.count:
+            reason = f"no stretch of {source.record.label} without a gap has 256 samples; record longer"
+            checks.append(Check("duration", False, reason))
+            continue
+        first = source.first()
+        checks += level_checks(source, levels, quantum([first] if first else []), given, limit)
+    closed = bool(sources[0].channels.reference)
+    chosen = estimator or ("joint" if closed else "H1")
+    if any(not (c.passed or c.warning) for c in checks) or not survey.spectra.segments:
+        if not checks or all(c.passed or c.warning for c in checks):
+            checks.append(
+                Check("duration", False, "no segment fits into a stretch; record longer, or shorten them")
+            )
+        return _Seen(checks, chosen, nothing.astype(complex), nothing, nothing.astype(bool), 0.0)
+    spectra = survey.spectra
+    value = spectra.response("force", "position", chosen, "reference" if closed else "")
+    coherence = spectra.coherence("reference" if closed else "force", "position")
+    check, excited = excitation_check(spectra, sources[0].record.label)
+    checks.append(check)
+    names = (sources[0].channels.force, sources[0].channels.position)
+    loudest = sources[survey.loudest[0]].first()
+    assert loudest is not None
+    both = {"force": loudest.force, "position": loudest.position}  # differenced alike: neither is known to drift
+    alike = averaged_spectra([both], spectra.period, spectra.length, dict.fromkeys(both, 2))
+    checks.append(order_check(*slope_of(alike), names))
+    checks.append(flip_check(survey.agreement))
+    if not all(check.passed for check in checks[-2:]):  # all else would be said of what is not so
+        return _Seen(checks, chosen, value, coherence, excited, 0.0)
+    squared, _ = undamped_modes(point.plant.mass, point.plant.stiffness)
+    if closed:
+        checks.append(Check("feedback", True, "the reference of the centring loop is recorded: S_yr/S_ur is used"))
+    else:
+        free = bool(np.any(squared == 0.0))
+        checks.append(feedback_check(loudest.force, loudest.position, spectra.period, free))
+    checks.append(_input_check(sources[0].channels))
+    check, top = coherence_check(spectra, excited, closed)
+    checks.append(check)
+    if checks[-1].passed or checks[-1].warning:
+        theta = 2.0 * np.pi * spectra.frequency * spectra.period
+        own = sampled_response(point.loop, np.minimum(theta, np.pi))
+        checks += sign_and_unit_checks(spectra, excited, value, own, sources[0].channels.turns)
+    return _Seen(checks, chosen, value, coherence, excited, top)
+
+
+def _input_check(channels: Channels) -> Check:
+    if channels.measured:
+        text = f"the response is from {channels.force}, what was commanded; {channels.measured} was measured"
+    else:
+        text = (
+            f"{channels.force} is taken for what was commanded and held; if it was measured, give the command as "
+            f"command_{channels.force.partition('_')[2]} beside it"
+        )
+    return Check("input", True, text)
+
+
+# --- the fit ----------------------------------------------------------------------------------------------------
+
+
+def _fitted(
+    device: Device,
+    point: OperatingPoint,
+    numbers: SampledModel | None,
+    data: FittedData,
+    pilot: ModalFit,
+    checks: list[Check],
+    survey: Survey,
+    seen: _Seen,
+) -> Identification:
+    modal = pilot
+    for _ in range(MOST_ROUNDS):
+        before = modal.poles
+        seen_part, unseen_part = data.sums(data.where(before), None, data.where(before, unseen=True))
+        response = local_response(seen_part)
+        modal = fit_modes(response, data.period, modal)
+        data.noise = response.noise
+        if data.settled(before, modal.poles):
+            break
+    profiled, spread = modal_intervals(response, modal)
+    checks.append(shift_check(float(profiled.low[0]), float(profiled.high[0]), modal.misfit))
+    checks.append(resolution_check(modal, data.line))
+    if numbers is not None and numbers.hand:
+        checks.append(hand_check(response, numbers, point))
+    if result := refused("modes", device.label, checks):
+        return result
+    found = None
+    if numbers is not None:
+        found = fit_model(response, numbers, modal, data.period)
+        if found.misfit < modal.misfit:
+            loop = numbers.loop_of(found.values)
+            modal = min(modal, modes_of(response, loop), key=lambda fit: fit.criterion)
+    lossy = against_hysteresis(response, modal) if modal.count else modal
+    difference = lossy.criterion - modal.criterion
+    modal = lossy if difference < -STRONG else modal
+    profiled, spread = modal_intervals(response, modal)
+    turns = data.sources[0].channels.turns
+    estimates = modal_estimates(modal, profiled, spread, modal.damping == "hysteretic", turns)
+    remarks = [_damping_remark(difference)] if modal.count else ["no resonance shows in the record"]
+    details: dict[str, Any] = {
+        "estimator": seen.estimator,
+        "averages": survey.spectra.averages,
+        "damping_criterion_difference": difference,
+        "modal_misfit": modal.misfit,
+        "turns": turns,
+    }
+    if numbers is not None and found is not None:
+        own, more = device_estimates(device, numbers, found, data.period)
+        estimates, remarks = own + estimates, remarks + more
+        details["misfit"] = found.misfit
+        if found.misfit > MISFIT:
+            checks.append(_misfit_check(found, numbers, response, data.period))
+    remarks += periodic_lines(survey.period, data.sources[survey.loudest[0]], details)
+
+    def fitted(theta: Floats) -> Complexes:
+        return (
+            modal.response(theta)
+            if found is None or numbers is None
+            else numbers.response(found.fit.values, theta)
+        )
+
+    curves = _curves(survey.spectra, seen, fitted)
+    share = explained_share(unseen_part, fitted)
+    if _clipped(checks, data.sources) and share < FOLLOWED:
+        reason = (
+            f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another "
+            "force acted there than is written; drive less, or write what the amplifier gave"
+        )
+        return Identification("modes", device.label, (*checks, Check("validation", False, reason)))
+    text = f"{data.unseen}, predicted from its force"
+    return Identification(
+        "modes", device.label, tuple(checks), tuple(estimates), share, text, tuple(remarks), curves, details
+    )
+
+
+def _clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:
+    """Whether a force has flat tops and is none that steps between a few levels on purpose."""
+    if all(check.passed for check in checks if check.what == "saturation"):
+        return False
+    first = [one for one in (source.first() for source in sources) if one is not None]
+    return any(len(np.unique(one.force[:LEVELS_READ])) > FEW_LEVELS for one in first)
+
+
+def _damping_remark(difference: float) -> str:
+    """Which damping explains the data, in words.
+
+    difference  of the criterion with loss factors less that with dampers
+    """
+    if difference < -STRONG:
+        return (
+            "loss factors explain the response better than dampers: the information criterion is "
+            f"{-difference:.3g} lower"
+        )
+    if difference > STRONG:
+        return (
+            "dampers explain the response better than loss factors: the information criterion is "
+            f"{difference:.3g} lower"
+        )
+    return (
+        "dampers and loss factors explain the response alike: the information criterion differs by "
+        f"{difference:.2g}"
+    )
+
+
+def _misfit_check(found: PhysicalFit, numbers: SampledModel, response: LocalResponse, period: float) -> Check:
+    own = numbers.response(found.fit.values, 2.0 * np.pi * response.middle * period)
+    off = np.abs(own - response.value) / response.deviation
+    worst = float(response.middle[int(np.nanargmax(off))])
+    reason = (
+        f"the device's model leaves {found.misfit:.3g} times the noise, most near {worst:.4g} Hz: friction, "
+        "another mode, or a stiffness that changes with load is not in it; the intervals are widened by that "
+        "factor"
+    )
+    return Check("model", False, reason, warning=True)
+
+
+def _curves(spectra: Spectra, seen: _Seen, fitted: Any) -> dict[str, Any]:
+    """Columns of the measured and the fitted response, at no more than 2000 frequencies."""
+    f = spectra.frequency
+    chosen = np.flatnonzero(seen.excited)
+    if len(chosen) > CURVE:
+        places = np.searchsorted(f[chosen], np.geomspace(f[chosen[0]], f[chosen[-1]], CURVE))
+        chosen = chosen[np.unique(np.minimum(places, len(chosen) - 1))]
+    P = fitted(np.minimum(2.0 * np.pi * f[chosen] * spectra.period, np.pi))
+    measured = seen.value[chosen]
+    return {
+        "frequency_Hz": f[chosen].tolist(),
+        "measured_real": measured.real.tolist(),
+        "measured_imag": measured.imag.tolist(),
+        "coherence": seen.coherence[chosen].tolist(),
+        "fitted_real": P.real.tolist(),
+        "fitted_imag": P.imag.tolist(),
+        "used": (f[chosen] <= seen.top).tolist(),
+    }

@@ -1,0 +1,380 @@
+"""Natural frequencies, damping and residues: a sum of modes fitted to a sampled response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.modes.local_response import LocalResponse
+from zwidth.identify.profile_likelihood import Fit, fit_least_squares
+from zwidth.loop.controller import split_delay
+from zwidth.loop.hold import held_row
+from zwidth.loop.loop import Loop
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Damping = Literal["viscous", "hysteretic"]
+
+RATIOS: Final = (0.005, 0.04, 0.3)  # damping ratios among which a further mode is looked for
+POINTS: Final = 100  # frequencies among which it is
+FIRST_DELAYS: Final = (0.0, 1.0, 2.0)  # samples
+MOST_MODES: Final = 6
+PROFILED: Final = 3  # modes at most whose intervals follow the likelihood; of more, its curvature
+UNEXPLAINED, HELPFUL = 2.0, 0.7  # misfit beyond which a third mode must lower the sum of squares to such a share
+SLOWEST: Final = 2.0  # lowest angles, below which no mode is looked for
+STRONG: Final = 10.0  # by which the information criterion must fall for a further mode (Kass and Raftery 1995)
+LEAST_DELAY, MOST_DELAY = -3.0, 20.0  # samples; below 0 where columns are shifted
+LEAST_RATIO, MOST_RATIO = 1e-5, 3.0
+ALIASES: Final = 12  # to either side, by which a loss factor differs from a damper
+FASTEST: Final = 30.0  # Nyquist frequencies: a mode so fast follows the force at once
+BASES: Final = ("free", "free, braked", "grounded")
+
+
+@dataclass(frozen=True)
+class ModalFit:
+    """A sum of modes that makes a response.
+
+    P = z^-d [ r_0 H_0 + sum_i r_i H_i + r_s H_s ],   H of a mode the exact held response of 1/(s^2 + 2 zeta w s +
+    w^2)
+
+    coupled      dampers couple the modes, so that each has a second residue, q_i s beside r_i
+    base         "free": H_0 of 1/s^2; "free, braked": of 1/(s (s + a)); "grounded": none
+    damping      "viscous"; "hysteretic": of 1/(w^2 (1 + i eta) - w^2), eta = 2 zeta
+    period       T [s]
+    vector       (1 + braked + 2 m,) delay [samples], ln a, then ln w and ln zeta of each mode
+    residues     of the base, of each mode, and of all faster ones together [1/kg]; then q_i/w_i where coupled
+    chi_squared  of the residuals
+    rows         number of residuals
+    """
+
+    base: str
+    damping: Damping
+    period: float
+    vector: Floats
+    residues: Floats
+    chi_squared: float
+    rows: int
+    coupled: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of modes."""
+        return (len(self.vector) - self._before) // 2
+
+    @property
+    def _before(self) -> int:
+        return 2 if self.base == "free, braked" else 1
+
+    @property
+    def rates(self) -> Floats:
+        """w (m,) [rad/s]."""
+        return np.exp(self.vector[self._before :: 2])
+
+    @property
+    def ratios(self) -> Floats:
+        """zeta (m,)."""
+        return np.exp(self.vector[self._before + 1 :: 2])
+
+    @property
+    def clear_rates(self) -> Floats:
+        """w of the modes that are peaks of the response, ascending [rad/s]."""
+        rates, shift = self.rates, 0 if self.base == "grounded" else 1
+        own = np.abs(self.residues[shift : shift + self.count]) / (2.0 * self.ratios * rates**2)
+        inside = rates * self.period < np.pi
+        whole = np.abs(self.response(np.minimum(rates * self.period, np.pi)))
+        return np.sort(rates[(own > 0.5 * whole) & inside])
+
+    @property
+    def delay(self) -> float:
+        """Sum of all delays [s]."""
+        return float(self.vector[0]) * self.period
+
+    @property
+    def poles(self) -> Complexes:
+        """Poles in continuous time, of pairs the upper ones, and that of the brake [1/s]."""
+        w, root = self.rates, np.emath.sqrt(self.ratios**2 - 1.0) * (1.0 + 0j)
+        upper = -self.ratios * w + 1j * np.abs(root.imag) * w
+        real = np.concatenate([-w * (self.ratios + sign * root.real) for sign in (1.0, -1.0)])
+        over = self.ratios >= 1.0
+        brake = [-np.exp(self.vector[1])] if self.base == "free, braked" else []
+        return np.concatenate([upper[~over], real[np.tile(over, 2)], brake]).astype(complex)
+
+    @property
+    def misfit(self) -> float:
+        """By how much the residuals are larger than the noise; 1 where the modes explain all."""
+        return float(np.sqrt(self.chi_squared / max(self.rows - len(self.vector) - len(self.residues), 1)))
+
+    @property
+    def criterion(self) -> float:
+        """Bayes's information criterion: n ln(chi^2/n) + k ln n."""
+        k = len(self.vector) + len(self.residues)
+        return self.rows * float(np.log(self.chi_squared / self.rows)) + k * float(np.log(self.rows))
+
+    def response(self, theta: Floats) -> Complexes:
+        """P (n,) at angles (n,) [m/N]."""
+        return np.asarray(self.columns(self.vector, theta) @ self.residues)
+
+    def columns(self, vector: Floats, theta: Floats) -> Complexes:
+        """Responses (n, c) of unit residues, for other poles and another delay."""
+        return _columns(self.base, self.damping, self.period, vector, theta, self.coupled)
+
+
+def fit_modes(
+    data: LocalResponse, period: float, near: ModalFit | None = None, most: int = MOST_MODES
+) -> ModalFit:
+    """The modes that a response shows: each further one where it explains the most, as long as the information
+    criterion falls by more than ten. The device is taken for a free one at first; in the end for a braked one, or
+    one on a spring, where that explains it better.
+
+    near  modes that are known to be about right, to begin with; None: none
+    """
+    if near is None:
+        starts = (_solved(data, "free", period, np.array([d])) for d in FIRST_DELAYS)
+        best = _refined(data, min(starts, key=lambda fit: fit.chi_squared))
+    else:
+        best = _pruned(data, _refined(data, near))
+    while best.count < most:
+        delays = FIRST_DELAYS if best.count == 0 else (float(best.vector[0]),)
+        tried = [_with_mode(data, replace(best, vector=np.r_[d, best.vector[1:]])) for d in delays]
+        longer = _refined(data, min(tried, key=lambda fit: fit.chi_squared))
+        if longer.criterion > best.criterion - STRONG:
+            break
+        if best.count > 1 and best.misfit > UNEXPLAINED and longer.chi_squared > HELPFUL * best.chi_squared:
+            break  # what is left is no mode
+        best = longer
+    others = [
+        _refined(data, _on_base(data, best, base))
+        for base in BASES
+        if base != best.base and (best.count or base != "grounded")
+    ]
+    return min([best, *others], key=lambda fit: fit.criterion)
+
+
+def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
+    """The modes nearest to those of a loop's plant, fitted to a response."""
+    plant, T = loop.plant, loop.period
+    n = plant.size
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:] = np.eye(n)
+    A[n:, :n] = -np.linalg.solve(plant.mass, plant.stiffness)
+    A[n:, n:] = -np.linalg.solve(plant.mass, plant.damping)
+    poles = np.linalg.eigvals(A)
+    low, fast = np.log(SLOWEST * data.theta.min() / T), np.log(np.pi / T)
+    real = np.sort(
+        np.abs(poles[(np.abs(poles.imag) < 1e-9 * np.abs(poles)) & (np.log(np.abs(poles) + 1e-300) > low)].real)
+    )
+    pairs = [(np.abs(p), -p.real / np.abs(p)) for p in poles if p.imag > 1e-9 * np.abs(p)]
+    pairs += [
+        (np.sqrt(a * b), 0.5 * (a + b) / np.sqrt(a * b)) for a, b in zip(real[::2], real[1::2], strict=False)
+    ]
+    vector = [loop.controller.delay]
+    for w, ratio in pairs:
+        if low < np.log(w) < fast:
+            vector += [np.log(w), np.log(max(ratio, 2.0 * LEAST_RATIO))]
+    start = _solved(data, "free", T, np.array(vector))
+    fits = [_on_base(data, replace(start, coupled=coupled), base) for base in BASES for coupled in (False, True)]
+    return min((_refined(data, fit) for fit in fits), key=lambda fit: fit.criterion)
+
+
+def _pruned(data: LocalResponse, fit: ModalFit) -> ModalFit:
+    """The modes without those that the information criterion does not miss."""
+    while fit.count > 1:
+        shorter = list[ModalFit]()
+        for i in range(fit.count):
+            at = fit._before + 2 * i
+            vector = np.delete(fit.vector, [at, at + 1])
+            shorter.append(_solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled))
+        one = _refined(data, min(shorter, key=lambda other: other.chi_squared))
+        if one.criterion > fit.criterion + STRONG:
+            return fit
+        fit = one
+    return fit
+
+
+def _on_base(data: LocalResponse, fit: ModalFit, base: str) -> ModalFit:
+    """The same modes on another base."""
+    modes = fit.vector[fit._before :]
+    vector = np.r_[fit.vector[0], _first_brake(base, data, fit.period), modes]
+    return _solved(data, base, fit.period, vector, fit.damping, fit.coupled)
+
+
+def _first_brake(base: str, data: LocalResponse, period: float) -> list[float]:
+    return [float(np.log(data.theta.min() / period))] if base == "free, braked" else []
+
+
+def _with_mode(data: LocalResponse, fit: ModalFit) -> ModalFit:
+    """One more mode, where it lowers the sum of squares most."""
+    columns = data.apply(fit.columns(fit.vector, data.theta))
+    q, _ = np.linalg.qr(columns)
+    rest = data.target - q @ (q.T @ data.target)
+    f = np.unique(data.theta)
+    f = f[np.unique(np.linspace(0, len(f) - 1, POINTS).astype(int))]
+    choices = [(np.log(t / fit.period), np.log(zeta)) for t in f for zeta in RATIOS]
+    pairs = [(float(np.exp(zeta + w)), float(np.exp(2.0 * w))) for w, zeta in choices]
+    rows = data.apply(_rows(pairs, fit.period, float(fit.vector[0]), data.theta))
+    rows -= q @ (q.T @ rows)
+    size = np.sum(rows**2, axis=0)
+    gain = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
+    return _solved(data, fit.base, fit.period, np.r_[fit.vector, choices[int(np.argmax(gain))]], fit.damping)
+
+
+def _solved(
+    data: LocalResponse,
+    base: str,
+    period: float,
+    vector: Floats,
+    damping: Damping = "viscous",
+    coupled: bool = False,
+) -> ModalFit:
+    """The residues that fit best."""
+    columns = data.apply(_columns(base, damping, period, vector, data.theta, coupled))
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    residues = np.linalg.lstsq(columns / size, data.target, rcond=None)[0] / size
+    chi_squared = float(np.sum((data.target - columns @ residues) ** 2))
+    return ModalFit(base, damping, period, vector, residues, chi_squared, len(data.target), coupled)
+
+
+def _residuals(data: LocalResponse, fit: ModalFit, vector: Floats) -> Floats:
+    """What is left when the residues are chosen best, for each choice of poles and delay (variable projection;
+    Golub and Pereyra 1973)."""
+    columns = data.apply(fit.columns(vector, data.theta))
+    q, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+    return np.asarray(data.target - q @ (q.T @ data.target))
+
+
+def _limits(fit: ModalFit, data: LocalResponse) -> tuple[Floats, Floats]:
+    T = fit.period
+    slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log(1.2 * np.pi / T)
+    braked = fit.base == "free, braked"
+    low = [LEAST_DELAY, *([np.log(1e-3 * data.theta.min() / T)] * braked)]
+    high = [MOST_DELAY, *([np.log(10.0 / T)] * braked)]
+    low += [slowest, np.log(LEAST_RATIO)] * fit.count
+    high += [fastest, np.log(MOST_RATIO)] * fit.count
+    return np.array(low), np.array(high)
+
+
+def _refined(data: LocalResponse, fit: ModalFit) -> ModalFit:
+    from scipy.optimize import least_squares
+
+    low, high = _limits(fit, data)
+    start = np.clip(fit.vector, low + 1e-9, high - 1e-9)
+    solved = least_squares(
+        lambda x: _residuals(data, fit, x),
+        start,
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=1e-5,
+        xtol=1e-7,
+        max_nfev=40,
+    )
+    return _solved(data, fit.base, fit.period, np.asarray(solved.x), fit.damping, fit.coupled)
+
+
+def modal_intervals(data: LocalResponse, fit: ModalFit) -> tuple[Fit, Floats]:
+    """Intervals of delay, frequencies and ratios by the profile likelihood, and standard deviations of the
+    residues by the curvature."""
+    low, high = _limits(fit, data)
+    start = np.clip(fit.vector, low + 1e-9, high - 1e-9)
+    rows = len(data.target)
+    profiled = fit_least_squares(
+        lambda x: _residuals(data, fit, x),
+        start,
+        lower=low,
+        upper=high,
+        profiled=fit.count <= PROFILED,
+        effective_count=rows * (rows - len(fit.residues)) / rows,
+    )
+    step = 1e-6
+    base = fit.columns(profiled.values, data.theta)
+    sides = list[Floats]()
+    for i in range(len(start)):
+        moved = profiled.values.copy()
+        moved[i] += step
+        other = fit.columns(moved, data.theta)
+        sides.append(data.apply((other - base) @ fit.residues) / step)
+    jacobian = np.column_stack([*sides, data.apply(base)])
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    inverse = np.linalg.pinv((jacobian / size).T @ (jacobian / size)) / np.outer(size, size)
+    return profiled, profiled.scale * np.sqrt(np.maximum(np.diag(inverse)[len(start) :], 0.0))
+
+
+def against_hysteresis(data: LocalResponse, fit: ModalFit) -> ModalFit:
+    """The same modes with loss factors in place of dampers: the criteria of both tell which explains the response
+    better. Modes that stood for what dampers do not explain fall away."""
+    return _pruned(data, _refined(data, _solved(data, fit.base, fit.period, fit.vector, "hysteretic")))
+
+
+# --- columns ----------------------------------------------------------------------------------------------------
+
+
+def _columns(
+    base: str, damping: Damping, period: float, vector: Floats, theta: Floats, coupled: bool = False
+) -> Complexes:
+    """Responses (n, c) of unit residue: of the base, of each mode, of all faster ones, and, where dampers couple
+    the modes, of each mode's velocity over w."""
+    before = 2 if base == "free, braked" else 1
+    delay = float(vector[0])
+    columns = list[Complexes]()
+    if base == "free":
+        columns.append(_row(0.0, 0.0, period, delay, theta))
+    elif base == "free, braked":
+        columns.append(_row(0.5 * float(np.exp(vector[1])), 0.0, period, delay, theta))
+    rates, ratios = np.exp(vector[before::2]), np.exp(vector[before + 1 :: 2])
+    modes = list(zip(rates.tolist(), ratios.tolist(), strict=True))
+    for w, zeta in modes:
+        columns.append(_row(zeta * w, w**2, period, delay, theta))
+    if damping == "hysteretic" and modes:
+        aliased = _aliased_hold(period, delay, theta)
+        for k, (w, zeta) in enumerate(modes, len(columns) - len(modes)):
+            columns[k] = columns[k] + _added_by_loss(w, zeta, aliased)
+    fast = FASTEST * np.pi / period
+    columns.append(_row(fast, fast**2, period, delay, theta))
+    if coupled:
+        for w, zeta in modes:
+            columns.append(_row(zeta * w, w**2, period, delay, theta, 1.0 / w))
+    return np.column_stack(columns)
+
+
+def _row(
+    decay: float, squared: float, period: float, delay: float, theta: Floats, velocity: float = 0.0
+) -> Complexes:
+    """Held response (n,) of 1/(s^2 + 2 a s + w^2) behind a delay in samples; or of its velocity times a factor."""
+    return _rows([(decay, squared)], period, delay, theta, velocity)[:, 0]
+
+
+def _rows(
+    pairs: Sequence[tuple[float, float]], period: float, delay: float, theta: Floats, velocity: float = 0.0
+) -> Complexes:
+    """Held responses (n, c) of pairs of a and w^2 behind a delay, as `loop.factor_response` has them."""
+    whole, fraction = split_delay(delay)
+    d = (2j * np.sin(0.5 * theta) * np.exp(0.5j * theta))[:, None]
+    z = 1.0 + d
+    share = (0.0, velocity) if velocity else (1.0, 0.0)
+    rows = [held_row(a, w2, *share, period, fraction) for a, w2 in pairs]
+    d1, d0, _, n1, n0, _, o1, o0 = np.array(rows).T
+    top = n1 * d + n0
+    if fraction > 0.0:
+        top = top + (o1 * d + o0) / z
+    return np.asarray(top / ((d + d1) * d + d0) / z**whole)
+
+
+def _aliased_hold(period: float, delay: float, theta: Floats) -> tuple[Floats, Complexes]:
+    """Rates (n, k) that sampling folds onto angles (n,), and the held and delayed response of 1 at each of them,
+    over the period."""
+    w = (theta[:, None] + 2.0 * np.pi * np.arange(-ALIASES, ALIASES + 1)) / period
+    hold = np.exp(-1j * w * delay * period) * -np.expm1(-1j * theta)[:, None] / (1j * w * period)
+    return w, np.asarray(hold)
+
+
+def _added_by_loss(rate: float, ratio: float, aliased: tuple[Floats, Complexes]) -> Complexes:
+    """What a mode with a loss factor has more than one with a damper (n,): 1/(S + i a) - 1/(S + i b), where
+    S = w_0^2 - w^2, a = sign(w) 2 zeta w_0^2, b = 2 zeta w_0 w."""
+    w, hold = aliased
+    stiff, loss = rate**2 - w**2, 2.0 * ratio * rate
+    a, b = np.sign(w) * loss * rate, loss * w
+    return np.asarray(np.sum(1j * (b - a) * hold / ((stiff + 1j * a) * (stiff + 1j * b)), axis=1))

@@ -1,0 +1,179 @@
+"""Masses, springs, dampers and delays of a device, fitted to a response through the device's own sampled loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.modes.local_response import LocalResponse
+from zwidth.identify.modes.modal_fit import ModalFit
+from zwidth.identify.modes.model import SampledModel
+from zwidth.identify.profile_likelihood import Fit, Residuals, fit_least_squares
+from zwidth.model.modes import undamped_modes
+
+Floats = NDArray[np.float64]
+
+HOPELESS: Final = 100.0  # times the number of residuals: where no modes explain them, no start does
+SPREAD: Final = np.log(6.0)  # about the file's numbers, within which a start is looked for
+TRIED, REFINED = 96, 3  # starts that are compared, and refined
+POINTS: Final = 30  # frequencies by which they are compared
+GOOD, ENOUGH = 1.05, 25.0  # times the sum of squares of the modes alone, or so much more: a fit has arrived
+FAR: Final = np.log(1e4)  # beyond which no number is looked for
+ABOUT: Final = (0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of a mode's frequency, where starts are compared, too
+HEAVY: Final = 10.0  # weight of a mode's frequency beside that of a point of the response
+LOST_START: Final = 50.0
+LOST: Final = 1e6  # residual where there is no such device
+SPRINGS: Final = ("N/m", "N m/rad")
+DAMPERS: Final = ("N s/m", "N m s/rad")
+
+
+@dataclass(frozen=True)
+class PhysicalFit:
+    """Numbers of a device that make a response.
+
+    values, low, high  (p,) with their intervals; 0 and inf for ends without bound
+    fit                of what the optimiser varied
+    chi_squared        of the residuals, which have unit variance where the model is right
+    rows               number of them
+    """
+
+    values: Floats
+    low: Floats
+    high: Floats
+    fit: Fit
+    chi_squared: float
+    rows: int
+
+    @property
+    def misfit(self) -> float:
+        """By how much the residuals are larger than the noise; 1 where the model explains all."""
+        return float(np.sqrt(self.chi_squared / max(self.rows - len(self.values), 1)))
+
+
+def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period: float) -> PhysicalFit:
+    """The numbers that explain the response best, each with its interval by the profile likelihood.
+
+    From the file's numbers first. Where that does not end at what the modes alone explain, from many others about
+    them within a factor of six, chosen by the logarithm of the response, in which a wrong frequency still pulls.
+    """
+    rows = len(data.target)
+
+    def residuals(x: Floats) -> Floats:
+        P = model.response(x, data.theta)
+        return data.residuals(P) if np.isfinite(P).all() else np.full(rows, LOST)
+
+    low, high = _limits(model, period)
+    start = np.clip(model.vector(np.maximum(model.start, 1e-300)), low, high)
+    timed = [i for i, one in enumerate(model.quantities) if not one.positive and one.unit == "s"]
+    if timed and modal.count:
+        start[timed[0]] = np.clip(modal.delay, 0.0, high[timed[0]])
+    good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
+    best = _descended(residuals, start, low, high)
+    if best[1] > good and modal.chi_squared < HOPELESS * rows:
+        for x in _starts(data, model, modal, start, low, high, period):
+            other = _descended(residuals, x, low, high)
+            best = other if other[1] < best[1] else best
+            if best[1] <= good:
+                break
+    best = _unfolded(residuals, model, best, low, high, period)
+    fit = fit_least_squares(residuals, best[0], lower=low, upper=high)
+    return PhysicalFit(
+        model.values(fit.values),
+        model.values(fit.low),
+        model.values(fit.high),
+        fit,
+        fit.sum_of_squares,
+        rows,
+    )
+
+
+def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
+    low, high = np.empty((2, len(model.quantities)))
+    for i, one in enumerate(model.quantities):
+        if one.positive:
+            low[i], high[i] = np.log(one.start) - FAR, np.log(one.start) + FAR
+        else:
+            low[i], high[i] = 0.0, max(20.0 * period, 4.0 * one.start) if one.unit == "s" else np.inf
+    return low, high
+
+
+def _descended(residuals: Residuals, x: Floats, low: Floats, high: Floats) -> tuple[Floats, float]:
+    """Parameters near x with a small sum of squares, and that sum."""
+    from scipy.optimize import least_squares
+
+    solved = least_squares(residuals, x, bounds=(low, high), x_scale="jac", ftol=1e-6, xtol=1e-7, max_nfev=40)
+    return np.asarray(solved.x), 2.0 * float(solved.cost)
+
+
+def _rates(model: SampledModel, x: Floats) -> Floats:
+    """Natural frequencies of the flexible modes [rad/s], ascending; () where there is no such device."""
+    try:
+        plant = model.loop_of(model.values(x)).plant
+    except ValueError:
+        return np.zeros(0)
+    squared = undamped_modes(plant.mass, plant.stiffness)[0]
+    return np.sqrt(squared[squared > 0.0])
+
+
+def _unfolded(
+    residuals: Residuals,
+    model: SampledModel,
+    best: tuple[Floats, float],
+    low: Floats,
+    high: Floats,
+    period: float,
+) -> tuple[Floats, float]:
+    """The better of a fit and those with a mode on the other side of half the sampling rate, which sampling makes
+    look much alike: springs and dampers that put it there are tried."""
+    springs = np.array([one.unit in SPRINGS for one in model.quantities])
+    dampers = np.array([one.unit in DAMPERS for one in model.quantities])
+    rates = _rates(model, best[0])
+    for rate in rates[(rates > 0.5 * np.pi / period) & (rates < 1.5 * np.pi / period)]:
+        factor = (2.0 * np.pi / period - rate) / rate
+        x = np.clip(best[0] + 2.0 * np.log(factor) * springs + np.log(factor) * dampers, low, high)
+        other = _descended(residuals, x, low, high)
+        best = other if other[1] < best[1] else best
+    return best
+
+
+def _starts(
+    data: LocalResponse,
+    model: SampledModel,
+    modal: ModalFit,
+    start: Floats,
+    low: Floats,
+    high: Floats,
+    period: float,
+) -> list[Floats]:
+    """Starts about the file's numbers, refined on the logarithm of the response, best first."""
+    from scipy.optimize import least_squares
+    from scipy.stats import qmc
+
+    peaks = modal.rates[:, None] * period * np.array(ABOUT)
+    theta = np.sort(np.append(np.geomspace(data.theta.min(), 0.99 * data.theta.max(), POINTS), peaks.ravel()))
+    theta = theta[theta < 0.999 * np.pi]
+    wanted, rates = modal.response(theta), modal.clear_rates
+
+    def off(x: Floats) -> Floats:
+        P = model.response(x, theta)
+        if not np.isfinite(P).all() or np.any(P == 0.0):
+            return np.full(2 * len(theta) + len(rates), LOST_START)
+        ratio = np.log(wanted / P)
+        own = _rates(model, x)[: len(rates)]
+        apart = np.zeros(len(rates))
+        apart[: len(own)] = HEAVY * np.log(own / rates[: len(own)])
+        return np.concatenate([ratio.real, ratio.imag, apart])
+
+    positive = np.array([one.positive for one in model.quantities])
+    cube = qmc.Sobol(len(start), scramble=False).random(128)[1 : TRIED + 1]
+    tried = np.where(positive, start + SPREAD * (2.0 * cube - 1.0), np.minimum(start, high))
+    tried = np.clip(np.vstack([start, tried]), low + 1e-12, high)
+    costs = np.array([np.sum(off(x) ** 2) for x in tried])
+    refined = list[tuple[float, Floats]]()
+    for i in np.argsort(costs)[:REFINED]:
+        solved = least_squares(off, tried[i], bounds=(low, high), loss="soft_l1", max_nfev=40)
+        refined.append((float(solved.cost), np.asarray(solved.x)))
+    return [x for _, x in sorted(refined, key=lambda one: one[0])]

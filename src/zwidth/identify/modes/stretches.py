@@ -1,0 +1,200 @@
+"""The stretches of records of which modes are identified, and what their columns are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import Sampling
+from zwidth.loop.operating_point import OperatingPoint
+
+Floats = NDArray[np.float64]
+
+BLOCK: Final = 1 << 20  # samples that are transformed at once
+KEPT: Final = 1 << 21  # samples of all records that are kept in memory; longer ones are read again
+SHORTEST: Final = 256  # samples of a stretch that is used
+LARGEST: Final = 1 << 16  # different values among which a step is looked for
+
+
+class Stretch(NamedTuple):
+    """Samples without a gap: command, position, reference and measured force (n,), None where there is none."""
+
+    force: Floats
+    position: Floats
+    reference: Floats | None
+    measured: Floats | None
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Names of the columns: what was commanded, what was read, and what stands beside them; "" for none."""
+
+    force: str
+    position: str
+    reference: str
+    measured: str
+
+    @property
+    def turns(self) -> bool:
+        """Whether they are torque and angle."""
+        return self.force.endswith("_Nm")
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Column -> field of a `Stretch`."""
+        every = {"force": self.force, "position": self.position}
+        every |= {"reference": self.reference, "measured": self.measured}
+        return {field_: name for field_, name in every.items() if name}
+
+
+def channels_of(device: Device, point: OperatingPoint, record: Record) -> Channels:
+    """The columns of a record. Raises DeviceError where they do not go together, or with the device."""
+    force = "force_N" if "force_N" in record else "torque_Nm"
+    position = "position_m" if "position_m" in record else "angle_rad"
+    if (force == "torque_Nm") != (position == "angle_rad"):
+        raise record.fault(f"has {force} and {position}; force_N goes with position_m, torque_Nm with angle_rad")
+    unit = force.partition("_")[2]
+    for name in ("reference_N", "reference_Nm", "command_N", "command_Nm"):
+        if name in record and name.partition("_")[2] != unit:
+            raise record.fault(f"has {name} beside {force}; give both in {unit}")
+    if point.given_plant is None and (force == "torque_Nm") != point.turns:
+        rendered = "a moment about an axis" if point.turns else "a force along a direction"
+        fits = "torque_Nm and angle_rad" if point.turns else "force_N and position_m"
+        raise record.fault(f"has {force}, but the device renders {rendered}; give {fits} of the rendered motion")
+    command = f"command_{unit}"
+    measured = force if command in record else ""
+    reference = f"reference_{unit}" if f"reference_{unit}" in record else ""
+    return Channels(command if measured else force, position, reference, measured)
+
+
+@dataclass
+class Source:
+    """A record's stretches, again and again: from memory where they are few, else from the file."""
+
+    record: Record
+    sampling: Sampling
+    channels: Channels
+    kept: list[Stretch] | None = field(default=None, repr=False)
+
+    def stretches(self) -> Iterator[Stretch]:
+        """Stretches of at most `BLOCK` samples, none across a gap, the shortest left out."""
+        yield from self._read() if self.kept is None else self.kept
+
+    def keep(self) -> None:
+        """Hold the stretches in memory."""
+        self.kept = list(self._read())
+
+    def first(self) -> Stretch | None:
+        """The first stretch; None where all are too short."""
+        return next(self.stretches(), None)
+
+    def _read(self) -> Iterator[Stretch]:
+        held, after = dict[str, Floats](), -1
+        for piece in self.sampling.stretches(self.record):
+            numbers = piece["sample"]
+            if not len(numbers):
+                continue
+            part = {field_: piece[name] for field_, name in self.channels.names.items()}
+            if held and int(numbers[0]) == after:
+                part = {name: np.concatenate([held[name], values]) for name, values in part.items()}
+            elif held:
+                yield from _stretch(held)
+            while len(part["force"]) >= BLOCK:
+                yield from _stretch({name: values[:BLOCK] for name, values in part.items()})
+                part = {name: values[BLOCK:] for name, values in part.items()}
+            held, after = part, int(numbers[-1]) + 1
+        if held:
+            yield from _stretch(held)
+
+
+def _stretch(columns: dict[str, Floats]) -> Iterator[Stretch]:
+    """The stretch of these columns, if it is not too short."""
+    force, position = columns["force"], columns["position"]
+    if len(force) >= SHORTEST:
+        yield Stretch(force, position, columns.get("reference"), columns.get("measured"))
+
+
+@dataclass
+class Levels:
+    """Running sums of the values in a record's columns.
+
+    count            samples
+    low, high, mean, square   of force and position: (2,) each, `mean` and `square` as sums about the first sample
+    at_limit         samples at the largest or the least force
+    longest          stretch of samples [samples]
+    step             least step between two positions; inf for none
+    """
+
+    count: int = 0
+    low: Floats = field(default_factory=lambda: np.full(2, np.inf))
+    high: Floats = field(default_factory=lambda: np.full(2, -np.inf))
+    origin: Floats | None = None
+    total: Floats = field(default_factory=lambda: np.zeros(2))
+    square: Floats = field(default_factory=lambda: np.zeros(2))
+    at_limit: int = 0
+    longest: int = 0
+    step: float = np.inf
+    drift: float = 0.0
+
+    def add(self, stretch: Stretch) -> None:
+        """Count a stretch."""
+        both = np.array([stretch.force, stretch.position])
+        if self.origin is None:
+            self.origin = both[:, 0].copy()
+        low, high = both.min(axis=1), both.max(axis=1)
+        if low[0] < self.low[0] or high[0] > self.high[0]:
+            self.at_limit = 0
+        self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
+        self.at_limit += int(np.count_nonzero((both[0] == self.low[0]) | (both[0] == self.high[0])))
+        about = both - self.origin[:, None]
+        self.total += about.sum(axis=1)
+        self.square += (about**2).sum(axis=1)
+        self.count += both.shape[1]
+        self.longest = max(self.longest, both.shape[1])
+        steps = np.abs(np.diff(stretch.position[:LARGEST]))
+        self.step = min(self.step, float(np.min(steps, where=steps > 0.0, initial=np.inf)))
+        t = np.linspace(-1.0, 1.0, both.shape[1])
+        slope = 3.0 * float(np.mean(t * (stretch.position - stretch.position[0])))
+        self.drift = max(self.drift, 2.0 * abs(slope))
+
+    @property
+    def deviation(self) -> Floats:
+        """Standard deviation of force and position (2,)."""
+        mean = self.total / max(self.count, 1)
+        return np.sqrt(np.maximum(self.square / max(self.count, 1) - mean**2, 0.0))
+
+    @property
+    def span(self) -> Floats:
+        """Largest less least force and position (2,)."""
+        return self.high - self.low
+
+
+def quantum(stretches: Sequence[Stretch]) -> float:
+    """The step of the encoder as the positions show it; 0 where they show none.
+
+    All differences must be whole multiples of the least one.
+    """
+    steps = (
+        np.concatenate([np.diff(one.position[:LARGEST]) for one in stretches[:2]]) if stretches else np.zeros(0)
+    )
+    size = np.abs(steps[steps != 0.0])
+    if not len(size):
+        return 0.0
+    scale = float(np.max([np.max(np.abs(one.position)) for one in stretches[:2]]))
+    least = float(np.min(size))
+    if least < 1e-11 * scale:
+        size = size[size > 1e-9 * scale]
+        if not len(size):
+            return 0.0
+        least = float(np.min(size))
+    least = float(np.mean(size[size < 1.5 * least]))
+    share = size / least
+    whole = np.abs(share - np.rint(share)) < 0.02 * np.maximum(1.0, share / 20.0)
+    few = len(np.unique(np.rint(share))) < 0.5 * len(size)  # of a fine noise all differences are unlike
+    return least if np.mean(whole) > 0.98 and np.mean(share < 40.0) > 0.02 and few else 0.0

@@ -1,0 +1,1 @@
+"""Records of a bench: columns, reading in pieces, sampling, averages."""

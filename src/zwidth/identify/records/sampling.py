@@ -1,0 +1,162 @@
+"""When the samples of a record were taken: their period, jitter and gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.faults import plural
+from zwidth.identify.identification import Check
+from zwidth.identify.records.record import Piece, Record
+
+UNEVEN: Final = 0.2  # share of the period by which a step may be longer or shorter
+MOST_UNEVEN: Final = 0.01  # share of the steps that may be so
+FIRST: Final = 20_000  # rows from which the period is read at first
+FEWEST: Final = 100  # rows of a record
+ROUNDING: Final = 1e-8  # share of the period by which steps differ as numbers are rounded
+SAME_PERIOD: Final = 1e-3  # relative, by which the record's period may differ from the computer's
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """A record's time stamps, column time_s.
+
+    period   mean step where no sample is missing [s]
+    jitter   standard deviation of such a step [s]
+    rows     number of rows
+    missing  samples that are not there, and rows with a cell without a number
+    runs     (r, 2) first row, and the one behind the last, of each stretch without a gap
+    """
+
+    period: float
+    jitter: float
+    rows: int
+    missing: int
+    runs: NDArray[np.int64]
+
+    @property
+    def longest(self) -> int:
+        """Samples in the longest stretch without a gap."""
+        return int(np.max(np.diff(self.runs, axis=1), initial=0))
+
+    def stretches(self, record: Record) -> Iterator[Piece]:
+        """The record's pieces, cut at the gaps, with two further columns.
+
+        row     of each sample in the record
+        sample  its number, which leaves out one at each gap: a piece goes on where the one before has ended only
+                if its numbers do, also where rows are not there
+        """
+        start = 0
+        for piece in record.pieces():
+            rows = len(piece["time_s"])
+            first = int(np.searchsorted(self.runs[:, 1], start, side="right"))
+            for run, (low, high) in enumerate(self.runs[first:], first):
+                if low >= start + rows:
+                    break
+                inside = slice(max(low - start, 0), min(high - start, rows))
+                cut = {name: values[inside] for name, values in piece.items()}
+                row = np.arange(start + inside.start, start + inside.stop)
+                yield cut | {"row": row, "sample": row + run}
+            start += rows
+
+
+def check_sampling(record: Record, period: float | None = None) -> tuple[Sampling | None, Check]:
+    """The sampling of a record with a column time_s, and the check that it is regular.
+
+    period   of the computer that is to have written the record [s]; None: any
+    Returns  None for the sampling where there is none: fewer than 100 rows, a time that falls or stands still, or
+             steps of which more than 1 % are off by a fifth
+    Raises   DeviceError  for cells that are no numbers
+    """
+
+    def failed(reason: str) -> tuple[None, Check]:
+        return None, Check("sampling", False, reason)
+
+    pieces = record.pieces()
+    first = next(pieces, None)
+    if first is None or len(first["time_s"]) < FEWEST:
+        rows = 0 if first is None else len(first["time_s"])
+        return failed(f"{plural(rows, 'row')} in {record.label}, at least {FEWEST} are needed; record longer")
+    usual = _usual_step(first["time_s"][:FIRST])
+    if not usual > 0.0:
+        return failed(f"time_s of {record.label} falls or stands still; sort the rows by rising time")
+    row, missing, uneven, sums, runs = 0, 0, 0, np.zeros(3), list[NDArray[np.int64]]()
+    last, last_whole, first_uneven = np.nan, False, -1
+    for piece in chain([first], pieces):
+        time = np.append(last, piece["time_s"])
+        whole = np.all([np.isfinite(v) for name, v in piece.items() if name not in record.text], axis=0)
+        steps = np.diff(time) / usual
+        falling = np.flatnonzero(steps <= 0.0)
+        if len(falling):
+            i = int(falling[0])
+            return failed(
+                f"time_s of {record.label} goes from {time[i]:.9g} to {time[i + 1]:.9g} s at "
+                f"{record.place(row + i)}; sort the rows by rising time"
+            )
+        many = np.rint(np.where(np.isfinite(steps), steps, 1.0))
+        off = np.flatnonzero(np.isfinite(steps) & (np.abs(steps - many) > UNEVEN) | (many < 1.0))
+        uneven += len(off)
+        first_uneven = row + int(off[0]) if len(off) and first_uneven < 0 else first_uneven
+        missing += int(np.sum(many - 1.0) + np.sum(~whole))
+        even = steps[np.isfinite(steps) & (many == 1.0)]
+        sums += len(even), np.sum(even - 1.0), np.sum((even - 1.0) ** 2)
+        before = np.append(last_whole, whole[:-1])
+        runs.append(row + np.flatnonzero(whole & ~(before & (many == 1.0))))
+        runs.append(row + np.flatnonzero(before & ~(whole & (many == 1.0))))
+        last, last_whole, row = float(piece["time_s"][-1]), bool(whole[-1]), row + len(whole)
+    edges = np.sort(np.concatenate([*runs, [row] if last_whole else []]).astype(np.int64))
+    if uneven > MOST_UNEVEN * row:
+        return failed(
+            f"{uneven} of {row} rows of {record.label} do not follow the one before by {usual:.6g} s or a "
+            f"multiple of it, first at {record.place(first_uneven)}; record every sample of the loop, with "
+            "its own time"
+        )
+    count, mean = max(sums[0], 1.0), sums[1] / max(sums[0], 1.0)
+    jitter = usual * float(np.sqrt(max(sums[2] / count - mean**2, 0.0)))
+    sampling = Sampling(usual * float(1.0 + mean), jitter, row, missing, edges.reshape(-1, 2))
+    if period is not None and abs(sampling.period / period - 1.0) > SAME_PERIOD:
+        return failed(
+            f"the rows of {record.label} come every {sampling.period:.6g} s, the device's computer samples every "
+            f"{period:.6g} s; "
+            + (
+                unit_of_time(sampling.period / period)
+                or "record every sample of the loop, or correct loop.sampling_period_s"
+            )
+        )
+    return sampling, Check("sampling", True, _sentence(sampling))
+
+
+def unit_of_time(ratio: float) -> str:
+    """The question whether time_s is in another unit, by the ratio of its period to the computer's; "" where none.
+
+    >>> unit_of_time(900.0)
+    'is time_s in milliseconds? multiply by 0.001'
+    """
+    for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6)):
+        if 0.5 < ratio / factor < 2.0:
+            return f"is time_s in {unit}? multiply by {1.0 / factor:g}"
+    return ""
+
+
+def _usual_step(time: NDArray[np.float64]) -> float:
+    """The mean of the steps that are like the median one [s]: the period to the stamps' last digit."""
+    steps = np.diff(time[np.isfinite(time)])
+    middle = float(np.median(steps)) if len(steps) else 0.0
+    alike = steps[np.abs(steps - middle) <= 0.5 * abs(middle)]
+    return float(np.mean(alike)) if middle > 0.0 else middle
+
+
+def _sentence(sampling: Sampling) -> str:
+    gaps = len(sampling.runs) - 1
+    lost = f", {plural(sampling.missing, 'sample')} missing in {plural(gaps, 'gap')}" if sampling.missing else ""
+    jitter = (
+        f", steps even to {100 * sampling.jitter / sampling.period:.2g} %"
+        if sampling.jitter > ROUNDING * sampling.period
+        else ""
+    )
+    return f"{sampling.rows} rows every {sampling.period:.6g} s{jitter}{lost}"

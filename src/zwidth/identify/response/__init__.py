@@ -1,0 +1,1 @@
+"""A frequency response from raw sweeps."""

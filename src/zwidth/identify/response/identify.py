@@ -1,0 +1,257 @@
+"""From raw sweeps of a device to its response, as a [response] reads it, with the chart that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.measured.chart import MeasuredChart, measured_chart
+from zwidth.device.device import Device
+from zwidth.device.faults import plural
+from zwidth.identify.identification import Check, Estimate, Identification, refused
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import check_sampling
+from zwidth.identify.response.checks import check_prediction, check_responses
+from zwidth.identify.response.sweep_blocks import SweepBlocks, SweepRange
+from zwidth.loop.controller import Controller
+from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
+from zwidth.model.sweep_response import block_length, sweep_response_of_blocks
+from zwidth.progress import Progress
+
+Floats = NDArray[np.float64]
+
+FORCES: Final = ("force_command_N", "force_N")
+COLUMNS: Final = Columns(("time_s", FORCES, "position_m"))
+
+KIND: Final = "response"
+FIT_SHARE: Final = 2.0 / 3.0  # of each record, its beginning; the rest is predicted
+FEWEST_COUNTS: Final = 10.0  # of the motion
+LIMITED: Final = 0.05  # share of the samples at the largest and the smallest force, from which on it was clipped
+FIRST_LEVELS: Final = 100_000  # samples among which the force's levels are counted
+FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
+FEWEST_USABLE: Final = 0.2  # share of the frequencies
+
+
+def identify_response(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    integrators: int | None = None,
+    segment: int | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """The response of a device from raw sweeps: force command sample to encoder sample, with coherence.
+
+    records      every sample of the loop; each is a sweep of its own, and several are repetitions
+    integrators  poles at z = 1: 0, 1 or 2; None: read off the response
+    segment      samples whose transform resolves what must be told apart, see `sweep_response`; None: by itself
+    Returns      `curves` are the columns of a file that a [response] reads; the number is the largest stiffness,
+                 its interval from what is stable beyond doubt to what may be
+    Raises       DeviceError  for records that cannot be read
+    """
+    period = device.controller.sampling_period
+    checks, sweeps = list[Check](), list[SweepBlocks]()
+    for record in records:
+        sampling, check = check_sampling(record, period)
+        checks.append(replace(check, what=_named("sampling", record, records)))
+        if sampling is None:
+            continue
+        name = next(one for one in FORCES if one in record)
+        sweep = SweepBlocks.longest(record, sampling, name, "position_m")
+        checks.append(replace(_gaps(len(sweep), sampling.rows), what=_named("gaps", record, records)))
+        checks += [replace(one, what=_named(one.what, record, records)) for one in _check_sweep(sweep)]
+        sweeps.append(sweep)
+    if (nothing := refused(KIND, device.label, checks)) is not None:
+        return nothing
+    count = min(len(sweep) for sweep in sweeps)
+    fitted = int(FIT_SHARE * count)
+    length = block_length(fitted, segment)
+    try:
+        responses = [
+            sweep_response_of_blocks(
+                _reported(sweep.part(0, fitted), length, f"sweep {n + 1}", progress), period, integrators, segment
+            )
+            for n, sweep in enumerate(sweeps)
+        ]
+    except ResponseError as error:
+        checks.append(Check("response", False, f"{records[0].label} {error}"))
+        return Identification(KIND, device.label, tuple(checks))
+    response = _together(responses)
+    checks.append(_usable(response))
+    columns = next(one for one in FORCES if one in records[0]), "position_m"
+    if checks[-1].passed:
+        checks += check_responses(device, responses, [record.label for record in records], columns)
+        shares = [_share_explained(response, sweep.part(fitted, len(sweep)), length, period) for sweep in sweeps]
+        checks += check_prediction(min(shares))
+    if (nothing := refused(KIND, device.label, checks)) is not None:
+        return nothing
+    chart, why = _chart(response, device.controller)
+    checks.append(Check("chart", chart is not None, why))
+    if chart is None:
+        return Identification(KIND, device.label, tuple(checks), curves=_columns(responses))
+    return Identification(
+        KIND,
+        device.label,
+        tuple(checks),
+        (_largest_stiffness(chart),),
+        float(np.min(shares)),
+        f"the motion in the last third of {'each of the ' if len(sweeps) > 1 else 'the '}"
+        f"{plural(len(sweeps), 'sweep') if len(sweeps) > 1 else 'sweep'}, at the frequencies that can be relied "
+        "on",
+        tuple(_remarks(chart, device, response)),
+        _columns(responses),
+        {"averages": response.averages, "integrators": chart.integrators, "measurement": response.note},
+    )
+
+
+def _named(what: str, record: Record, records: Sequence[Record]) -> str:
+    return what if len(records) == 1 else f"{record.label}: {what}"
+
+
+def _reported(
+    sweep: SweepBlocks, length: int, name: str, progress: Progress | None
+) -> Iterator[tuple[Floats, Floats]]:
+    """The blocks of a sweep, with progress."""
+    for number, block in enumerate(sweep.blocks(length)):
+        if progress is not None:
+            progress(f"transforming {name}", number, len(sweep) // length)
+        yield block
+
+
+def _gaps(kept: int, rows: int) -> Check:
+    """Whether the longest stretch without a gap is most of the record."""
+    said = (
+        "no sample is missing"
+        if kept == rows
+        else f"the longest stretch without a gap is used, {kept} of {rows} rows"
+    )
+    enough = kept >= 0.5 * rows
+    return Check("gaps", enough, said if enough else f"{said}; record without gaps")
+
+
+def _check_sweep(sweep: SweepBlocks) -> list[Check]:
+    """Is something excited, does it move, and is the force free to take its values?"""
+    if not len(sweep):
+        return []
+    seen = SweepRange.of(sweep, FIRST_LEVELS)
+    (least, most), (lowest, highest) = seen.force, seen.position
+    if least == most:
+        return [Check("excitation", False, f"the force is {least:g} N all the time; excite the device")]
+    if lowest == highest:
+        return [Check("motion", False, f"the position is {lowest:g} m all the time; is the encoder read?")]
+    checks = [Check("excitation", True, f"the force runs from {least:.4g} to {most:.4g} N")]
+    counts = (highest - lowest) / seen.step if seen.step else np.inf
+    said = f"the position runs over {highest - lowest:.4g} m" + (f", {counts:.4g} counts" if seen.step else "")
+    moved = counts >= FEWEST_COUNTS
+    checks.append(
+        Check("motion", moved, said if moved else f"{said}; at least {FEWEST_COUNTS:g} are needed, push more")
+    )
+    limited = max(seen.at_largest, seen.at_smallest) / len(sweep)
+    clipped = seen.levels > FEW_LEVELS and limited > LIMITED
+    said = f"{100 * limited:.2g} % of the samples are at the largest or smallest force"
+    reason = f"{said}: clipped? excite less, a command that was not followed is no input" if clipped else said
+    return [*checks, Check("saturation", not clipped, reason)]
+
+
+def _together(responses: Sequence[Response]) -> Response:
+    """Repeated sweeps as one response: their mean, each beside it."""
+    if len(responses) == 1:
+        return responses[0]
+    whole = mean_path([MeasuredPath(one.value, one.coherence) for one in responses])
+    return replace(responses[0], value=whole.value, coherence=whole.coherence, sweeps=whole.sweeps)
+
+
+def _usable(response: Response) -> Check:
+    """From where to where the response can be relied on."""
+    assert response.coherence is not None
+    good = response.coherence >= LEAST_COHERENCE
+    share = float(np.mean(good))
+    if share < FEWEST_USABLE:
+        return Check(
+            "coherence",
+            False,
+            f"only {100 * share:.2g} % of the frequencies are coherent: the position hardly answers the force; "
+            "are columns "
+            "of two records mixed, or is the force too small?",
+        )
+    f = response.frequency[good]
+    text = f"coherent from {f[0]:.4g} to {f[-1]:.4g} Hz, at {100 * share:.3g} % of the frequencies"
+    return Check("coherence", True, text)
+
+
+def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | None, str]:
+    """The chart of the response, which holds the hardware's delay and lag already; None and why there is none."""
+    computer = replace(controller, delay=0.0, actuator_time_constant=0.0)
+    try:
+        chart = measured_chart(response, computer)
+    except ResponseError as error:
+        return None, str(error)
+    if not np.isfinite(chart.stiffness_max_nominal):
+        return None, (
+            "no wall with a stiffness above 0 is stable by this response; write in each row the reading and the "
+            "force sent after it, as commanded: a force that was measured, or rows that are shifted, come too late"
+        )
+    return chart, f"poles at z = 1: {chart.integrators}"
+
+
+def _largest_stiffness(chart: MeasuredChart) -> Estimate:
+    high = chart.band.stiffness_high if chart.band is not None else chart.stiffness_max_nominal
+    return Estimate("largest stiffness", chart.stiffness_max_nominal, chart.stiffness_max, high, "N/m")
+
+
+def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[str]:
+    said = (
+        [f"{response.note}; the interval holds what is stable beyond doubt, and what may be"]
+        if response.note
+        else []
+    )
+    if device.response is None:
+        own = device.at().chart(decay=False).stiffness_max
+        high = chart.band.stiffness_high if chart.band is not None else chart.stiffness_max
+        within = "within" if chart.stiffness_max <= own <= high else "outside"
+        said.append(f"the file's own model renders {own:.5g} N/m at its reference, {within} this interval")
+    return said
+
+
+def _share_explained(response: Response, unseen: SweepBlocks, length: int, period: float) -> float:
+    """Share of the unseen motion's power that the response predicts from the force, where it can be relied on.
+
+    The position is differenced twice, and both are weighted by a Hann window, since a device that drifts leaks.
+
+    length  of the blocks that are transformed at once, at most [samples]
+    """
+    m = 2
+    assert response.coherence is not None
+    good = response.coherence >= LEAST_COHERENCE
+    known, value = response.frequency[good], response.value[good]
+    shifted = value * (np.exp(2j * np.pi * known * period) - 1.0) ** m
+    missed = total = 0.0
+    for force, position in unseen.blocks(min(length, len(unseen))):
+        moved = np.diff(position, n=m)
+        window = np.hanning(len(moved))
+        U, Y = np.fft.rfft(force[: len(moved)] * window), np.fft.rfft(moved * window)
+        f = np.fft.rfftfreq(len(moved), period)
+        inside = (f >= known[0]) & (f <= known[-1]) & (np.interp(f, response.frequency, good) > 0.99)
+        predicted = np.interp(f, known, shifted.real) + 1j * np.interp(f, known, shifted.imag)
+        missed += float(np.sum(np.abs(Y - predicted * U)[inside] ** 2))
+        total += float(np.sum(np.abs(Y[inside]) ** 2))
+    return 1.0 - missed / total
+
+
+def _columns(responses: Sequence[Response]) -> dict[str, Any]:
+    """The columns of a file that a [response] reads."""
+    parts = [(one.frequency, one.value, one.coherence) for one in responses]
+    columns = {
+        "frequency_Hz": np.concatenate([f for f, _, _ in parts]),
+        "real_m_per_N": np.concatenate([v.real for _, v, _ in parts]),
+        "imag_m_per_N": np.concatenate([v.imag for _, v, _ in parts]),
+        "coherence": np.concatenate([np.ones_like(f) if c is None else c for f, _, c in parts]),
+    }
+    if len(parts) > 1:
+        columns["sweep"] = np.repeat(np.arange(1.0, len(parts) + 1), [len(f) for f, _, _ in parts])
+    return columns

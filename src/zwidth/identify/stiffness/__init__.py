@@ -1,0 +1,1 @@
+"""Stiffness of a drive from torque over angle."""

@@ -1,0 +1,255 @@
+"""Stiffness of a drive's transmission from torque over angle, loaded and unloaded both ways.
+
+The link is blocked, the motor pulls at its transmission, slowly, up and down; or the motor is blocked and the link
+is loaded. The thesis measures its Table 3.3 so (section 3.1.3, Fig. 3.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from zwidth.device.device import Device
+from zwidth.device.faults import comma_list, fail, plural
+from zwidth.identify.drives import Drive, drive_named
+from zwidth.identify.identification import Estimate, Identification, refused
+from zwidth.identify.records.averaged_rows import averaged_rows
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import Record
+from zwidth.identify.stiffness.checks import Run, check_runs
+from zwidth.identify.stiffness.spring_fit import SpringFit, fit_spring
+from zwidth.identify.stiffness.strokes import Resolution, Strokes, joined, strokes_of
+from zwidth.progress import Progress
+
+COLUMNS: Final = Columns(("torque_Nm", "angle_rad"), text=("joint",))
+FIT_SHARE: Final = 2.0 / 3.0  # of the strokes, from the first on; the others are predicted
+DIGITS: Final = 4
+
+
+def identify_stiffness(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    joint: str | None = None,
+    side: Literal["motor", "link"] = "motor",
+    progress: Progress | None = None,
+) -> Identification:
+    """The stiffness of drives, at the motor's shaft, with hysteresis, backlash and hardening where they are seen.
+
+    records  torque and angle in the order in which they were measured, each record a run; a column joint says of
+             which drive each row is
+    joint    name of the drive or of its link, where the records do not say; None: the only drive
+    side     "motor": torque and angle of the motor's shaft, the link blocked; "link": of the joint, the motor
+             blocked
+    Raises   DeviceError  for records without the columns, and drives that the device does not have
+    """
+    parts = [
+        _identify_drive(device, drive, runs, side, prefix=f"{drive.name}: " if len(drives) > 1 else "")
+        for drives in [_runs_by_drive(device, records, joint)]
+        for drive, runs in drives
+    ]
+    return parts[0] if len(parts) == 1 else _together(parts)
+
+
+def _runs_by_drive(device: Device, records: Sequence[Record], joint: str | None) -> list[tuple[Drive, list[Run]]]:
+    """The runs of each drive, in the order in which the drives appear."""
+    runs: dict[str, tuple[Drive, list[Run]]] = {}
+    for record in records:
+        rows = averaged_rows(record)
+        torque, angle = rows.columns["torque_Nm"], rows.columns["angle_rad"]
+        if "joint" not in record:
+            names = [joint]
+        elif joint is not None:
+            raise fail(
+                record.label, "joint", "is a column of the record; leave out the joint that is named beside it"
+            )
+        else:
+            names = list(dict.fromkeys(rows.columns["joint"].tolist()))
+        for name in names:
+            drive = drive_named(device, name)
+            mine = slice(None) if "joint" not in record else rows.columns["joint"] == name
+            label = record.label if len(names) == 1 else f"{record.label}, joint {name}"
+            run = Run(label, torque[mine], angle[mine], rows.together, rows.left_out)
+            runs.setdefault(drive.path, (drive, []))[1].append(run)
+    if not runs:
+        raise records[0].fault("has no rows; record torque and angle")
+    return list(runs.values())
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """From what was measured to the motor's shaft: torques and angles are multiplied by these."""
+
+    torque: float
+    angle: float
+
+
+def _identify_drive(device: Device, drive: Drive, runs: list[Run], side: str, prefix: str) -> Identification:
+    """The spring of one drive."""
+    scale = _Scale(1.0, 1.0)
+    if side == "link":
+        ratio = drive.table.get("transmission_ratio")
+        if ratio is None:
+            key = f"{drive.path}.transmission_ratio"
+            raise fail(
+                device.label, key, "is missing: it turns a stiffness at the link into one at the motor's shaft"
+            )
+        scale = _Scale(1.0 / ratio, ratio)
+        runs = [replace(run, torque=run.torque * scale.torque, angle=run.angle * scale.angle) for run in runs]
+    counts = drive.table.get("encoder_counts_per_rev") if side == "motor" else None
+    known_step = 2.0 * pi / counts if counts else 0.0
+    checks, resolution, both_sides = check_runs(runs, known_step, drive.table.get("stiffness_Nm_per_rad"))
+    checks = [replace(check, what=prefix + check.what) for check in checks]
+    none = refused("stiffness", f"{device.name}, {drive.name}", checks)
+    if none is not None:
+        return none
+    strokes = _strokes(runs, resolution)
+    fitted, unseen = _split(strokes)
+    fit = fit_spring(fitted, resolution, both_sides)
+    explained = _share_explained(fit, unseen)
+    return Identification(
+        "stiffness",
+        f"{device.name}, {drive.name}",
+        tuple(checks),
+        tuple(replace(one, name=prefix + one.name) for one in _estimates(fit, fitted, drive, side)),
+        explained,
+        f"the angle in {_parts(unseen)} that were not fitted, predicted from their torque",
+        tuple(prefix + remark for remark in _remarks(fit, fitted, both_sides)),
+        _curves(drive, fit, strokes, unseen),
+    )
+
+
+def _strokes(runs: Sequence[Run], resolution: Resolution) -> Strokes:
+    """The strokes of all runs."""
+    parts, first = list[Strokes](), 0
+    for number, run in enumerate(runs):
+        parts.append(strokes_of(run.torque[run.kept], run.angle[run.kept], resolution, number, first))
+        first += parts[-1].count
+    return joined(parts)
+
+
+def _split(strokes: Strokes) -> tuple[Strokes, Strokes]:
+    """The part that is fitted and the part that is predicted: the last strokes, of few strokes every third bin."""
+    _, number = np.unique(strokes.stroke, return_inverse=True)
+    count = int(number.max()) + 1
+    if count < 6:
+        late = np.arange(len(number)) % 3 == 2
+    else:
+        # of every run the last strokes
+        late = np.zeros(len(number), dtype=bool)
+        for run in np.unique(strokes.run):
+            mine = strokes.run == run
+            low, high = number[mine].min(), number[mine].max() + 1
+            late |= mine & (number >= low + max(round(FIT_SHARE * (high - low)), 1))
+    return strokes.select(~late), strokes.select(late)
+
+
+def _share_explained(fit: SpringFit, unseen: Strokes) -> float:
+    """1 - variance of what is not predicted / variance of the bend, over the unseen part."""
+    bend = fit.bend(unseen)
+    missed = bend - fit.bend_under(unseen)
+    return float(1.0 - np.mean(missed**2) / np.var(bend))
+
+
+def _estimates(fit: SpringFit, strokes: Strokes, drive: Drive, side: str) -> Iterator[Estimate]:
+    """The numbers of the spring; forward is where the motor leads the joint, as in the device file."""
+
+    def estimate(name: str, value: float, gradient: dict[str, float], unit: str, key: str = "") -> Estimate:
+        half = fit.half_width(gradient)
+        return Estimate(name, value, value - half, value + half, unit, f"{drive.path}.{key}" if key else "")
+
+    bend = fit.bend(strokes)
+    forward, k3 = fit["forward"], fit["hardening"]
+    if "backward" in fit.names:
+        backward = fit["backward"]
+        uneven = abs(forward - backward) > fit.half_width({"forward": 1.0, "backward": -1.0})
+        uneven = uneven or "backward_stiffness_Nm_per_rad" in drive.table or "preload" in fit.names
+        halves = {"forward": 0.5, "backward": 0.5}
+        unit = "N m/rad"
+        if uneven:
+            yield estimate("stiffness", forward, {"forward": 1.0}, unit, "stiffness_Nm_per_rad")
+            yield estimate(
+                "backward stiffness", backward, {"backward": 1.0}, unit, "backward_stiffness_Nm_per_rad"
+            )
+        else:
+            yield estimate("stiffness", 0.5 * (forward + backward), halves, unit, "stiffness_Nm_per_rad")
+        ends = {
+            "forward": (forward + 3.0 * k3 * np.max(bend) ** 2, 3.0 * np.max(bend) ** 2),
+            "backward": (backward + 3.0 * k3 * np.min(bend) ** 2, 3.0 * np.min(bend) ** 2),
+        }
+        stiffer = max(ends, key=lambda name: ends[name][0])
+        gradient = {stiffer: 1.0, "hardening": float(ends[stiffer][1])}
+        yield estimate("largest stiffness", float(ends[stiffer][0]), gradient, unit)
+        yield estimate("average stiffness", 0.5 * (forward + backward), halves, unit)
+    else:
+        yield estimate("stiffness", forward, {"forward": 1.0}, "N m/rad", "stiffness_Nm_per_rad")
+    if "hardening" in fit.names:
+        yield estimate("hardening", k3, {"hardening": 1.0}, "N m/rad^3", "hardening_Nm_per_rad3")
+    if "preload" in fit.names:
+        yield estimate("preload", fit["preload"], {"preload": 1.0}, "N m", "preload_Nm")
+    if "play" in fit.names:
+        yield estimate("backlash", fit["play"], {"play": 1.0}, "rad")
+    friction = estimate("dry friction", fit["friction"], {"friction": 1.0}, "N m")
+    path = f"{drive.path}.coulomb_Nm" if side == "motor" and friction.low > 0.0 else ""
+    yield replace(friction, low=max(friction.low, 0.0), value=max(friction.value, 0.0), path=path)
+    way = 2.0 * float(np.ptp(bend))
+    loss = estimate("hysteresis loss per cycle", way * fit["friction"], {"friction": way}, "J")
+    yield replace(loss, low=max(loss.low, 0.0), value=max(loss.value, 0.0))
+
+
+def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str]:
+    """What was seen beside the numbers."""
+    if not both_sides:
+        yield "the spring was bent one way only: the stiffness is that of this way, and says nothing of the other"
+    if fit.outliers.any():
+        places = plural(int(np.count_nonzero(fit.outliers)), "average", "averages")
+        yield f"{places} of {len(strokes.angle)} far from all others left out"
+    for name, unit, column in (("angle drift", "rad", strokes.angle), ("torque drift", "N m", strokes.torque)):
+        if name in fit.names:
+            share = 100.0 * abs(fit[name]) / float(np.ptp(column))
+            yield (
+                f"the {name.split()[0]} drifts by {fit[name]:.{DIGITS}g} {unit} over a record, {share:.2g} % of "
+                "its range"
+            )
+    if "hardening" in fit.names:
+        yield f"the transmission {'stiffens' if fit['hardening'] > 0.0 else 'softens'} as it is bent"
+
+
+def _curves(drive: Drive, fit: SpringFit, strokes: Strokes, unseen: Strokes) -> dict[str, Any]:
+    """Averages of the strokes, and what the fit says of each: columns of equal length."""
+    held_out = np.isin(strokes.stroke * 1e6 + strokes.time, unseen.stroke * 1e6 + unseen.time)
+    return {
+        "drive": [drive.name] * len(strokes.angle),
+        "angle_rad": strokes.angle,
+        "torque_Nm": strokes.torque,
+        "fitted_torque_Nm": fit.torque(strokes),
+        "motion": strokes.sign,
+        "fitted": np.where(held_out, 0.0, 1.0),
+    }
+
+
+def _parts(strokes: Strokes) -> str:
+    return plural(strokes.count, "stroke") if strokes.count > 2 else plural(len(strokes.angle), "average")
+
+
+def _together(parts: Sequence[Identification]) -> Identification:
+    """Several drives as one result."""
+    shares = [part.validation for part in parts if part.estimates]
+    curves = {
+        name: [value for part in parts for value in part.curves.get(name, ())]
+        for name in dict.fromkeys(name for part in parts for name in part.curves)
+    }
+    return Identification(
+        "stiffness",
+        comma_list([part.label for part in parts]),
+        tuple(check for part in parts for check in part.checks),
+        tuple(one for part in parts for one in part.estimates),
+        min(shares, default=float("nan")),
+        next((f"the least of the drives: {part.validated_on}" for part in parts if part.estimates), ""),
+        tuple(remark for part in parts for remark in part.remarks),
+        curves,
+    )

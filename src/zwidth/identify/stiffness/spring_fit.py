@@ -1,0 +1,293 @@
+"""A spring with dry friction fitted to strokes of torque over angle.
+
+    T = g(d) + s T_c + a t,        d = angle - rest - c t
+
+    g(d) = k d (1 for d > 0) + k_b d (for d < 0) + k_3 d^3        and, where the data show them,
+    play        g stays 0 over a width b about rest
+    preload     the stiffness becomes k_b only below d = -p/k
+
+with a rest angle for each record, s the sign of the motion and t the time, for a drift of one of the two.
+
+Torque is regressed on angle: a rounded angle plus its error is the true one, with an error that hardly depends on
+the rounded one (Berkson's case), which leaves slopes unbiased.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.identify.stiffness.strokes import Resolution, Strokes
+
+Floats = NDArray[np.float64]
+
+BASE: Final = ("forward", "backward", "rest", "friction")
+EXTENSIONS: Final = ("hardening", "play", "preload", "angle drift", "torque drift")
+# Kinks of two kinds, and drifts of two kinds, of which one record tells one.
+EXCLUSIVE: Final = ({"play", "preload"}, {"angle drift", "torque drift"})
+SEEN: Final = 4.0  # standard errors from zero, from which an extension counts
+WORTH: Final = 0.9  # of the sum of squares, that an extension must at least bring it down to
+CLUSTERS: Final = 24  # that are wanted for the intervals
+MOST_CLUSTERS: Final = 120  # of several strokes each where there are many
+FEWEST_STROKES: Final = 10  # from which each is a cluster of its own
+OUTLIER: Final = 6.0  # robust standard deviations
+MOST_OUTLIERS: Final = 0.05  # share of the bins
+
+
+@dataclass(frozen=True)
+class SpringFit:
+    """A fitted spring.
+
+    names       of its parameters: those of BASE, and of EXTENSIONS where the data show them
+    values      (p,) of them
+    covariance  (p, p) of their errors
+    freedom     of Student's distribution for their intervals
+    residuals   (n,) torque less the fitted one
+    outliers    (n,) bins that were left out
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    covariance: Floats
+    freedom: int
+    residuals: Floats
+    outliers: NDArray[np.bool_]
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    def combination(self, gradient: dict[str, float]) -> float:
+        """Standard error of a function of the parameters with this gradient."""
+        g = np.array([gradient.get(name, 0.0) for name in self.names])
+        return float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
+
+    def half_width(self, gradient: dict[str, float]) -> float:
+        """Half of its 95 % interval."""
+        from scipy.stats import t
+
+        return float(t.ppf(0.975, self.freedom)) * self.combination(gradient)
+
+    def torque(self, strokes: Strokes) -> Floats:
+        """The fitted torque (n,) of other strokes."""
+        return _torque(self.names, self.values, strokes)
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The parameters by their names."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    def bend(self, strokes: Strokes) -> Floats:
+        """By how much the spring is bent (n,) [rad]."""
+        return _bend(self.by_name, strokes)
+
+    def bend_under(self, strokes: Strokes) -> Floats:
+        """By how much the fitted spring bends (n,) under their torques [rad]."""
+        d = self.bend(strokes)
+        reach = 2.0 * float(np.max(np.abs(d)))
+        grid = np.linspace(-reach, reach, 4001)
+        torque = strokes.torque - self["friction"] * strokes.sign - self["torque drift"] * strokes.time
+        # across play every angle has the same torque: a small slope makes the inverse one
+        elastic = _elastic(self.by_name, grid) + 1e-9 * self["forward"] * grid
+        return np.interp(torque, np.maximum.accumulate(elastic), grid)
+
+
+def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> SpringFit:
+    """The spring that fits strokes best, with those extensions that the data show.
+
+    resolution  of the angle
+    both_sides  whether the spring was bent both ways; else it has one stiffness
+    """
+    names = (*(BASE if both_sides else ("forward", "rest", "friction")), *_rests(strokes))
+    good = np.ones(len(strokes.angle), dtype=bool)
+    fit = _fit(names, strokes, resolution, good)
+    for _ in range(len(EXTENSIONS) + 1):
+        good &= ~_outliers(fit.residuals, good)
+        kept = good & ~_across_kink(fit, strokes)
+        if np.count_nonzero(kept) <= len(fit.names):
+            kept = good
+        fit = _fit(fit.names, strokes, resolution, kept, fit)
+        better = _best_extension(fit, strokes, resolution, kept, both_sides)
+        if better is None:
+            break
+        fit = better
+    return replace(fit, outliers=~good)
+
+
+def _best_extension(
+    fit: SpringFit, strokes: Strokes, resolution: Resolution, kept: NDArray[np.bool_], both_sides: bool
+) -> SpringFit | None:
+    """The fit with one more parameter that brings most, of those that differ from zero; None if none does."""
+    best, least = None, float(np.sum(fit.residuals[kept] ** 2))
+    limit = WORTH * least
+    for name in EXTENSIONS:
+        if (
+            name in fit.names
+            or (name == "preload" and not both_sides)
+            or {name, *fit.names} >= {"play", "preload"}
+        ):
+            continue
+        tried = _fit((*fit.names, name), strokes, resolution, kept, fit)
+        rest = float(np.sum(tried.residuals[kept] ** 2))
+        if rest < limit and abs(tried[name]) > SEEN * tried.combination({name: 1.0}):
+            best, limit = tried, rest
+    return best
+
+
+def _elastic(x: dict[str, float], d: Floats, reach: Floats | float = 0.0) -> Floats:
+    """Mean torque of a spring bent by angles spread evenly over d +- reach, on one side of its kinks."""
+    forward = x["forward"]
+    backward = x.get("backward", forward)
+    half, change = 0.5 * x.get("play", 0.0), -x.get("preload", 0.0) / forward
+    above = change + np.maximum(d - half - change, 0.0)
+    below = -np.maximum(change - d - half, 0.0)
+    return np.asarray(forward * above + backward * below + x.get("hardening", 0.0) * (d**3 + d * reach**2))
+
+
+def _across_kink(fit: SpringFit, strokes: Strokes) -> NDArray[np.bool_]:
+    """Bins (n,) of several readings over a kink of the fitted spring, whose mean torque is not that of their mean
+    angle."""
+    half = 0.5 * fit["play"]
+    kinks = (-half, half) if half else (-fit["preload"] / fit["forward"],)
+    d = fit.bend(strokes)
+    over = np.any([np.abs(d - kink) <= 1.2 * strokes.reach for kink in kinks], axis=0)
+    return np.asarray(over & (strokes.samples > 1) & ("backward" in fit.names))
+
+
+def _rests(strokes: Strokes) -> list[str]:
+    """Names of the rest angles of the records after the first."""
+    return [f"rest of record {run}" for run in range(1, int(np.max(strokes.run, initial=0)) + 1)]
+
+
+def _bend(x: dict[str, float], strokes: Strokes) -> Floats:
+    """By how much the spring is bent (n,)."""
+    rests = np.array([x["rest"], *(x.get(name, x["rest"]) for name in _rests(strokes))])
+    return np.asarray(strokes.angle - rests[strokes.run] - x.get("angle drift", 0.0) * strokes.time)
+
+
+def _torque(names: tuple[str, ...], values: Floats, strokes: Strokes) -> Floats:
+    x = dict(zip(names, values.tolist(), strict=True))
+    elastic = _elastic(x, _bend(x, strokes), strokes.reach)
+    return np.asarray(elastic + x["friction"] * strokes.sign + x.get("torque drift", 0.0) * strokes.time)
+
+
+def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -> tuple[Floats, Floats]:
+    """Where the search begins, and by how much each parameter is likely to differ."""
+    span_angle, span_torque = float(np.ptp(strokes.angle)), float(np.ptp(strokes.torque))
+    if before is None:
+        columns = np.stack([strokes.angle, strokes.sign, np.ones_like(strokes.sign)], axis=1)
+        (k, friction, offset), *_ = np.linalg.lstsq(columns, strokes.torque, rcond=None)
+        k = k if k != 0.0 else span_torque / span_angle
+        guess = {"forward": k, "backward": k, "rest": -offset / k, "friction": friction}
+        guess |= dict.fromkeys(_rests(strokes), guess["rest"])
+    else:
+        guess = dict(zip(before.names, before.values.tolist(), strict=True))
+    usual = abs(guess["forward"])
+    sizes = {
+        "forward": usual,
+        "backward": usual,
+        "rest": span_angle,
+        "friction": 0.1 * span_torque,
+        "hardening": usual / span_angle**2,
+        "play": 0.05 * span_angle,
+        "preload": 0.1 * span_torque,
+        "angle drift": 0.1 * span_angle,
+        "torque drift": 0.1 * span_torque,
+    }
+    sizes |= dict.fromkeys(_rests(strokes), span_angle)
+    first = {"play": 0.05 * span_angle, "preload": 0.1 * span_torque}
+    return (
+        np.array([guess.get(name, first.get(name, 0.0)) for name in names]),
+        np.array([sizes[name] for name in names]),
+    )
+
+
+def _fit(
+    names: tuple[str, ...],
+    strokes: Strokes,
+    resolution: Resolution,
+    kept: NDArray[np.bool_],
+    before: SpringFit | None = None,
+) -> SpringFit:
+    """Least squares over the kept bins. Play and preload are not negative."""
+    from scipy.optimize import least_squares
+
+    used = strokes.select(kept)
+    start, size = _start(names, used, before)
+    lower = np.array([0.0 if name in ("play", "preload") else -np.inf for name in names])
+    scale = max(float(np.ptp(used.torque)), 1e-300)
+
+    def residuals(scaled: Floats) -> Floats:
+        return np.asarray((used.torque - _torque(names, scaled * size, used)) / scale)
+
+    solved = least_squares(residuals, start / size, bounds=(lower, np.inf), x_scale="jac", ftol=1e-14, xtol=1e-12)
+    values = np.asarray(solved.x) * size
+    jacobian = -np.asarray(solved.jac) * scale / size
+    covariance, freedom = _covariance(jacobian, used, used.torque - _torque(names, values, used), resolution)
+    return SpringFit(names, values, covariance, freedom, strokes.torque - _torque(names, values, strokes), ~kept)
+
+
+def _covariance(
+    jacobian: Floats, strokes: Strokes, residuals: Floats, resolution: Resolution
+) -> tuple[Floats, int]:
+    """Covariance of the parameters' errors, and the freedom of its estimate.
+
+    From the scatter between clusters, as by deleting each in turn (jackknife, in its first order), so that errors
+    within a cluster may depend on each other; and from the rounding of the angle, which is the same in every
+    stroke and does not show in any scatter.
+    """
+    cluster = _clusters(strokes)
+    pseudo = np.linalg.pinv(jacobian)  # (p, n)
+    number = int(cluster.max()) + 1
+    changes = np.empty((number, jacobian.shape[1]))
+    for which in range(number):
+        rows = np.flatnonzero(cluster == which)
+        left = np.eye(len(rows)) - jacobian[rows] @ pseudo[:, rows]
+        changes[which] = pseudo[:, rows] @ np.linalg.lstsq(left, residuals[rows], rcond=None)[0]
+    scatter = (number - 1.0) / number * changes.T @ changes
+    freedom = max(number - jacobian.shape[1], 1)
+    return np.asarray(scatter + _rounding(np.asarray(pseudo, dtype=float), strokes, resolution)), freedom
+
+
+def _rounding(pseudo: Floats, strokes: Strokes, resolution: Resolution) -> Floats:
+    """Covariance by the rounding of the angle: one error for each count and sign of motion.
+
+    A bin that covers several counts averages their errors, evenly where it has several readings of each count;
+    noise of half a count and more does the same (dither).
+    """
+    if resolution.step == 0.0:
+        return np.zeros((len(pseudo), len(pseudo)))
+    rise = np.polyfit(strokes.angle, strokes.torque, 1)[0]
+    moved = 2.0 * strokes.reach / resolution.step
+    dither = np.exp(-2.0 * (np.pi * resolution.noise / resolution.step) ** 2)
+    averaged = np.maximum(1.0, np.where(moved > strokes.samples, np.sqrt(strokes.samples), moved))
+    error = abs(rise) * resolution.step / np.sqrt(12.0) * dither / averaged
+    cell = np.rint(strokes.angle / resolution.step).astype(np.int64) * 2 + (strokes.sign > 0)
+    _, which = np.unique(cell, return_inverse=True)
+    parts = np.zeros((int(which.max()) + 1, len(pseudo)))
+    np.add.at(parts, which, (pseudo * error).T)
+    return np.asarray(parts.T @ parts)
+
+
+def _clusters(strokes: Strokes) -> NDArray[np.int64]:
+    """A number (n,) for each bin: bins of one cluster are not independent. Strokes, cut where they are few."""
+    _, stroke = np.unique(strokes.stroke, return_inverse=True)
+    count = int(stroke.max()) + 1
+    if count >= FEWEST_STROKES:
+        return np.asarray(stroke * min(MOST_CLUSTERS, count) // count)
+    pieces = int(np.ceil(CLUSTERS / count))
+    label = np.empty(len(stroke), dtype=np.int64)
+    for number in range(count):
+        rows = np.flatnonzero(stroke == number)
+        label[rows] = number * pieces + np.arange(len(rows)) * pieces // len(rows)
+    return np.unique(label, return_inverse=True)[1]
+
+
+def _outliers(residuals: Floats, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Kept bins that lie far from all others; none where they are many, since then the model is wrong."""
+    middle = float(np.median(residuals[kept]))
+    spread = 1.4826 * float(np.median(np.abs(residuals[kept] - middle)))
+    bad = kept & (np.abs(residuals - middle) > OUTLIER * max(spread, 1e-300))
+    return bad if np.count_nonzero(bad) <= MOST_OUTLIERS * len(residuals) else np.zeros_like(bad)
