@@ -80,8 +80,8 @@ def fit_tiles(U: Complexes, Y: Complexes, width: int) -> Fits:
     size = 2 * width + 1
     chunk = max(1, CHUNK // (size * TERMS))
     parts = [_fit_windows(U, Y, middles[i : i + chunk], width) for i in range(0, len(middles), chunk)]
-    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Fits(width, *columns, freedom=np.full(len(middles), float(size - TERMS)))
+    coefficients, factor, cubic, noise, excited = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Fits(width, coefficients, factor, cubic, noise, excited, np.full(len(middles), float(size - TERMS)))
 
 
 def _fit_windows(
@@ -186,16 +186,16 @@ def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> Local
         level[np.repeat(whole & (apart < AGREED), 2**n)[:count]] = n
     tile = np.clip(((places - 1.0) / narrowest).astype(int), 0, count - 1)
     result = LocalResponse(np.empty(len(places), complex), *np.empty((4, len(places))))
-    for n, fits in enumerate(levels):
+    for n, one in enumerate(levels):
         at = np.flatnonzero(level[tile] == n)
-        numbers = np.minimum(tile[at] // 2**n, len(fits.noise) - 1)
-        r = (places[at] - (1 + fits.width * numbers + fits.width // 2)) / fits.width
-        value, spread = fits.at(numbers, r)
+        numbers = np.minimum(tile[at] // 2**n, len(one.noise) - 1)
+        r = (places[at] - (1 + one.width * numbers + one.width // 2)) / one.width
+        value, spread = one.at(numbers, r)
         # a merged window may be off by what would just not have kept its halves apart
-        noise = spread * fits.noise[numbers]
-        error = (UNSEEN if n else 1.0) * noise + fits.curvature(numbers, r)
+        noise = spread * one.noise[numbers]
+        error = (UNSEEN if n else 1.0) * noise + one.curvature(numbers, r)
         result.value[at], result.variance[at] = value, error + (TOLERANCE * np.abs(value)) ** 2
-        result.freedom[at] = fits.freedom[numbers]
+        result.freedom[at] = one.freedom[numbers]
         result.noise[at], result.excited[at] = levels[0].noise[tile[at]], levels[0].excited[tile[at]]
     return result
 

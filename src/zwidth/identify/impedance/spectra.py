@@ -16,7 +16,7 @@ hand; here by the noncentral chi-square distribution).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
@@ -82,8 +82,14 @@ class MeasuredImpedance:
 
     def only(self, some: NDArray[np.bool_]) -> MeasuredImpedance:
         """Some of the frequencies."""
-        parts = (self.frequency, self.value, self.coherence, self.deviation, self.bias)
-        return MeasuredImpedance(*(part[some] for part in parts), self.freedom)
+        return replace(
+            self,
+            frequency=self.frequency[some],
+            value=self.value[some],
+            coherence=self.coherence[some],
+            deviation=self.deviation[some],
+            bias=self.bias[some],
+        )
 
 
 def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, level: float = LEVEL) -> Floats:
@@ -283,8 +289,8 @@ def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | N
         some = slice(0, count)
         weight = np.tile(1.0 / sigma[some], 2)
         rows = np.vstack([A[some].real, A[some].imag]) * weight[:, None]
-        right = np.column_stack([impedance.value[some], scaled[some]])
-        right = np.concatenate([right.real, right.imag]) * weight[:, None]
+        both_values = np.column_stack([impedance.value[some], scaled[some]])
+        right = np.concatenate([both_values.real, both_values.imag]) * weight[:, None]
         size = np.linalg.norm(rows, axis=0)
         both, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
         solved, shift = (both / size[:, None])[:KEPT_POWERS].T
