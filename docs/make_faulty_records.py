@@ -7,13 +7,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.identify.faulty_records import RECORDS, answer
+from tests.identify.faulty_records import RECORDS, FaultyRecord
+from tests.identify.record_answers import answer
 
 PAGE = Path(__file__).parent / "faulty-records.md"
 
@@ -30,14 +30,11 @@ Each row is a record of a virtual bench with something wrong, and the sentence a
 GIVEN = {0: "given", 1: "none", 2: "none, bad input"}
 
 
-def page(sentences: Sequence[str]) -> str:
-    """The page, with what is said to each record."""
-    rows = [
-        f"| {one.wrong} | [`{one.kind}`](identify.md#{SECTIONS.get(one.kind, one.kind)}) | {GIVEN[one.code]} "
-        f"| {_cell(said)} |"
-        for one, said in zip(RECORDS, sentences, strict=True)
-    ]
-    return INTRODUCTION + "\n".join(rows) + "\n"
+def row(record: FaultyRecord, said: str) -> str:
+    """The line of a record."""
+    section = SECTIONS.get(record.kind, record.kind)
+    answered = f"[`{record.kind}`](identify.md#{section}) | {GIVEN[record.code]}"
+    return f"| {record.wrong} | {answered} | {_cell(said)} |"
 
 
 SECTIONS = {"friction": "friction-and-mass", "mass": "friction-and-mass"}
@@ -48,11 +45,11 @@ def _cell(text: str) -> str:
 
 
 def main() -> None:
-    sentences = []
+    rows = []
     for one in RECORDS:
         with TemporaryDirectory() as folder:
-            sentences.append(answer(one, Path(folder)).said)
-    PAGE.write_text(page(sentences), encoding="utf-8")
+            rows.append(row(one, answer(one, Path(folder)).said))
+    PAGE.write_text(INTRODUCTION + "\n".join(rows) + "\n", encoding="utf-8")
     print(PAGE)
 
 

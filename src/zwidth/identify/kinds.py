@@ -21,10 +21,12 @@ from zwidth.progress import Progress
 class Kind:
     """One kind of measurement.
 
-    module       in this package, with COLUMNS and `identify_<module>`
+    name         as users write it
+    module       in this package, with COLUMNS and `identify_<name>`
     takes_point  whether the numbers are of the device at an operating point
     """
 
+    name: str
     module: str
     takes_point: bool = False
 
@@ -38,20 +40,23 @@ class Kind:
     def function(self) -> Callable[..., Identification]:
         """What identifies it."""
         found: Callable[..., Identification] = getattr(
-            import_module(f"zwidth.identify.{self.module}"), f"identify_{self.module}"
+            import_module(f"zwidth.identify.{self.module}"), f"identify_{self.name}"
         )
         return found
 
 
 KINDS: Final[dict[str, Kind]] = {
-    "stiffness": Kind("stiffness"),
-    "friction": Kind("friction"),
-    "mass": Kind("mass"),
-    "response": Kind("response"),
-    "modes": Kind("modes", takes_point=True),
-    "impedance": Kind("impedance", takes_point=True),
-    "boundary": Kind("boundary", takes_point=True),
-    "arm": Kind("arm", takes_point=True),
+    kind.name: kind
+    for kind in (
+        Kind("stiffness", "stiffness.identify"),
+        Kind("friction", "joint.friction"),
+        Kind("mass", "joint.mass"),
+        Kind("response", "response.identify"),
+        Kind("modes", "modes.identify", takes_point=True),
+        Kind("impedance", "impedance.identify", takes_point=True),
+        Kind("boundary", "boundary.identify", takes_point=True),
+        Kind("arm", "arm", takes_point=True),
+    )
 }
 
 
