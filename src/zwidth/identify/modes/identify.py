@@ -260,8 +260,8 @@ def _fitted(
         data.noise = response.noise
         if data.settled(before, modal.poles):
             break
-    profiled, spread = modal_intervals(response, modal)
-    checks.append(shift_check(float(profiled.low[0]), float(profiled.high[0]), modal.misfit))
+    rough, _ = modal_intervals(response, modal, profiled=False)
+    checks.append(shift_check(float(rough.low[0]), float(rough.high[0]), modal.misfit))
     checks.append(resolution_check(modal, data.line))
     if numbers is not None and numbers.hand:
         checks.append(hand_check(response, numbers, point))

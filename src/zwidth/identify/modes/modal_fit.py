@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ LEAST_DELAY, MOST_DELAY = -3.0, 20.0  # samples; below 0 where columns are shift
 LEAST_RATIO, MOST_RATIO = 1e-5, 3.0
 ALIASES: Final = 12  # to either side, by which a loss factor differs from a damper
 FASTEST: Final = 30.0  # Nyquist frequencies: a mode so fast follows the force at once
+MOST_KEPT: Final = 256  # columns that a search keeps
 BASES: Final = ("free", "free, braked", "grounded")
 
 
@@ -239,12 +240,17 @@ def _solved(
     return ModalFit(base, damping, period, vector, residues, chi_squared, len(data.target), coupled)
 
 
-def _residuals(data: LocalResponse, fit: ModalFit, vector: Floats) -> Floats:
-    """What is left when the residues are chosen best, for each choice of poles and delay (variable projection;
+def _residuals(data: LocalResponse, fit: ModalFit) -> Callable[[Floats], Floats]:
+    """What is left when the residues are chosen best, as a function of poles and delay (variable projection;
     Golub and Pereyra 1973)."""
-    columns = data.apply(fit.columns(vector, data.theta))
-    q, _ = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
-    return np.asarray(data.target - q @ (q.T @ data.target))
+    rows_of = _RowsOfColumns(data, fit)
+
+    def left(vector: Floats) -> Floats:
+        rows = rows_of(vector)
+        q, _ = np.linalg.qr(rows / np.maximum(np.linalg.norm(rows, axis=0), 1e-300))
+        return np.asarray(data.target - q @ (q.T @ data.target))
+
+    return left
 
 
 def _limits(fit: ModalFit, data: LocalResponse) -> tuple[Floats, Floats]:
@@ -264,7 +270,7 @@ def _refined(data: LocalResponse, fit: ModalFit) -> ModalFit:
     low, high = _limits(fit, data)
     start = np.clip(fit.vector, low + 1e-9, high - 1e-9)
     solved = least_squares(
-        lambda x: _residuals(data, fit, x),
+        _residuals(data, fit),
         start,
         bounds=(low, high),
         x_scale="jac",
@@ -275,32 +281,35 @@ def _refined(data: LocalResponse, fit: ModalFit) -> ModalFit:
     return _solved(data, fit.base, fit.period, np.asarray(solved.x), fit.damping, fit.coupled)
 
 
-def modal_intervals(data: LocalResponse, fit: ModalFit) -> tuple[Fit, Floats]:
+def modal_intervals(data: LocalResponse, fit: ModalFit, *, profiled: bool = True) -> tuple[Fit, Floats]:
     """Intervals of delay, frequencies and ratios by the profile likelihood, and standard deviations of the
-    residues by the curvature."""
+    residues by the curvature.
+
+    profiled  False: all by the curvature
+    """
     low, high = _limits(fit, data)
     start = np.clip(fit.vector, low + 1e-9, high - 1e-9)
     rows = len(data.target)
-    profiled = fit_least_squares(
-        lambda x: _residuals(data, fit, x),
+    found = fit_least_squares(
+        _residuals(data, fit),
         start,
         lower=low,
         upper=high,
-        profiled=fit.count <= PROFILED,
+        profiled=profiled and fit.count <= PROFILED,
         effective_count=rows * (rows - len(fit.residues)) / rows,
     )
     step = 1e-6
-    base = fit.columns(profiled.values, data.theta)
+    base = fit.columns(found.values, data.theta)
     sides = list[Floats]()
     for i in range(len(start)):
-        moved = profiled.values.copy()
+        moved = found.values.copy()
         moved[i] += step
         other = fit.columns(moved, data.theta)
         sides.append(data.apply((other - base) @ fit.residues) / step)
     jacobian = np.column_stack([*sides, data.apply(base)])
     size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     inverse = np.linalg.pinv((jacobian / size).T @ (jacobian / size)) / np.outer(size, size)
-    return profiled, profiled.scale * np.sqrt(np.maximum(np.diag(inverse)[len(start) :], 0.0))
+    return found, found.scale * np.sqrt(np.maximum(np.diag(inverse)[len(start) :], 0.0))
 
 
 def against_hysteresis(data: LocalResponse, fit: ModalFit) -> ModalFit:
@@ -312,39 +321,80 @@ def against_hysteresis(data: LocalResponse, fit: ModalFit) -> ModalFit:
 # --- columns ----------------------------------------------------------------------------------------------------
 
 
+class _Column(NamedTuple):
+    """A column: 1/(s^2 + 2 a s + w^2) of unit residue, held and sampled.
+
+    decay, squared  a and w^2
+    velocity        factor of its velocity in place of the motion; 0: the motion
+    loss            w and zeta of a mode with a loss factor; None: it has a damper
+    """
+
+    decay: float
+    squared: float
+    velocity: float = 0.0
+    loss: tuple[float, float] | None = None
+
+
+def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coupled: bool) -> list[_Column]:
+    """The base, each mode, all faster ones, and, where dampers couple the modes, each mode's velocity over w."""
+    before = 2 if base == "free, braked" else 1
+    columns = list[_Column]()
+    if base == "free":
+        columns.append(_Column(0.0, 0.0))
+    elif base == "free, braked":
+        columns.append(_Column(0.5 * float(np.exp(vector[1])), 0.0))
+    modes = list(zip(np.exp(vector[before::2]).tolist(), np.exp(vector[before + 1 :: 2]).tolist(), strict=True))
+    columns += [_Column(zeta * w, w**2, loss=(w, zeta) if damping == "hysteretic" else None) for w, zeta in modes]
+    fast = FASTEST * np.pi / period
+    columns.append(_Column(fast, fast**2))
+    return columns + ([_Column(zeta * w, w**2, 1.0 / w) for w, zeta in modes] if coupled else [])
+
+
 def _columns(
     base: str, damping: Damping, period: float, vector: Floats, theta: Floats, coupled: bool = False
 ) -> Complexes:
-    """Responses (n, c) of unit residue: of the base, of each mode, of all faster ones, and, where dampers couple
-    the modes, of each mode's velocity over w."""
-    before = 2 if base == "free, braked" else 1
-    delay = float(vector[0])
-    columns = list[Complexes]()
-    if base == "free":
-        columns.append(_row(0.0, 0.0, period, delay, theta))
-    elif base == "free, braked":
-        columns.append(_row(0.5 * float(np.exp(vector[1])), 0.0, period, delay, theta))
-    rates, ratios = np.exp(vector[before::2]), np.exp(vector[before + 1 :: 2])
-    modes = list(zip(rates.tolist(), ratios.tolist(), strict=True))
-    for w, zeta in modes:
-        columns.append(_row(zeta * w, w**2, period, delay, theta))
-    if damping == "hysteretic" and modes:
-        aliased = _aliased_hold(period, delay, theta)
-        for k, (w, zeta) in enumerate(modes, len(columns) - len(modes)):
-            columns[k] = columns[k] + _added_by_loss(w, zeta, aliased)
-    fast = FASTEST * np.pi / period
-    columns.append(_row(fast, fast**2, period, delay, theta))
-    if coupled:
-        for w, zeta in modes:
-            columns.append(_row(zeta * w, w**2, period, delay, theta, 1.0 / w))
-    return np.column_stack(columns)
+    """Responses (n, c) of unit residue."""
+    columns, delay = _columns_of(base, damping, period, vector, coupled), float(vector[0])
+    aliased = _aliased_hold(period, delay, theta) if any(one.loss for one in columns) else None
+    return np.column_stack([_column(one, period, delay, theta, aliased) for one in columns])
 
 
-def _row(
-    decay: float, squared: float, period: float, delay: float, theta: Floats, velocity: float = 0.0
+def _column(
+    column: _Column, period: float, delay: float, theta: Floats, aliased: tuple[Floats, Complexes] | None
 ) -> Complexes:
-    """Held response (n,) of 1/(s^2 + 2 a s + w^2) behind a delay in samples; or of its velocity times a factor."""
-    return _rows([(decay, squared)], period, delay, theta, velocity)[:, 0]
+    """Response (n,) of one column behind a delay in samples."""
+    own = _rows([(column.decay, column.squared)], period, delay, theta, column.velocity)[:, 0]
+    if column.loss is not None and aliased is not None:
+        own = own + _added_by_loss(*column.loss, aliased)
+    return own
+
+
+class _RowsOfColumns:
+    """Rows (r, c) that a local response makes of a fit's columns, for many choices of poles and delay.
+
+    A search changes one pole at a time: the columns of the others are kept.
+    """
+
+    def __init__(self, data: LocalResponse, fit: ModalFit) -> None:
+        self.data, self.fit = data, fit
+        self.kept = dict[tuple[_Column, float], Floats]()
+        self.aliased = dict[float, tuple[Floats, Complexes]]()
+
+    def __call__(self, vector: Floats) -> Floats:
+        fit, delay = self.fit, float(vector[0])
+        columns = _columns_of(fit.base, fit.damping, fit.period, vector, fit.coupled)
+        if len(self.kept) > MOST_KEPT:
+            self.kept.clear()
+        return np.column_stack([self._rows(column, delay) for column in columns])
+
+    def _rows(self, column: _Column, delay: float) -> Floats:
+        key = column, delay
+        if key not in self.kept:
+            theta, period = self.data.theta, self.fit.period
+            if column.loss is not None and delay not in self.aliased:
+                self.aliased = {delay: _aliased_hold(period, delay, theta)}
+            self.kept[key] = self.data.apply(_column(column, period, delay, theta, self.aliased.get(delay)))
+        return self.kept[key]
 
 
 def _rows(
