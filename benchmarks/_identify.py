@@ -102,13 +102,18 @@ def response_by_welch(table: Any) -> dict[str, float]:
 
 def modes_by_curve_fit(table: Any) -> dict[str, float]:
     """Two masses to H1 of Welch's spectra."""
+    return masses_by_curve_fit(*response_by_csd(table))
+
+
+def response_by_csd(table: Any) -> tuple[Any, Any]:
+    """Frequencies and H1 there, by Welch's spectra."""
     from scipy.signal import csd, welch
 
     force, position = table["force_N"].to_numpy(), table["position_m"].to_numpy()
     f, power = welch(force, RATE, nperseg=SEGMENT)
     _, cross = csd(force, position, RATE, nperseg=SEGMENT)
     used = (f > 0.5) & (f < 1000.0)
-    return masses_by_curve_fit(f[used], (cross / power)[used])
+    return f[used], (cross / power)[used]
 
 
 def masses_by_curve_fit(frequency: Any, response: Any) -> dict[str, float]:
