@@ -77,7 +77,7 @@ def test_no_promise_is_larger_than_the_exact_one(seed, largest):
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "excess"), [(502, 0.02), (508, 3e-4)])
 def test_what_a_promise_exceeds_where_modes_or_the_plants_own_region_err(seed, excess):
-    """Of 502 the fitted delay is 7e-5 samples wrong, and modes beyond half the rate are not the device's; of 508 ten
-    times as many frequencies give the same promise, and the plant's own region is known to a few 1e-4."""
+    """Of 502 the fitted delay is 7e-5 samples wrong, and modes beyond half the rate are not the device's; of 508
+    ten times as many frequencies give the same promise, and the plant's own region is known to a few 1e-4."""
     found, exact = promised_and_exact(seed)
     assert TOLERANCE < found.stiffness_max / exact.stiffness_max - 1.0 < excess

@@ -66,6 +66,14 @@ def test_an_even_spring_has_one_stiffness(device):
     assert holds(found, f"{DRIVE}.stiffness_Nm_per_rad", 0.45)
 
 
+def test_rounding_alone_makes_no_preload(device):
+    """Without noise, each stroke has the same errors of the encoder, which may look like a kink."""
+    found = identified(device, bench_record(1, **(EVEN | {"step": 2.0 * np.pi / 4096})))
+    assert f"{DRIVE}.preload_Nm" not in found.settings
+    assert f"{DRIVE}.backward_stiffness_Nm_per_rad" not in found.settings
+    assert holds(found, f"{DRIVE}.stiffness_Nm_per_rad", 0.45)
+
+
 @pytest.mark.parametrize(
     ("change", "name", "truth"),
     [

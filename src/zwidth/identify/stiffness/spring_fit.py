@@ -131,9 +131,17 @@ def _best_extension(
             continue
         tried = _fit((*fit.names, name), strokes, resolution, kept, fit)
         rest = float(np.sum(tried.residuals[kept] ** 2))
-        if rest < limit and abs(tried[name]) > SEEN * tried.combination({name: 1.0}):
+        if rest < limit and _is_seen(tried, name):
             best, limit = tried, rest
     return best
+
+
+def _is_seen(fit: SpringFit, name: str) -> bool:
+    """Whether an extension differs from zero; a preload only where the stiffness beyond it differs, too."""
+    change = {"forward": 1.0, "backward": -1.0}
+    if name == "preload" and abs(fit["forward"] - fit["backward"]) <= SEEN * fit.combination(change):
+        return False
+    return abs(fit[name]) > SEEN * fit.combination({name: 1.0})
 
 
 def _elastic(x: dict[str, float], d: Floats, reach: Floats | float = 0.0) -> Floats:
