@@ -94,6 +94,24 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert 0.93 < held / all_ < 0.97
 
 
+def test_dampers_that_couple_modes_are_no_further_modes():
+    """Two masses on a spring and a strong damper to the ground: two modes, with the delay that there is."""
+    grounded = replace(
+        PLANT, damping=PLANT.damping + np.diag([0.0, 60.0]), stiffness=PLANT.stiffness + np.diag([0.0, 4e4])
+    )  # fmt: skip
+    rng = np.random.default_rng(12)
+    force = rng.normal(size=N)
+    position = quantised(readings(grounded, T, force, 1.0) + STEP * rng.normal(size=N), STEP)
+    spring = {"plant.stiffness_N_per_m": grounded.stiffness.tolist()}
+    found = identified(columns(force, position, T), of=device(**spring), fitted="modes")
+    M, B, K = grounded.mass, grounded.damping, grounded.stiffness
+    poles = np.linalg.eigvals(np.vstack([np.eye(2, 4, 2), -np.linalg.solve(M, np.hstack([K, B]))]))
+    names = [one.name for one in found.estimates if one.name.startswith("natural frequency")]
+    assert len(names) == 2, found.reason
+    for name, rate in zip(names, np.sort(np.abs(poles[poles.imag > 0.0])), strict=True):
+        assert found[name].value == pytest.approx(rate / (2 * np.pi), rel=0.01)
+
+
 def test_a_sweep_from_numbers_that_are_off_by_five():
     t = np.arange(N) * T
     force = np.sin(2 * np.pi * 5.0 * t[-1] * ((80.0) ** (t / t[-1]) - 1.0) / np.log(80.0))

@@ -42,12 +42,13 @@ class ModalFit:
     P = z^-d [ r_0 H_0 + sum_i r_i H_i + r_s H_s ],   H of a mode the exact held response of 1/(s^2 + 2 zeta w s +
     w^2)
 
-    coupled      dampers couple the modes, so that each has a second residue, q_i s beside r_i
+    coupled      dampers couple the modes, so that each has a second residue, q_i s beside r_i, all q_i together 0
     base         "free": H_0 of 1/s^2; "free, braked": of 1/(s (s + a)); "grounded": none
     damping      "viscous"; "hysteretic": of 1/(w^2 (1 + i eta) - w^2), eta = 2 zeta
     period       T [s]
     vector       (1 + braked + 2 m,) delay [samples], ln a, then ln w and ln zeta of each mode
-    residues     of the base, of each mode, and of all faster ones together [1/kg]; then q_i/w_i where coupled
+    residues     of the base, of each mode, and of all faster ones together [1/kg]; then q_i/w_i, but for the first
+                 of them, where coupled
     chi_squared  of the residuals
     rows         number of residuals
     """
@@ -142,6 +143,14 @@ def fit_modes(
         delays = FIRST_DELAYS if best.count == 0 else (float(best.vector[0]),)
         tried = [_with_mode(data, replace(best, vector=np.r_[d, best.vector[1:]])) for d in delays]
         longer = _refined(data, min(tried, key=lambda fit: fit.chi_squared))
+        if best.count and not best.coupled:
+            # dampers that couple the modes are no further mode; with them the base shows
+            bases = BASES if best.count > 1 else ("free, braked",)  # one mode alone is coupled to nothing else
+            mixed = (_refined(data, _on_base(data, replace(best, coupled=True), base)) for base in bases)
+            own = min(mixed, key=lambda fit: fit.criterion)
+            if own.criterion < min(best.criterion - STRONG, longer.criterion):
+                best = own
+                continue
         if longer.criterion > best.criterion - STRONG:
             break
         if best.count > 1 and best.misfit > UNEXPLAINED and longer.chi_squared > HELPFUL * best.chi_squared:
@@ -220,7 +229,8 @@ def _with_mode(data: LocalResponse, fit: ModalFit) -> ModalFit:
     rows -= q @ (q.T @ rows)
     size = np.sum(rows**2, axis=0)
     gain = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
-    return _solved(data, fit.base, fit.period, np.r_[fit.vector, choices[int(np.argmax(gain))]], fit.damping)
+    vector = np.r_[fit.vector, choices[int(np.argmax(gain))]]
+    return _solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled)
 
 
 def _solved(
@@ -326,17 +336,21 @@ class _Column(NamedTuple):
 
     decay, squared  a and w^2
     velocity        factor of its velocity in place of the motion; 0: the motion
+    less            a and w^2 of another whose velocity is taken off it: all velocities together are none at once
+                    after a force, since masses do not jump
     loss            w and zeta of a mode with a loss factor; None: it has a damper
     """
 
     decay: float
     squared: float
     velocity: float = 0.0
+    less: tuple[float, float] = (0.0, 0.0)
     loss: tuple[float, float] | None = None
 
 
 def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coupled: bool) -> list[_Column]:
-    """The base, each mode, all faster ones, and, where dampers couple the modes, each mode's velocity over w."""
+    """The base, each mode, all faster ones, and, where dampers couple the modes, each mode's velocity over w, less
+    that of the brake or of the first mode."""
     before = 2 if base == "free, braked" else 1
     columns = list[_Column]()
     if base == "free":
@@ -347,7 +361,11 @@ def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coup
     columns += [_Column(zeta * w, w**2, loss=(w, zeta) if damping == "hysteretic" else None) for w, zeta in modes]
     fast = FASTEST * np.pi / period
     columns.append(_Column(fast, fast**2))
-    return columns + ([_Column(zeta * w, w**2, 1.0 / w) for w, zeta in modes] if coupled else [])
+    if coupled:
+        joined = [(one.decay, one.squared) for one in columns[int(base == "free") : -1]]
+        slowest, *others = joined
+        columns += [_Column(a, w2, 1.0 / np.sqrt(max(w2, a**2)), slowest) for a, w2 in others]
+    return columns
 
 
 def _columns(
@@ -363,7 +381,10 @@ def _column(
     column: _Column, period: float, delay: float, theta: Floats, aliased: tuple[Floats, Complexes] | None
 ) -> Complexes:
     """Response (n,) of one column behind a delay in samples."""
-    own = _rows([(column.decay, column.squared)], period, delay, theta, column.velocity)[:, 0]
+    if column.velocity:
+        both = _rows([(column.decay, column.squared), column.less], period, delay, theta, column.velocity)
+        return np.asarray(both[:, 0] - both[:, 1])
+    own = _rows([(column.decay, column.squared)], period, delay, theta)[:, 0]
     if column.loss is not None and aliased is not None:
         own = own + _added_by_loss(*column.loss, aliased)
     return own
