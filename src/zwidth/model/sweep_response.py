@@ -242,7 +242,8 @@ def _places(samples: int, segment: int | None) -> Floats:
 
 
 def encoder_step(position: Floats) -> float:
-    """The smallest step [m] between readings (n,): that of the encoder, or next to nothing without one."""
-    gaps = np.diff(np.unique(position))
+    """The smallest step [m] between readings (n,), or in their second differences: that of the encoder, or next to
+    nothing without one. Second differences show it where readings drift so far that none is close to another."""
+    gaps = np.concatenate([np.diff(np.unique(position)), np.abs(np.diff(position, n=2))])
     gaps = gaps[gaps > BELOW_ALL_STEPS * np.max(np.abs(position))]
     return float(np.min(gaps)) if len(gaps) else 0.0
