@@ -202,7 +202,7 @@ def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
         total += len(piece[force])
     for name, what in ((force, "force"), (position, "position")):
         if not high[name] > low[name]:
-            text = f"{name} of {record.label} is {low[name]:g} all the time; move the handle while recording"
+            text = f"{name} of {record.label} is {low[name] + 0.0:g} all the time; move the handle while recording"
             return [Check(what, False, text)]
     counts = (high[position] - low[position]) / step
     seen = f"the handle moves over {high[position] - low[position]:.3g} m, {counts:.4g} steps of its reading"

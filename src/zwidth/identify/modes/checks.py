@@ -47,14 +47,13 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
     force, position = levels.span
     checks = list[Check]()
     if force == 0.0:
-        reason = (
-            f"{names.force} of {label} is {levels.high[0]:.6g} all the time; excite the device by noise or a sweep"
-        )
+        value = levels.high[0] + 0.0  # no negative zero
+        reason = f"{names.force} of {label} is {value:.6g} all the time; excite the device by noise or a sweep"
         return [Check("excitation", False, reason)]
     if position == 0.0:
         reason = (
-            f"{names.position} of {label} is {levels.high[1]:.6g} all the time; is the encoder connected, and "
-            "read?"
+            f"{names.position} of {label} is {levels.high[1] + 0.0:.6g} all the time; is the encoder connected, "
+            "and read?"
         )
         return [Check("motion", False, reason)]
     steps = max(step, given_step)

@@ -141,9 +141,9 @@ def _check_sweep(sweep: SweepBlocks) -> list[Check]:
     seen = SweepRange.of(sweep, FIRST_LEVELS)
     (least, most), (lowest, highest) = seen.force, seen.position
     if least == most:
-        return [Check("excitation", False, f"the force is {least:g} N all the time; excite the device")]
+        return [Check("excitation", False, f"the force is {least + 0.0:g} N all the time; excite the device")]
     if lowest == highest:
-        return [Check("motion", False, f"the position is {lowest:g} m all the time; is the encoder read?")]
+        return [Check("motion", False, f"the position is {lowest + 0.0:g} m all the time; is the encoder read?")]
     checks = [Check("excitation", True, f"the force runs from {least:.4g} to {most:.4g} N")]
     counts = (highest - lowest) / seen.step if seen.step else np.inf
     said = f"the position runs over {highest - lowest:.4g} m" + (f", {counts:.4g} counts" if seen.step else "")
