@@ -25,7 +25,6 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 SHORTEST_SEGMENT = 64  # samples
-FEWEST_SAMPLES = 2 * SHORTEST_SEGMENT
 EXCITED = 1e-7  # power of the force, over its largest, below which a frequency was not excited
 LEFT_AT_END = 0.1  # the same over that at frequencies from half of it on: there an excitation ends
 AVERAGES = 8.0  # in a spectrum of which the coherence that is given leaves the same error

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.identify.records.record import Piece
+from zwidth.identify.records.sampling import joined
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -136,13 +137,10 @@ def local_spectra(stretches: Iterable[Piece], period: float, length: int, names:
     middles = 1 + HALF + STRIDE * np.arange(count)
     gram: Complexes = np.zeros((count, 2 * TERMS, 2 * TERMS), dtype=np.complex128)
     segments = 0
-    kept, after = np.empty((2, 0)), -1
-    for piece in stretches:
+    kept = np.empty((2, 0))
+    for piece, goes_on in joined(stretches):
         values = np.array([piece[name] for name in names])
-        numbers = piece["sample"]
-        joins = len(numbers) > 0 and int(numbers[0]) == after
-        kept = np.concatenate([kept, values], axis=1) if joins else values
-        after = int(numbers[-1]) + 1 if len(numbers) else -1
+        kept = np.concatenate([kept, values], axis=1) if goes_on else values
         whole = (kept.shape[1] - DIFFERENCES) // length
         several = max(1, BATCH // (2 * length))
         for first in range(0, whole, several):

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbours
 from zwidth.identify.records.record import Piece, Record
-from zwidth.identify.records.sampling import Sampling
+from zwidth.identify.records.sampling import Sampling, joined
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -184,12 +184,11 @@ def longest_stretch(record: Record, sampling: Sampling, state: str) -> int:
     """Samples of the longest stretch of a state of the wall without a gap."""
     if "wall" not in record:
         return sampling.longest
-    longest = count = after = 0
+    longest = count = 0
     names = (record.names[0], record.names[0])
-    for piece in stretches_of(record, sampling, names, state, (0.0, 1.0)):
-        numbers = piece["sample"]
-        count = len(numbers) + (count if int(numbers[0]) == after else 0)
-        longest, after = max(longest, count), int(numbers[-1]) + 1
+    for piece, goes_on in joined(stretches_of(record, sampling, names, state, (0.0, 1.0))):
+        count = len(piece["sample"]) + (count if goes_on else 0)
+        longest = max(longest, count)
     return longest
 
 

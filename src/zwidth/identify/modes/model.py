@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from zwidth.device import address
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, dotted, fail, quote
+from zwidth.device.faults import dotted, fail, quote
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.operator import Operator, attach
+from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -323,11 +323,6 @@ def without_hand(point: OperatingPoint) -> Loop:
     return Loop(point.ungripped_plant, point.loop.controller)
 
 
-def hand_of(operator: Operator) -> Mapping[str, float | None]:
-    """The five numbers by their keys."""
-    return {key: getattr(operator, _attribute(key)) for key in HAND}
-
-
 # --- everything else, through the file --------------------------------------------------------------------------
 
 
@@ -377,13 +372,4 @@ def _unit_of(path: str) -> str:
     for ending, unit in units.items():
         if key.endswith("_" + ending):
             return unit
-    return ""
-
-
-def check_settings(device: Device, settings: Mapping[str, float]) -> str:
-    """Why the device cannot have these numbers; "" where it can."""
-    try:
-        device.with_(dict(settings))
-    except DeviceError as error:
-        return str(error)
     return ""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.device.device import Device
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling
+from zwidth.identify.records.sampling import Sampling, joined
 from zwidth.loop.operating_point import OperatingPoint
 
 Floats = NDArray[np.float64]
@@ -95,20 +95,17 @@ class Source:
         return next(self.stretches(), None)
 
     def _read(self) -> Iterator[Stretch]:
-        held, after = dict[str, Floats](), -1
-        for piece in self.sampling.stretches(self.record):
-            numbers = piece["sample"]
-            if not len(numbers):
-                continue
+        held = dict[str, Floats]()
+        for piece, goes_on in joined(self.sampling.stretches(self.record)):
             part = {field_: piece[name] for field_, name in self.channels.names.items()}
-            if held and int(numbers[0]) == after:
+            if held and goes_on:
                 part = {name: np.concatenate([held[name], values]) for name, values in part.items()}
             elif held:
                 yield from _stretch(held)
             while len(part["force"]) >= BLOCK:
                 yield from _stretch({name: values[:BLOCK] for name, values in part.items()})
                 part = {name: values[BLOCK:] for name, values in part.items()}
-            held, after = part, int(numbers[-1]) + 1
+            held = part
         if held:
             yield from _stretch(held)
 

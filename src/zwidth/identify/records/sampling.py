@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from typing import Final
@@ -63,6 +63,19 @@ class Sampling:
                 row = np.arange(start + inside.start, start + inside.stop)
                 yield cut | {"row": row, "sample": row + run}
             start += rows
+
+
+def joined(stretches: Iterable[Piece]) -> Iterator[tuple[Piece, bool]]:
+    """Pieces with a column "sample", and whether each goes on where the one before has ended.
+
+    Those without rows are left out.
+    """
+    after = -1
+    for piece in stretches:
+        numbers = piece["sample"]
+        if len(numbers):
+            yield piece, int(numbers[0]) == after
+            after = int(numbers[-1]) + 1
 
 
 def check_sampling(record: Record, period: float | None = None) -> tuple[Sampling | None, Check]:
