@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 UNKNOWN: Final = 1024  # lines that are kept one by one as long as no poles are known
-SETTLED: Final = 0.01  # of the distance of two lines, by which a pole may move between two rounds
+SETTLED: Final = 1e-3  # of the distance of two lines, by which a pole may move between two rounds
 ALMOST: Final = 0.9995  # of half the sampling rate, up to which is fitted
 
 

@@ -61,7 +61,7 @@ COLUMNS: Final = Columns(
     ("time_s", ("force_N", "torque_Nm"), ("position_m", "angle_rad")),
     ("reference_N", "reference_Nm", "command_N", "command_Nm"),
 )
-MOST_ROUNDS: Final = 4
+MOST_ROUNDS: Final = 8
 STRONG: Final = 10.0  # difference of the information criterion that is clear (Kass and Raftery 1995)
 SHIFTED: Final = -0.5  # samples of delay, below which nothing more is fitted
 MISFIT: Final = 1.5  # by which residuals may exceed the noise before a model is said to miss something

@@ -106,24 +106,17 @@ def segment_length(samples: int, segment: int | None = None) -> int:
 def averaged_spectra(
     stretches: Iterable[Piece], period: float, length: int, differences: Mapping[str, int]
 ) -> Spectra:
-    """Welch's averaged spectra of pieces of a record: Hann windows of `length` that overlap by half, each less its
-    mean, none across a gap (Welch 1967).
+    """Welch's averaged spectra of stretches of a record: Hann windows of `length` that overlap by half, each less
+    its mean, none from one stretch into the next (Welch 1967).
 
-    stretches    pieces with a column "sample" that numbers the samples, as `Sampling.stretches` makes them;
-                 without it a gap lies between each two
+    stretches    each with its channels as columns (n,)
     differences  channels, and how often each is differenced: a position that drifts leaks into every line
     """
     names = tuple(differences)
     order = tuple(differences.values())
     sums = _Sums(len(names), length)
-    kept, after = np.empty((len(names), 0)), -1
-    for piece in stretches:
-        values = np.array([piece[name] for name in names])
-        numbers = piece.get("sample", np.zeros(0, dtype=int))
-        joins = len(numbers) > 0 and int(numbers[0]) == after
-        kept = np.concatenate([kept, values], axis=1) if joins else values
-        after = int(numbers[-1]) + 1 if len(numbers) else -1
-        kept = sums.add(kept, order)
+    for stretch in stretches:
+        sums.add([stretch[name] for name in names], order)
     usable = slice(2, None)
     n = max(sums.count, 1)
     frequency = np.arange(length // 2 + 1) / (length * period)
@@ -146,14 +139,13 @@ class _Sums:
         self.count, self.length = 0, length
         self._window = np.hanning(length + 1)[:-1]
 
-    def add(self, values: Floats, order: Sequence[int]) -> Floats:
-        """Add the segments of (c, n) samples; returns what the next one begins with."""
+    def add(self, values: Sequence[Floats], order: Sequence[int]) -> None:
+        """Add the segments of channels (c, n)."""
         L, hop = self.length, self.length // 2
-        most = max(order, default=0)
-        n = values.shape[1] - most
-        count = 1 + (n - L) // hop if n >= L else 0
-        if not count:
-            return values
+        n = len(values[0]) - max(order, default=0)
+        if n < L:
+            return
+        count = 1 + (n - L) // hop
         moved = [np.diff(row, n=m)[:n] for row, m in zip(values, order, strict=True)]
         several = max(1, BATCH // (L * len(order)))
         for first in range(0, count, several):
@@ -166,7 +158,6 @@ class _Sums:
                     if a != b:
                         self.matrix[:, b, a] += np.conj(product)
         self.count += count
-        return values[:, count * hop :]
 
     def _transform(self, row: Floats, starts: range) -> Complexes:
         from scipy.fft import rfft
