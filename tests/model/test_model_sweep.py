@@ -12,7 +12,7 @@ from zwidth.chart.measured.chart import measured_chart
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.response import ResponseError
-from zwidth.model.sweep_response import encoder_step, sweep_response
+from zwidth.model.sweep_response import sweep_response
 
 T = 0.001
 DEVICE = systems.two_mass(0.26, 0.025, 15000.0, 8.0)
@@ -63,10 +63,3 @@ def test_a_record_that_cannot_serve_is_refused():
         sweep_response(force[:100], force[:100], T)
     with pytest.raises(ResponseError, match="is 2 N all the time"):
         sweep_response(np.full(1000, 2.0), force, T)
-
-
-def test_a_drift_does_not_hide_the_encoders_step():
-    """4096 readings over 8 m, of which no two are as close as a step of 0.1 um."""
-    rng = np.random.default_rng(5)
-    counts = np.rint(5000.0 * np.arange(4096) * 4.0 + np.cumsum(rng.normal(size=4096)) * 50.0)
-    assert encoder_step(counts * 1e-7) == pytest.approx(1e-7, rel=1e-3)

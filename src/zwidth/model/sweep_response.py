@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.encoder_step import encoder_step
 from zwidth.model.local_polynomials import (
     MOST_TILES,
     NARROWEST,
@@ -35,7 +36,6 @@ CLOSEST = 3.0  # spacing of the response's frequencies, in those of the record's
 RATIO = 0.01  # the same in shares of the frequency, from where that is wider
 BLOCK = 2**20  # samples of a long record that are transformed at once; its response is one over all blocks
 SEGMENTS_IN_BLOCK = 256  # that were given; so that a window of 64 spacings is no wider than theirs
-BELOW_ALL_STEPS = 1e-9  # of the largest reading: what is closer is no step of an encoder, but rounding
 
 
 def sweep_response(
@@ -107,7 +107,7 @@ def sweep_response_of_blocks(
     sums = None if second is None else PieceSums(values, narrowest)
     for force, position in chain([first], [] if second is None else [second], blocks):
         sizes.append(_ForceSize.of(force))
-        step = min(step, encoder_step(position) or np.inf)
+        step = min(step, encoder_step([position]) or np.inf)
         U, Y = transforms(force, position, m, count)
         if sums is not None:
             sums.add(U, Y)
@@ -238,11 +238,3 @@ def _places(samples: int, segment: int | None) -> Floats:
     steps = np.ceil(np.log(0.5 / first[-1]) / RATIO)
     above = first[-1] * np.exp(np.log(0.5 / first[-1]) * np.arange(1, steps + 1) / max(steps, 1.0))
     return np.asarray(np.minimum(np.concatenate([first, above]), 0.5))
-
-
-def encoder_step(position: Floats) -> float:
-    """The smallest step [m] between readings (n,), or in their second differences: that of the encoder, or next to
-    nothing without one. Second differences show it where readings drift so far that none is close to another."""
-    gaps = np.concatenate([np.diff(np.unique(position)), np.abs(np.diff(position, n=2))])
-    gaps = gaps[gaps > BELOW_ALL_STEPS * np.max(np.abs(position))]
-    return float(np.min(gaps)) if len(gaps) else 0.0

@@ -15,6 +15,7 @@ from zwidth.identify.arm.channels import Channels
 from zwidth.identify.arm.smoothing import convolved
 from zwidth.identify.identification import Check
 from zwidth.identify.records.record import Piece
+from zwidth.model.encoder_step import encoder_step
 
 Floats = NDArray[np.float64]
 
@@ -51,11 +52,11 @@ class Survey:
 def motion_check(drives: Sequence[str], surveys: Sequence[Survey], counts: Floats, turning: Floats) -> Check:
     """That the joints move by more than ten counts.
 
-    counts   (d,) of the encoders, at the joint [rad], [m]; nan where not known: the least step that is seen
+    counts   (d,) of the encoders, at the joint [rad], [m]; nan where not known: the step that the readings show
     turning  (d,) whether a coordinate is an angle
     """
     spans = np.max([np.ptp(one.coordinates, axis=0) for one in surveys], axis=0)
-    steps = np.max([_least_steps(one.coordinates) for one in surveys], axis=0)
+    steps = np.max([_steps(one.coordinates) for one in surveys], axis=0)
     steps = np.where(np.isfinite(counts), counts, steps)
     still = [k for k in range(len(drives)) if not spans[k] > COUNTS * steps[k] or spans[k] == 0.0]
     far = [k for k in range(len(drives)) if turning[k] and spans[k] > 8.0 * np.pi]
@@ -63,22 +64,19 @@ def motion_check(drives: Sequence[str], surveys: Sequence[Survey], counts: Float
         named = comma_list([f"{drives[k]} by {spans[k]:.3g} rad" for k in far])
         return Check("motion", False, f"{named}, which is several turns: are these angles in degrees or counts?")
     if still:
-        named = comma_list(
-            [f"{drives[k]} by {spans[k]:.3g} ({spans[k] / max(steps[k], 1e-300):.3g} counts)" for k in still]
-        )
+        counted = [f" ({spans[k] / steps[k]:.3g} counts)" if steps[k] else "" for k in range(len(drives))]
+        named = comma_list([f"{drives[k]} by {spans[k]:.3g}{counted[k]}" for k in still])
         reason = f"too little motion: {named}; move every joint by more than {COUNTS:g} counts"
         return Check("motion", False, reason, warning=len(still) < len(drives))
     least = comma_list([f"{name} by {span:.3g}" for name, span in zip(drives, spans, strict=True)])
-    worst = float(np.min(spans / np.maximum(steps, 1e-300)))
-    return Check("motion", True, f"{least} (rad or m), {worst:.3g} counts at least")
+    shown = steps > 0.0
+    worst = f", {np.min(spans[shown] / steps[shown]):.3g} counts at least" if shown.any() else ""
+    return Check("motion", True, f"{least} (rad or m){worst}")
 
 
-def _least_steps(values: Floats) -> Floats:
-    """The least steps (d,) between values that differ."""
-    steps = np.abs(np.diff(values[:200_000], axis=0))
-    steps[steps == 0.0] = np.inf
-    least = np.min(steps, axis=0, initial=np.inf)
-    return np.where(np.isfinite(least), least, 0.0)
+def _steps(values: Floats) -> list[float]:
+    """The steps (d,) of the encoders, as the readings (n, d) show them; 0 where they show none."""
+    return [encoder_step([column]) for column in values.T]
 
 
 def torque_check(drives: Sequence[str], surveys: Sequence[Survey], limits: Floats) -> Check:

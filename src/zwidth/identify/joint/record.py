@@ -14,6 +14,7 @@ from zwidth.identify.joint.fit import Windows
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
+from zwidth.model.encoder_step import encoder_step
 
 Floats = NDArray[np.float64]
 
@@ -23,8 +24,6 @@ BEFORE: Final = 8  # samples before a window, from which a delayed force comes
 FEWEST: Final = 40  # samples in a window
 MANY: Final = (36, 27, 18, 12, 6)  # windows of all records, as many as bend enough
 BEND: Final = 40.0  # steps of the encoder by which the motion in a window leaves a straight line
-SHORTEST_STEP: Final = 1e-9  # share of the travel below which a difference is rounding
-WHOLE: Final = 0.02  # by which a difference may miss a whole number of steps
 STANDING: Final = 3.0  # steps within which a window that stands moves
 
 
@@ -140,23 +139,6 @@ def planned_sections(runs: NDArray[np.int64], total: int) -> list[tuple[int, int
         for start in np.linspace(a, max(b - length, a), many).astype(int):
             planned.append((int(start), int(min(start + length, b)), n))
     return planned
-
-
-def encoder_step(readings: Sequence[Floats]) -> float:
-    """The step of which all differences of consecutive readings are whole multiples; 0 where there is none."""
-    steps = np.abs(np.concatenate([np.diff(one) for one in readings]))
-    least = SHORTEST_STEP * max(
-        float(np.max(steps, initial=0.0)), max(float(np.max(np.abs(one))) for one in readings) * 1e-3
-    )
-    steps = steps[steps > least]
-    if not len(steps):
-        return 0.0
-    step = float(np.min(steps))
-    few = steps[steps < 50.0 * step]
-    step = float(np.median(few / np.rint(few / step)))
-    few = steps[steps < 20.0 * step] / step
-    whole = np.mean(np.abs(few - np.rint(few)) < WHOLE)
-    return step if len(few) >= 5 and whole > 0.98 else 0.0
 
 
 def noise_of(sections: Sequence[Section]) -> float:

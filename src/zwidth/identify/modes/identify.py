@@ -44,11 +44,12 @@ from zwidth.identify.modes.overview import Survey, survey_of
 from zwidth.identify.modes.periodic_force import periodic_lines
 from zwidth.identify.modes.physical_fit import PhysicalFit, fit_model
 from zwidth.identify.modes.spectra import Spectra, averaged_spectra
-from zwidth.identify.modes.stretches import KEPT, Channels, Source, channels_of, quantum
+from zwidth.identify.modes.stretches import KEPT, Channels, Source, channels_of
 from zwidth.identify.records.columns import Columns
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import check_sampling
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.encoder_step import encoder_step
 from zwidth.model.modes import undamped_modes
 from zwidth.progress import Progress
 
@@ -188,7 +189,7 @@ def _saw(
             checks.append(Check("duration", False, reason))
             continue
         first = source.first()
-        checks += level_checks(source, levels, quantum([first] if first else []), given, limit)
+        checks += level_checks(source, levels, encoder_step([first.position] if first else []), given, limit)
     closed = bool(sources[0].channels.reference)
     chosen = estimator or ("joint" if closed else "H1")
     if any(not (c.passed or c.warning) for c in checks) or not survey.spectra.segments:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -19,7 +19,6 @@ Floats = NDArray[np.float64]
 BLOCK: Final = 1 << 20  # samples that are transformed at once
 KEPT: Final = 1 << 21  # samples of all records that are kept in memory; longer ones are read again
 SHORTEST: Final = 256  # samples of a stretch that is used
-LARGEST: Final = 1 << 16  # different values among which a step is looked for
 
 
 class Stretch(NamedTuple):
@@ -125,7 +124,6 @@ class Levels:
     low, high, mean, square   of force and position: (2,) each, `mean` and `square` as sums about the first sample
     at_limit         samples at the largest or the least force
     longest          stretch of samples [samples]
-    step             least step between two positions; inf for none
     """
 
     count: int = 0
@@ -136,7 +134,6 @@ class Levels:
     square: Floats = field(default_factory=lambda: np.zeros(2))
     at_limit: int = 0
     longest: int = 0
-    step: float = np.inf
     drift: float = 0.0
 
     def add(self, stretch: Stretch) -> None:
@@ -154,8 +151,6 @@ class Levels:
         self.square += (about**2).sum(axis=1)
         self.count += both.shape[1]
         self.longest = max(self.longest, both.shape[1])
-        steps = np.abs(np.diff(stretch.position[:LARGEST]))
-        self.step = min(self.step, float(np.min(steps, where=steps > 0.0, initial=np.inf)))
         t = np.linspace(-1.0, 1.0, both.shape[1])
         slope = 3.0 * float(np.mean(t * (stretch.position - stretch.position[0])))
         self.drift = max(self.drift, 2.0 * abs(slope))
@@ -170,28 +165,3 @@ class Levels:
     def span(self) -> Floats:
         """Largest less least force and position (2,)."""
         return self.high - self.low
-
-
-def quantum(stretches: Sequence[Stretch]) -> float:
-    """The step of the encoder as the positions show it; 0 where they show none.
-
-    All differences must be whole multiples of the least one.
-    """
-    steps = (
-        np.concatenate([np.diff(one.position[:LARGEST]) for one in stretches[:2]]) if stretches else np.zeros(0)
-    )
-    size = np.abs(steps[steps != 0.0])
-    if not len(size):
-        return 0.0
-    scale = float(np.max([np.max(np.abs(one.position)) for one in stretches[:2]]))
-    least = float(np.min(size))
-    if least < 1e-11 * scale:
-        size = size[size > 1e-9 * scale]
-        if not len(size):
-            return 0.0
-        least = float(np.min(size))
-    least = float(np.mean(size[size < 1.5 * least]))
-    share = size / least
-    whole = np.abs(share - np.rint(share)) < 0.02 * np.maximum(1.0, share / 20.0)
-    few = len(np.unique(np.rint(share))) < 0.5 * len(size)  # of a fine noise all differences are unlike
-    return least if np.mean(whole) > 0.98 and np.mean(share < 40.0) > 0.02 and few else 0.0

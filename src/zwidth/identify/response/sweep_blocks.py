@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
-from zwidth.identify.stiffness.strokes import resolution_of
+from zwidth.model.encoder_step import encoder_step
 
 Floats = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class SweepRange:
         first_levels  samples among which levels are counted
         """
         force, position = next(sweep.blocks(min(len(sweep), FIRST)))
-        step = resolution_of(position).step if np.ptp(position) > 0.0 else 0.0
+        step = encoder_step([position])
         levels = len(np.unique(force[:first_levels]))
         low, high, at_low, at_high = np.full(2, np.inf), np.full(2, -np.inf), 0, 0
         for values in sweep.pieces():
