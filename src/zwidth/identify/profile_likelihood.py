@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Floats = NDArray[np.float64]
 Residuals = Callable[[Floats], Floats]
 
 LEVEL: Final = 0.95
-MOST_STEPS: Final = 20  # towards one end of an interval
-MOST_TRIALS: Final = 8  # steps of the other parameters at each of them
+MOST_STEPS: Final = 40  # towards one end of an interval
+LOST: Final = (
+    3.0  # times the wanted rise's root, beyond which a step was too far, or others have lost their valley
+)
+SHORTER: Final = 0.25  # such a step, then
+MOST_TRIALS: Final = 25  # steps of the other parameters at each of them
 MOST_DAMPED: Final = 5  # shorter ones, where one does not gain
 ENOUGH: Final = 1e-3  # of the rise at an end: what a step must gain
 SHORT, SHORTEST = 1e-3, 1e-6  # step of a derivative, in standard deviations, or in shares of the parameter
+SAME: Final = 0.1  # standard deviations within which two minima are one
 CLOSE: Final = 1e-3  # share of the half width to which an end is found
 FARTHEST: Final = 1e3  # half widths by curvature, beyond which the data set no bound
 
@@ -64,6 +72,7 @@ def fit_least_squares(
     tolerance: float = 1e-12,
     level: float = LEVEL,
     profiled: bool = True,
+    rivals: Sequence[Floats] = (),
 ) -> Fit:
     """Parameters x that make |r(x)|^2 least, each with its interval by the profile likelihood.
 
@@ -83,6 +92,8 @@ def fit_least_squares(
     diff_step        relative step of the derivatives, for residuals that are not exact to rounding; None: 1.5e-8
     tolerance        relative change of the sum of squares at which the search ends
     profiled         False: intervals by the curvature alone, q sigma_i
+    rivals           further places (p,) where the search begins. Where the sum of squares has several minima, the
+                     least is the fit, and all whose rise is below that of an interval's end widen the interval
     Raises           ValueError  for fewer residuals than parameters, or some that are no numbers at the start
     """
     from scipy.optimize import least_squares
@@ -93,17 +104,14 @@ def fit_least_squares(
     first = residuals(x0)
     if len(first) < len(x0) or not np.all(np.isfinite(first)):
         raise ValueError(f"{len(first)} residuals for {len(x0)} parameters, or some are no finite numbers")
-    solved = least_squares(
-        residuals,
-        x0,
-        bounds=(low, high),
-        x_scale="jac",
-        diff_step=diff_step,
-        xtol=1e-10,
-        ftol=tolerance,
-        gtol=1e-12,
-    )
-    x, r = np.asarray(solved.x), np.asarray(solved.fun)
+    settings = {"bounds": (low, high), "x_scale": "jac", "diff_step": diff_step}
+    minima = [least_squares(residuals, x0, xtol=1e-10, ftol=tolerance, gtol=1e-12, **settings)]
+    minima += [
+        least_squares(residuals, place, xtol=1e-8, ftol=max(tolerance, 1e-8), gtol=1e-12, **settings)
+        for place in rivals
+    ]
+    solved = min(minima, key=lambda one: float(one.cost))
+    x, r = solved.x, np.asarray(solved.fun)
     count = len(r) if effective_count is None else effective_count
     thinned = count / len(r)  # each residual counts for so much of an independent one
     freedom = max(count - len(x), 1.0)
@@ -116,13 +124,34 @@ def fit_least_squares(
     sigma = np.sqrt(np.diag(covariance))
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
     if profiled and scale > 0.0:
+        least = float(np.sum(r**2))
+        places = _distinct(minima, solved, scale**2 / thinned)
         for i in range(len(x)):
             rise = float(quantile[i] * scale) ** 2 / thinned
-            search = _EndSearch(residuals, x, float(np.sum(r**2)), rise, low, high, covariance, diff_step)
-            for side in (0, 1):
-                ends[side, i] = search.end(i, ends[side, i])
+            for place, height, own in places:
+                search = _EndSearch(residuals, place, height, least, rise, low, high, own, diff_step)
+                if height - least < rise:
+                    width = quantile[i] * np.sqrt(own[i, i])
+                    both = [search.end(i, place[i] - width), search.end(i, place[i] + width)]
+                    ends[:, i] = both if place is x else (min(ends[0, i], both[0]), max(ends[1, i], both[1]))
     ends = np.where(np.isfinite(ends), ends, np.array([[-np.inf], [np.inf]]))
     return Fit(x, ends[0], ends[1], covariance, r, scale, freedom, bool(solved.status > 0))
+
+
+def _distinct(
+    minima: Sequence[OptimizeResult], least: OptimizeResult, variance: float
+) -> list[tuple[Floats, float, Floats]]:
+    """Place (p,), sum of squares and covariance (p, p) of each minimum, the least first, those that came to the
+    same place once.
+
+    variance  of a residual
+    """
+    found = list[tuple[Floats, float, Floats]]()
+    for one in (least, *(one for one in minima if one is not least)):
+        apart = [np.abs(one.x - place) > SAME * np.sqrt(np.diag(own)) for place, _, own in found]
+        if all(np.any(far) for far in apart):
+            found.append((one.x, 2.0 * float(one.cost), _covariance(one.jac) * variance))
+    return found
 
 
 def _covariance(jacobian: Floats) -> Floats:
@@ -138,10 +167,12 @@ def _covariance(jacobian: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class _EndSearch:
-    """Where the least sum of squares has risen by `rise` above `least`, along one parameter."""
+    """Where the sum of squares, least over the other parameters, is by `rise` above `least`, along one parameter
+    from a minimum at `best` whose own sum is `height`."""
 
     residuals: Residuals
     best: Floats
+    height: float
     least: float
     rise: float
     lower: Floats
@@ -151,27 +182,33 @@ class _EndSearch:
 
     def end(self, i: int, guess: float) -> float:
         """The end of parameter i's interval on the side of a guess; -inf, inf where there is none within its
-        bounds or FARTHEST widths."""
+        bounds or FARTHEST widths.
+
+        The others follow along the valley from the last place within: where a step goes so far that they lose it,
+        a shorter one is made, and the end is looked for from within.
+        """
         towards = np.sign(guess - self.best[i]) or 1.0
         if not np.isfinite(guess):
             return float(towards * np.inf)
-        bound = self.upper[i] if towards > 0 else self.lower[i]
+        bound = abs((self.upper[i] if towards > 0 else self.lower[i]) - self.best[i])
         width = abs(guess - self.best[i])
-        inner, outer = 0.0, np.nan  # steps with a rise below and above the wanted one
-        step, rest, before = width, self.best.copy(), 0.0
-        rises = {0.0: 0.0}
         along = np.nan_to_num(
             self.covariance[i] / self.covariance[i, i], posinf=0.0, neginf=0.0
         )  # how the others move with this one, to first order
+        inner, place, outer = 0.0, self.best, np.nan  # steps with a rise below and above the wanted one
+        step, rises = width, {0.0: float(np.sqrt(max(self.height - self.least, 0.0) / self.rise))}
         for _ in range(MOST_STEPS):
-            step = min(step, abs(bound - self.best[i]))
-            rest = np.clip(rest + towards * (step - before) * along, self.lower, self.upper)
-            risen, rest = self._risen(i, self.best[i] + towards * step, rest)
-            before = step
-            rises[step] = root = float(np.sqrt(max(risen, 0.0) / self.rise))
+            step = min(step, bound)
+            moved = np.clip(place + towards * (step - inner) * along, self.lower, self.upper)
+            risen, rest = self._risen(i, self.best[i] + towards * step, (moved, place))
+            root = float(np.sqrt(max(risen, 0.0) / self.rise))
+            if root > LOST and step - inner > CLOSE * width:
+                outer, step = np.nan, inner + SHORTER * (step - inner)
+                continue
+            rises[step] = root
             if root < 1.0:
-                inner = step
-                if step >= abs(bound - self.best[i]) or step > FARTHEST * width:
+                inner, place = step, rest
+                if step >= bound or step > FARTHEST * width:
                     return float(towards * np.inf)
             else:
                 outer = step
@@ -187,8 +224,11 @@ class _EndSearch:
         share = (1.0 - rises[inner]) / (rises[outer] - rises[inner])
         return inner + float(np.clip(share, 0.1, 0.9)) * (outer - inner)
 
-    def _risen(self, i: int, fixed: float, start: Floats) -> tuple[float, Floats]:
-        """By how much the least sum of squares with parameter i held exceeds the least of all, and its place."""
+    def _risen(self, i: int, fixed: float, starts: Sequence[Floats]) -> tuple[float, Floats]:
+        """By how much the least sum of squares with parameter i held exceeds the least of all, and its place.
+
+        starts  places of all parameters; the search begins at the better one
+        """
         others = np.arange(len(self.best)) != i
 
         def held(some: Floats) -> Floats:
@@ -200,11 +240,10 @@ class _EndSearch:
             return float(np.sum(held(np.zeros(0)) ** 2)) - self.least, self.best.copy()
         sigma = np.sqrt(np.diag(self.covariance)[others])
         size = np.maximum(np.abs(self.best[others]), SHORTEST)
-        step = np.where(np.isfinite(sigma), SHORT * sigma, SHORTEST * size)
+        step = np.where(np.isfinite(sigma), SHORT * np.minimum(sigma, np.maximum(size, 1.0)), SHORTEST * size)
         step = np.maximum(step, (self.diff_step or 0.0) * size)
-        rest, least = _descended(
-            held, start[others], step, self.lower[others], self.upper[others], ENOUGH * self.rise
-        )
+        start = min((one[others] for one in starts), key=lambda some: float(np.sum(held(some) ** 2)))
+        rest, least = _descended(held, start, step, self.lower[others], self.upper[others], ENOUGH * self.rise)
         place = np.empty(len(self.best))
         place[others], place[i] = rest, fixed
         return least - self.least, place

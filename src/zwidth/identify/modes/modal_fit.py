@@ -22,6 +22,8 @@ Damping = Literal["viscous", "hysteretic"]
 RATIOS: Final = (0.005, 0.04, 0.3)  # damping ratios among which a further mode is looked for
 POINTS: Final = 100  # frequencies among which it is
 FIRST_DELAYS: Final = (0.0, 1.0, 2.0)  # samples
+REFINED: Final = 2  # places of a further mode that are refined
+FOLDED: Final = 0.5  # of half the sampling rate, above which modes beyond it may show
 MOST_MODES: Final = 6
 PROFILED: Final = 3  # modes at most whose intervals follow the likelihood; of more, its curvature
 UNEXPLAINED, HELPFUL = 2.0, 0.7  # misfit beyond which a third mode must lower the sum of squares to such a share
@@ -140,9 +142,10 @@ def fit_modes(
     else:
         best = _pruned(data, _refined(data, near))
     while best.count < most:
-        delays = FIRST_DELAYS if best.count == 0 else (float(best.vector[0]),)
-        tried = [_with_mode(data, replace(best, vector=np.r_[d, best.vector[1:]])) for d in delays]
-        longer = _refined(data, min(tried, key=lambda fit: fit.chi_squared))
+        delays = (float(best.vector[0]), *(FIRST_DELAYS if best.count == 0 else ()))
+        tried = [one for d in delays for one in _with_mode(data, replace(best, vector=np.r_[d, best.vector[1:]]))]
+        tried.sort(key=lambda fit: fit.chi_squared)
+        longer = min((_refined(data, one) for one in tried[:REFINED]), key=lambda fit: fit.chi_squared)
         if best.count and not best.coupled:
             # dampers that couple the modes are no further mode; with them the base shows
             bases = BASES if best.count > 1 else ("free, braked",)  # one mode alone is coupled to nothing else
@@ -173,7 +176,7 @@ def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
     A[n:, :n] = -np.linalg.solve(plant.mass, plant.stiffness)
     A[n:, n:] = -np.linalg.solve(plant.mass, plant.damping)
     poles = np.linalg.eigvals(A)
-    low, fast = np.log(SLOWEST * data.theta.min() / T), np.log(np.pi / T)
+    low, fast = np.log(SLOWEST * data.theta.min() / T), np.log((2.0 - FOLDED) * np.pi / T)
     real = np.sort(
         np.abs(poles[(np.abs(poles.imag) < 1e-9 * np.abs(poles)) & (np.log(np.abs(poles) + 1e-300) > low)].real)
     )
@@ -186,7 +189,8 @@ def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
         if low < np.log(w) < fast:
             vector += [np.log(w), np.log(max(ratio, 2.0 * LEAST_RATIO))]
     start = _solved(data, "free", T, np.array(vector))
-    fits = [_on_base(data, replace(start, coupled=coupled), base) for base in BASES for coupled in (False, True)]
+    ways = (False, True) if start.count else (False,)  # dampers couple modes, where there are some
+    fits = [_on_base(data, replace(start, coupled=coupled), base) for base in BASES for coupled in ways]
     return min((_refined(data, fit) for fit in fits), key=lambda fit: fit.criterion)
 
 
@@ -216,21 +220,25 @@ def _first_brake(base: str, data: LocalResponse, period: float) -> list[float]:
     return [float(np.log(data.theta.min() / period))] if base == "free, braked" else []
 
 
-def _with_mode(data: LocalResponse, fit: ModalFit) -> ModalFit:
-    """One more mode, where it lowers the sum of squares most."""
+def _with_mode(data: LocalResponse, fit: ModalFit) -> list[ModalFit]:
+    """One more mode, where it lowers the sum of squares most, below half the sampling rate and above, which
+    sampling makes look much alike."""
     columns = data.apply(fit.columns(fit.vector, data.theta))
     q, _ = np.linalg.qr(columns)
     rest = data.target - q @ (q.T @ data.target)
     f = np.unique(data.theta)
     f = f[np.unique(np.linspace(0, len(f) - 1, POINTS).astype(int))]
+    f = np.append(f, 2.0 * np.pi - f[f > FOLDED * np.pi])
     choices = [(np.log(t / fit.period), np.log(zeta)) for t in f for zeta in RATIOS]
     pairs = [(float(np.exp(zeta + w)), float(np.exp(2.0 * w))) for w, zeta in choices]
     rows = data.apply(_rows(pairs, fit.period, float(fit.vector[0]), data.theta))
     rows -= q @ (q.T @ rows)
     size = np.sum(rows**2, axis=0)
     gain = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
-    vector = np.r_[fit.vector, choices[int(np.argmax(gain))]]
-    return _solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled)
+    above = np.repeat(f > np.pi, len(RATIOS))
+    best = [int(np.argmax(np.where(which, gain, -1.0))) for which in (~above, above) if which.any()]
+    vectors = [np.r_[fit.vector, choices[i]] for i in best]
+    return [_solved(data, fit.base, fit.period, vector, fit.damping, fit.coupled) for vector in vectors]
 
 
 def _solved(
@@ -265,7 +273,7 @@ def _residuals(data: LocalResponse, fit: ModalFit) -> Callable[[Floats], Floats]
 
 def _limits(fit: ModalFit, data: LocalResponse) -> tuple[Floats, Floats]:
     T = fit.period
-    slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log(1.2 * np.pi / T)
+    slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log((2.0 - FOLDED) * np.pi / T)
     braked = fit.base == "free, braked"
     low = [LEAST_DELAY, *([np.log(1e-3 * data.theta.min() / T)] * braked)]
     high = [MOST_DELAY, *([np.log(10.0 / T)] * braked)]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -23,6 +25,9 @@ POINTS: Final = 30  # frequencies by which they are compared
 GOOD, ENOUGH = 1.05, 25.0  # times the sum of squares of the modes alone, or so much more: a fit has arrived
 FAR: Final = np.log(1e4)  # beyond which no number is looked for
 ABOUT: Final = (0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of a mode's frequency, where starts are compared, too
+DAMPED: Final = (0.1, 1.0, 10.0)  # times the damping of a mode about half the sampling rate
+RIVAL: Final = 8.0  # by which a sum of squares may exceed the least one, and still set an interval's end
+ELSEWHERE: Final = 0.05  # how far from the least one, in logarithms
 HEAVY: Final = 10.0  # weight of a mode's frequency beside that of a point of the response
 LOST_START: Final = 50.0
 LOST: Final = 1e6  # residual where there is no such device
@@ -71,15 +76,16 @@ def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period:
     if timed and modal.count:
         start[timed[0]] = np.clip(modal.delay, 0.0, high[timed[0]])
     good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
-    best = _descended(residuals, start, low, high)
-    if best[1] > good and modal.chi_squared < HOPELESS * rows:
+    minima = [_descended(residuals, start, low, high)]
+    if minima[0][1] > good and modal.chi_squared < HOPELESS * rows:
         for x in _starts(data, model, modal, start, low, high, period):
-            other = _descended(residuals, x, low, high)
-            best = other if other[1] < best[1] else best
-            if best[1] <= good:
+            minima.append(_descended(residuals, x, low, high))
+            if minima[-1][1] <= good:
                 break
-    best = _unfolded(residuals, model, best, low, high, period)
-    fit = fit_least_squares(residuals, best[0], lower=low, upper=high)
+    best, _ = min(minima, key=lambda one: one[1])
+    minima += [_descended(residuals, x, low, high) for x in _unfolded(model, best, low, high, period)]
+    best, rivals = _lowest(minima)
+    fit = fit_least_squares(residuals, best, lower=low, upper=high, rivals=rivals)
     return PhysicalFit(
         model.values(fit.values),
         model.values(fit.low),
@@ -118,25 +124,25 @@ def _rates(model: SampledModel, x: Floats) -> Floats:
     return np.sqrt(squared[squared > 0.0])
 
 
-def _unfolded(
-    residuals: Residuals,
-    model: SampledModel,
-    best: tuple[Floats, float],
-    low: Floats,
-    high: Floats,
-    period: float,
-) -> tuple[Floats, float]:
-    """The better of a fit and those with a mode on the other side of half the sampling rate, which sampling makes
-    look much alike: springs and dampers that put it there are tried."""
+def _lowest(minima: Sequence[tuple[Floats, float]]) -> tuple[Floats, list[Floats]]:
+    """The lowest minimum; and the next one elsewhere, where it is hardly higher."""
+    (best, least), *others = sorted(minima, key=lambda one: one[1])
+    return best, [x for x, height in others if height < least + RIVAL and np.max(np.abs(x - best)) > ELSEWHERE][:1]
+
+
+def _unfolded(model: SampledModel, best: Floats, low: Floats, high: Floats, period: float) -> list[Floats]:
+    """Starts with a mode on the other side of half the sampling rate, and with other damping: sampling
+    makes all of them look much alike. Springs and dampers are scaled."""
     springs = np.array([one.unit in SPRINGS for one in model.quantities])
     dampers = np.array([one.unit in DAMPERS for one in model.quantities])
-    rates = _rates(model, best[0])
-    for rate in rates[(rates > 0.5 * np.pi / period) & (rates < 1.5 * np.pi / period)]:
-        factor = (2.0 * np.pi / period - rate) / rate
-        x = np.clip(best[0] + 2.0 * np.log(factor) * springs + np.log(factor) * dampers, low, high)
-        other = _descended(residuals, x, low, high)
-        best = other if other[1] < best[1] else best
-    return best
+    starts = list[Floats]()
+    for rate in _rates(model, best):
+        if 0.5 * np.pi / period < rate < 1.5 * np.pi / period:
+            mirrored = 2.0 * np.pi / period - rate
+            for factor, damped in product(np.log([1.0, mirrored / rate]), np.log(DAMPED)):
+                x = best + 2.0 * factor * springs + (factor + damped) * dampers
+                starts.append(np.clip(x, low, high))
+    return starts
 
 
 def _starts(
