@@ -192,7 +192,10 @@ def integrators_of(response: Response, period: float) -> int:
     unlike = abs(fall - nearest) > UNLIKE and 0.0 <= fall <= 2.5
     fit = low_frequencies(response) if unlike or not settled else None
     if fit is not None and fit.first_seen and fit.first_seen[1] < 0.0 and fit.terms[2] < 0.0:
-        raise ResponseError(f"{where}: the position moves against the force; is the sign of one of them turned?")
+        raise ResponseError(
+            f"{where}: the position moves against the force; is the sign of one of them turned? If not, the data "
+            "begin above a resonance: measure lower"
+        )
     if clear and unlike and not (fit and fit.closely and fit.integrators is not None):
         raise ResponseError(
             f"{where}, but the magnitude falls like f^-{fall:.1f} there, which goes with "

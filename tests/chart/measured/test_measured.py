@@ -242,6 +242,22 @@ def test_incoherent_frequencies_are_left_out_and_named():
     assert 0.5 * exact < chart.stiffness_max < exact
 
 
+def test_the_lowest_frequencies_that_are_left_out_for_their_error_are_not_called_incoherent():
+    loop = systems.published()
+    f = np.linspace(0.5, 400.0, 800)
+    response, computer = measured_response(loop, f, coherence=np.where(f < 3.0, 0.9, 0.9999))
+    first = measured_chart(response, computer).unusable[0]
+    assert first.low == 0.0
+    assert "coherence down to 0.9 of 1 averages leaves an error of more than 50 %" in first.reason
+
+
+def test_a_device_that_begins_above_its_resonance_is_told_to_be_measured_lower():
+    response, computer = measured_response(Loop(systems.mass(0.1, 0.3, 0.0), Controller(0.001)))
+    above = Response(response.frequency, -response.value)
+    with pytest.raises(ResponseError, match="one of them turned\\? If not, .* measure lower"):
+        measured_chart(above, computer)
+
+
 def test_what_was_measured_there_still_bounds_the_response():
     """Left out of the nominal chart, but where little is known walls are not certain."""
     loop = systems.published()

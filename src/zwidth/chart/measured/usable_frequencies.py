@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.measured.response_interpolation import ResponseInterpolation, around_one
-from zwidth.model.response import LEAST_COHERENCE, Response
+from zwidth.model.response import LEAST_COHERENCE, UNSURE, Response
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -85,9 +85,13 @@ def _incoherent(response: Response, good: Flags) -> Iterator[UnusableRange]:
             yield UnusableRange(float(low), float(high), "no response is given")
         else:
             least = float(np.min(response.coherence[run]))
-            yield UnusableRange(
-                float(low), float(high), f"coherence down to {least:.2g}, less than {LEAST_COHERENCE:g}"
+            known = f"coherence down to {least:.2g}"
+            reason = (
+                f"{known}, less than {LEAST_COHERENCE:g}"
+                if least < LEAST_COHERENCE
+                else f"{known} of {response.averages:.3g} averages leaves an error of more than {100 * UNSURE:g} %"
             )
+            yield UnusableRange(float(low), float(high), reason)
 
 
 def _gaps(f: Floats, errors: Floats) -> Iterator[UnusableRange]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
+from zwidth.chart.measured.hidden_walls import hidden_walls
 from zwidth.device.device import Device
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check, Estimate, Identification, refused
@@ -192,6 +193,11 @@ def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | 
     except ResponseError as error:
         return None, str(error)
     if not np.isfinite(chart.stiffness_max_nominal):
+        if hidden := hidden_walls(chart):
+            return None, (
+                f"the data leave no wall certain: {hidden}; record longer, so that a resonance spans many "
+                "frequencies, with more force there, or repeat the sweep"
+            )
         return None, (
             "no wall with a stiffness above 0 is stable by this response; write in each row the reading and the "
             "force sent after it, as commanded: a force that was measured, or rows that are shifted, come too late"
@@ -209,6 +215,10 @@ def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[s
         [f"{response.note}; the interval holds what is stable beyond doubt, and what may be"]
         if response.note
         else []
+    )
+    said.append(
+        "beside --output sweep.csv, for a [response]: averages = "
+        f"{response.averages:.4g}, integrators = {chart.integrators}"
     )
     if device.response is None:
         own = device.at().chart(decay=False).stiffness_max

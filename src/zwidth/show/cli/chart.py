@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import inf
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import click
 
@@ -103,7 +103,11 @@ class ChartCommand(Command):
             return None
         if getattr(result, "open", False):
             return OPEN_EDGE
-        return NO_CERTAIN_WALL if getattr(result, "band", None) is not None else NO_WALL
+        if getattr(result, "band", None) is None:
+            return NO_WALL
+        from zwidth.chart.measured.hidden_walls import hidden_walls
+
+        return "; ".join(filter(None, (NO_CERTAIN_WALL, hidden_walls(cast("MeasuredChart", result)))))
 
     def pages(self, case: CommandLine, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
         if document.get("warning"):

@@ -1,0 +1,53 @@
+"""What `identify response` says where errors hide every wall, and what a device file beside its data must say."""
+
+import numpy as np
+
+from tests.identify.modes_bench import columns, readings
+from zwidth.chart.measured.chart import measured_chart
+from zwidth.device.load import from_document
+from zwidth.identify.kinds import identify
+from zwidth.loop.controller import Controller
+from zwidth.model.response import Response
+
+PERIOD = 1e-3
+
+
+def one_mass(damping):
+    """0.1 kg on a spring of 400 N/m: 10 Hz."""
+    plant = {"mass_kg": 0.1, "stiffness_N_per_m": 400.0, "damping_Ns_per_m": damping}
+    document = {"name": "mass on a spring", "plant": plant, "loop": {"sampling_period_s": PERIOD}}
+    return from_document(document, "mass on a spring")
+
+
+def shaken(device, count=12_000):
+    rng = np.random.default_rng(3)
+    force = rng.normal(size=count)
+    position = readings(device.at().plant, PERIOD, force, 0.0)
+    return columns(force, position + 1e-7 * rng.normal(size=count), PERIOD)
+
+
+def test_a_resonance_too_sharp_for_the_record_is_named_as_the_reason():
+    """By the response as measured walls are stable; the columns are right, and are not said to be wrong."""
+    device = one_mass(0.2)  # 1.6 % of damping: 0.3 Hz wide, in a record of 8 s
+    found = identify(device, "response", shaken(device))
+    (chart,) = (check for check in found.checks if check.what == "chart")
+    assert not chart.passed
+    assert "leave no wall certain" in chart.reason
+    nominal, at = (float(chart.reason.split(word)[1].split()[0]) for word in ("walls up to", "most of all at"))
+    exact = device.chart(decay=False).stiffness_max
+    assert abs(nominal / exact - 1.0) < 0.05
+    assert 8.0 < at < 12.0
+
+
+def test_the_written_columns_give_the_same_interval_with_the_keys_that_are_named():
+    device = one_mass(6.0)
+    found = identify(device, "response", shaken(device))
+    (said,) = (remark for remark in found.remarks if "averages = " in remark)
+    averages = float(said.split("averages = ")[1].split(",")[0])
+    f, real, imag, coherence = (
+        np.array(found.curves[name]) for name in ("frequency_Hz", "real_m_per_N", "imag_m_per_N", "coherence")
+    )
+    again = Response(f, real + 1j * imag, int(said[-1]), coherence=coherence, averages=averages)
+    chart = measured_chart(again, Controller(PERIOD))
+    (stiffness,) = found.estimates
+    assert abs(chart.stiffness_max / stiffness.low - 1.0) < 0.02
