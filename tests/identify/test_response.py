@@ -1,11 +1,16 @@
 """What `identify response` says where errors hide every wall, and what a device file beside its data must say."""
 
 import numpy as np
+import pytest
 
 from tests.identify.modes_bench import columns, readings
 from zwidth.chart.measured.chart import measured_chart
 from zwidth.device.load import from_document
 from zwidth.identify.kinds import identify
+from zwidth.identify.records.columns import Columns
+from zwidth.identify.records.record import record_of
+from zwidth.identify.response.sweep_blocks import SweepBlocks
+from zwidth.identify.response.sweep_parts import shared_excitation
 from zwidth.loop.controller import Controller
 from zwidth.model.response import Response
 
@@ -51,3 +56,47 @@ def test_the_written_columns_give_the_same_interval_with_the_keys_that_are_named
     chart = measured_chart(again, Controller(PERIOD))
     (stiffness,) = found.estimates
     assert abs(chart.stiffness_max / stiffness.low - 1.0) < 0.02
+
+
+def chirp(count, up=True):
+    """A force that goes through all frequencies once, evenly."""
+    t = np.arange(count)
+    phase = np.pi * 0.49 * t**2 / count
+    return np.sin(phase if up else phase[::-1])
+
+
+@pytest.mark.parametrize("up", [True, False])
+def test_a_single_sweep_is_fitted_as_a_whole_and_is_said_not_to_predict_itself(up):
+    """Two thirds of it would have no high, or no low frequencies."""
+    device = one_mass(6.0)
+    force = chirp(12_000, up)
+    record = columns(force, readings(device.at().plant, PERIOD, force, 0.0), PERIOD)
+    found = identify(device, "response", record)
+    (stiffness,) = found.estimates
+    assert stiffness.low < device.chart(decay=False).stiffness_max < stiffness.high
+    assert max(found.curves["frequency_Hz"]) > 480.0
+    assert np.isnan(found.validation)
+    (said,) = (check for check in found.checks if check.what == "validation")
+    assert said.warning
+    assert "record the sweep twice" in said.reason
+
+
+def test_sweeps_in_files_of_their_own_are_predicted_from_each_other():
+    device = one_mass(6.0)
+    force = chirp(12_000)
+    position = readings(device.at().plant, PERIOD, force, 0.0)
+    noise = 1e-7 * np.random.default_rng(1).normal(size=(2, len(force)))
+    found = identify(device, "response", [columns(force, position + one, PERIOD) for one in noise])
+    assert found.validation > 0.9
+    assert "another one" in found.validated_on
+
+
+def test_noise_excites_both_parts_of_a_record_alike_and_a_sweep_does_not():
+    def shared(force):
+        record = record_of({"f": force, "x": force}, Columns(("f", "x")))
+        return shared_excitation(SweepBlocks(record, "f", "x", 0, len(force)), 2 * len(force) // 3)
+
+    assert shared(np.random.default_rng(0).normal(size=9000)) > 0.7
+    assert shared(np.random.default_rng(0).normal(size=300)) > 0.5
+    assert shared(np.concatenate([chirp(3000)] * 2)) > 0.3
+    assert shared(chirp(9000)) < 0.05

@@ -254,7 +254,7 @@ def test_the_lowest_frequencies_that_are_left_out_for_their_error_are_not_called
 def test_a_device_that_begins_above_its_resonance_is_told_to_be_measured_lower():
     response, computer = measured_response(Loop(systems.mass(0.1, 0.3, 0.0), Controller(0.001)))
     above = Response(response.frequency, -response.value)
-    with pytest.raises(ResponseError, match="one of them turned\\? If not, .* measure lower"):
+    with pytest.raises(ResponseError, match=r"one of them turned\? If not, .* measure lower"):
         measured_chart(above, computer)
 
 

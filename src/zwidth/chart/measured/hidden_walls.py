@@ -1,4 +1,4 @@
-"""Walls that a measured device renders by its response as measured, where the error of that response hides them."""
+"""Walls that a device renders by its response as measured, where the error of the measurement hides them."""
 
 from __future__ import annotations
 

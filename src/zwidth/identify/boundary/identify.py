@@ -27,6 +27,7 @@ from zwidth.identify.boundary.explained import check_explained, share_of_points
 from zwidth.identify.boundary.fit import BoundaryFit, derivatives, first_scatter, fit_boundary, without
 from zwidth.identify.boundary.model import BoundaryModel
 from zwidth.identify.boundary.parameters import BoundaryParameters
+from zwidth.identify.boundary.period import check_period
 from zwidth.identify.boundary.points import COLUMNS, BoundaryPoints, read_points
 from zwidth.identify.boundary.trials import TrialModel, TrialPlan, model_by_trials, needs_trials
 from zwidth.identify.identification import Check, Estimate, Identification, refused
@@ -111,6 +112,11 @@ def identify_boundary(
     checks += [*_alike(fit), check_explained(model, fit)]
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
+    if plan is None:
+        report("trying other sampling periods", 0, 0)
+        checks += check_period(model, fit)
+        if (nothing := refused(KIND, device.label, checks)) is not None:
+            return nothing
     report("validating", 0, 0)
     share, sentence = _validate(model, fit)
     return Identification(

@@ -71,8 +71,14 @@ def _units(device: Device, f: Floats, size: Floats) -> list[Check]:
 def check_prediction(share: float) -> list[Check]:
     """Whether the response holds for the part of the motion that it is not made of; [] where it does.
 
-    share  of that motion that it predicts
+    share  of that motion that it predicts; nan: there is none
     """
+    if np.isnan(share):
+        text = (
+            "the first two thirds of the record have other frequencies than the last, as in a single sweep: all "
+            "of it is fitted, and nothing is left to be predicted; record the sweep twice, in one file or in two"
+        )
+        return [Check("validation", False, text, warning=True)]
     if share > PREDICTED:
         return []
     if share > 0.0:

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.hidden_walls import hidden_walls
 from zwidth.device.device import Device
-from zwidth.device.faults import plural
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.records.columns import Columns
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import check_sampling
 from zwidth.identify.response.checks import check_prediction, check_responses
 from zwidth.identify.response.sweep_blocks import SweepBlocks, SweepRange
+from zwidth.identify.response.sweep_parts import LEAST_SHARED, shared_excitation
 from zwidth.loop.controller import Controller
 from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
 from zwidth.model.sweep_response import block_length, sweep_response_of_blocks
@@ -71,6 +71,9 @@ def identify_response(
         return nothing
     count = min(len(sweep) for sweep in sweeps)
     fitted = int(FIT_SHARE * count)
+    once = min(shared_excitation(sweep, int(FIT_SHARE * len(sweep))) for sweep in sweeps) < LEAST_SHARED
+    if once:  # each frequency is there at one time only: all of it is fitted
+        fitted = count
     length = block_length(fitted, segment)
     try:
         responses = [
@@ -87,8 +90,12 @@ def identify_response(
     columns = next(one for one in FORCES if one in records[0]), "position_m"
     if checks[-1].passed:
         checks += check_responses(device, responses, [record.label for record in records], columns)
-        shares = [_share_explained(response, sweep.part(fitted, len(sweep)), length, period) for sweep in sweeps]
-        checks += check_prediction(min(shares))
+        if once:
+            shares = _shares_of_others(responses, sweeps, length, period)
+        else:
+            unseen = (sweep.part(fitted, len(sweep)) for sweep in sweeps)
+            shares = [_share_explained(response, part, length, period) for part in unseen]
+        checks += check_prediction(min(shares, default=np.nan))
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     chart, why = _chart(response, device.controller)
@@ -100,10 +107,8 @@ def identify_response(
         device.label,
         tuple(checks),
         (_largest_stiffness(chart),),
-        float(np.min(shares)),
-        f"the motion in the last third of {'each of the ' if len(sweeps) > 1 else 'the '}"
-        f"{plural(len(sweeps), 'sweep') if len(sweeps) > 1 else 'sweep'}, at the frequencies that can be relied "
-        "on",
+        min(shares, default=np.nan),
+        _validated_on(len(sweeps), once),
         tuple(_remarks(chart, device, response)),
         _columns(responses),
         {"averages": response.averages, "integrators": chart.integrators, "measurement": response.note},
@@ -226,6 +231,28 @@ def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[s
         within = "within" if chart.stiffness_max <= own <= high else "outside"
         said.append(f"the file's own model renders {own:.5g} N/m at its reference, {within} this interval")
     return said
+
+
+def _shares_of_others(
+    responses: Sequence[Response], sweeps: Sequence[SweepBlocks], length: int, period: float
+) -> list[float]:
+    """Share of each sweep's motion that the response of the one before predicts; [] of a single sweep."""
+    if len(sweeps) == 1:
+        return []
+    before = [responses[-1], *responses[:-1]]
+    return [_share_explained(one, sweep, length, period) for one, sweep in zip(before, sweeps, strict=True)]
+
+
+def _validated_on(sweeps: int, once: bool) -> str:
+    """What the share that is explained is of."""
+    where = "at the frequencies that can be relied on"
+    if once and sweeps == 1:
+        return "nothing: the sweep has each frequency at one time only"
+    if once:
+        return f"the motion in each of the {sweeps} sweeps by the response of another one, {where}"
+    return (
+        f"the motion in the last third of {f'each of the {sweeps} sweeps' if sweeps > 1 else 'the sweep'}, {where}"
+    )
 
 
 def _share_explained(response: Response, unseen: SweepBlocks, length: int, period: float) -> float:

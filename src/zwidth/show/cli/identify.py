@@ -141,7 +141,9 @@ class IdentifyCommand(Command):
         if result.reason is not None:
             return
         yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.estimates])
-        yield f"validation: {100.0 * result.validation:.6g} % of the variance explained, {result.validated_on}"
+        share = result.validation
+        explained = f"{100.0 * share:.6g} % of the variance explained, " if share == share else ""
+        yield f"validation: {explained}{result.validated_on}"
         yield from result.remarks
         if result.settings and not case["write"] and Path(case.question.name).is_file():
             yield f"to write them into {printable(case.question.name)}, comments kept: add --write"
