@@ -109,9 +109,20 @@ def arm() -> tuple[zwidth.Device, Columns]:
 
 
 @cache
-def edge() -> Columns:
-    """The boundary of the two masses with a scatter of half a per cent."""
-    chords = EdgeChords.of(two_masses().with_({DELAY: 0.4}).at().chart(decay=False))
+def swept() -> Columns:
+    """Two masses under one sweep from 0 to 490 Hz."""
+    t = np.arange(2 * COUNT)
+    force = np.sin(0.98 * np.pi * t**2 / (4 * COUNT))
+    noise = STEP * np.random.default_rng(0).normal(size=len(t))
+    position = readings(two_masses().given_plant, PERIOD, force, 0.4) + noise
+    return {"time_s": t * PERIOD, "force_N": force, "position_m": position}
+
+
+@cache
+def edge(period: float = PERIOD) -> Columns:
+    """The boundary of the two masses with a scatter of half a per cent, at a sampling period [s]."""
+    device = two_masses().with_({DELAY: 0.4, "loop.sampling_period_s": period})
+    chords = EdgeChords.of(device.at().chart(decay=False))
     return measured(np.random.default_rng(2), chords, scatter=0.005)
 
 
@@ -540,6 +551,21 @@ RECORDS: tuple[FaultyRecord, ...] = (
         "if another recorder wrote it",
         0,
         UNIT_MASS,
+    ),
+    FaultyRecord(
+        "another sampling rate than the file's",
+        "boundary",
+        lambda: (edge(0.8 * PERIOD),),
+        "sampling period",
+        "correct loop.sampling_period_s",
+    ),
+    FaultyRecord(
+        "one sweep, in which each frequency is at one time only",
+        "response",
+        lambda: (swept(),),
+        "validation",
+        "record the sweep twice",
+        0,
     ),
     FaultyRecord(
         "a boundary that no parameter explains",

@@ -16,6 +16,7 @@ from zwidth.contact.stability_trial import StabilityTrial
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
 from zwidth.identify.boundary.identify import COLUMNS, identify_boundary
+from zwidth.identify.boundary.parameters import BoundaryParameters
 from zwidth.identify.records.record import read_record
 
 DELAY = "loop.delay_samples"
@@ -137,6 +138,32 @@ def test_a_boundary_that_no_value_explains_is_said_and_not_fitted():
     assert not result.estimates
     assert "no value of the numbers that were named explains this boundary" in result.reason
     assert json.loads(json.dumps(result.document(), default=str))["parameters"] == []
+
+
+def test_the_rounding_of_exact_points_is_no_pattern():
+    rounded = {
+        name: np.round(v, 7) if name == "damping_Ns_per_m" else v for name, v in points(scatter=0.0).items()
+    }
+    result = identify_boundary(device(), [record(rounded)], paths=[DELAY])
+    assert all(check.passed for check in result.checks)
+    assert result[DELAY].value == pytest.approx(0.3, rel=1e-6)
+
+
+def test_a_sampling_period_that_the_points_contradict_is_refused_and_one_nearby_is_a_warning():
+    for period, refused in ((0.0016, True), (0.0013, False)):
+        wrong = device(0.3).with_({"loop.sampling_period_s": period})
+        result = identify_boundary(wrong, [record(points(scatter=0.002))], paths=[DELAY])
+        said = failed(result, "sampling period")
+        assert float(said.split()[0]) == pytest.approx(0.00125, rel=0.02)
+        assert (not result.estimates) == refused
+        assert ("correct loop.sampling_period_s" in said) == refused
+    right = identify_boundary(device(0.2), [record(points(scatter=0.002))], paths=[DELAY])
+    assert "sampling period" not in [check.what for check in right.checks]
+
+
+def test_an_interval_without_bound_has_infinite_ends():
+    parameters = BoundaryParameters.of(device(), device().at(), ["plant.mass_kg.1.1"])
+    assert parameters.values(np.array([800.0])).tolist() == [np.inf]
 
 
 def test_a_small_error_of_the_model_is_a_warning():

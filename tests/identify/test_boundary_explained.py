@@ -12,6 +12,7 @@ from zwidth.identify.boundary.explained import check_explained
 from zwidth.identify.boundary.fit import fit_boundary
 from zwidth.identify.boundary.model import BoundaryModel
 from zwidth.identify.boundary.parameters import BoundaryParameters
+from zwidth.identify.boundary.period import PERIOD, check_period
 from zwidth.identify.boundary.points import read_points
 
 DELAY = "loop.delay_samples"
@@ -23,7 +24,7 @@ def verdict(seed, folder, other):
     """What is said of points of one device and the delay of a model; None where the device has too few points.
 
     other  None: the model is right;  "masses": each mass is wrong by a random factor of 1.3 to 2 either way;
-           "device": the model is another random device
+           "device": the model is another random device;  "period": the sampling period is 30 % too long
     """
     rng = np.random.default_rng([24, seed])
     device, chords = random_device(rng, folder)
@@ -35,6 +36,8 @@ def verdict(seed, folder, other):
         for path in ("plant.mass_kg.0.0", "plant.mass_kg.1.1"):
             factor = rng.uniform(1.3, 2.0) ** rng.choice([-1.0, 1.0])
             model = model.with_({path: factor * address.get(device.document, path)})
+    elif other == "period":
+        model = model.with_({PERIOD: 1.3 * address.get(model.document, PERIOD)})
     elif other == "device":
         model, _ = random_device(rng, folder)
     start = model.with_({DELAY: address.get(model.document, DELAY) * 10.0 ** rng.uniform(-0.1, 0.1)})
@@ -43,9 +46,13 @@ def verdict(seed, folder, other):
     if not sizes.passed:
         return REFUSED
     model = BoundaryModel(points, parameters.edge)
-    check = check_explained(model, fit_boundary(model, parameters, profiled=False))
+    fit = fit_boundary(model, parameters, profiled=False)
+    check = check_explained(model, fit)
     assert check.passed or "model lacks something" in check.reason or "no value of the numbers" in check.reason
-    return ACCEPTED if check.passed else WARNED if check.warning else REFUSED
+    checks = [check, *check_period(model, fit)]
+    if any(not one.passed and not one.warning for one in checks):
+        return REFUSED
+    return ACCEPTED if all(one.passed for one in checks) else WARNED
 
 
 def verdicts(seeds, folder, other):
@@ -60,6 +67,17 @@ def test_points_of_the_right_device_are_explained(tmp_path):
 
 def test_points_of_another_device_are_not(tmp_path):
     assert verdict(0, tmp_path, "device") == REFUSED
+
+
+def test_another_sampling_period_is_named_as_the_reason(tmp_path):
+    assert verdict(1, tmp_path, "period") == REFUSED
+
+
+@pytest.mark.slow
+def test_of_a_hundred_sampling_periods_30_percent_too_long_most_are_refused(tmp_path):
+    said = verdicts(range(100), tmp_path, "period")
+    assert len(said) > 75
+    assert np.mean(said == REFUSED) >= 0.75
 
 
 @pytest.mark.slow

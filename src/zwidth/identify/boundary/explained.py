@@ -21,6 +21,7 @@ LEAST_POINTS: Final = 8  # from which an order can be seen
 LEAST_REPEATED: Final = 3  # degrees of freedom of repeated points, from which their own scatter counts
 HALF: Final = 0.5  # share of the spread below which nothing is explained
 MOST: Final = 0.9  # the same where what remains is systematic
+EXACT: Final = 1e-6  # of the largest value: what remains below it is the rounding of charts and no pattern
 GROSS: Final = 0.05  # of the largest value: what remains is small in any case if it is below
 LOST: Final = 0.25  # share of points beyond any stable set, or of tried walls on the wrong side, that is too many
 WRONG: Final = 3.0  # standard deviations on the wrong side of the edge, from which on a tried wall contradicts it
@@ -48,9 +49,8 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
 
     How often, with up to 24 points on random devices of two masses, scatter of 0.1-2 %, and the delay fitted:
     of 113 right models none was refused or warned of (below 2.7 % with 95 % confidence); of 22 with both masses
-    wrong by factors of 1.3 to 2 all were refused, of 22 that were other devices 21, and one was warned of. Of 56
-    with a sampling period 30 % too long, which a different delay makes up for in part, 5 were refused and 36
-    warned of.
+    wrong by factors of 1.3 to 2 all were refused, of 22 that were other devices 21, and one was warned of. A wrong
+    sampling period, which a different delay makes up for in part, is looked for by `check_period`.
     """
     points, deviations = model.points, fit.deviations
     edges = points[points.on_edge]
@@ -60,7 +60,7 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
     most = np.where(edges.kind == TIP, np.max(edges.stiffness), np.max(np.abs(edges.damping)))
     sizes = np.where(edges.kind == EDGE, deviations.value * fit.scatter.damping, deviations.value)
     remains = float(np.sqrt(np.mean((sizes / np.maximum(most, 1e-300)) ** 2)))
-    chance, signs = _chance(edges, deviations.value / units), list[str]()
+    signs, chance = list[str](), 1.0 if remains < EXACT else _chance(edges, deviations.value / units)
     if chance < SYSTEMATIC:
         signs.append("what remains follows a pattern along the edges instead of scattering")
     if (repeated := _repeated(edges, deviations.value / units)) is not None and repeated < SYSTEMATIC:

