@@ -26,8 +26,9 @@ def check_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
     minus twice the log-likelihood, (exp(D / n) - 1) (n - p - 1) has Fisher's distribution with 1 and n - p - 1
     degrees of freedom if the file is right.
 
-    How often, with up to 24 points on random devices of two masses, scatter of 0.1-2 %, and the delay fitted: of 60
-    periods 30 % too long 51 were refused (D 21 to 180), 9 not even warned of (D 1.9 to 17); of 110 right ones none.
+    How often, with up to 24 points on random devices of two masses, scatter of 0.1-2 %, and the delay fitted: of
+    60 periods 30 % too long 51 were refused (D 21 to 180), 9 not even warned of (D 1.9 to 17); of 110 right ones
+    none.
     """
     from scipy.stats import f
 
