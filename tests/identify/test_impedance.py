@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.identify.impedance_bench import bench, pushed
+from tests.identify.modes_bench import readings
 from zwidth.device.faults import DeviceError
 from zwidth.identify.impedance.identify import COLUMNS, identify_impedance
 from zwidth.identify.impedance.spectra import MeasuredImpedance, octave_bands
@@ -143,3 +144,25 @@ def test_faults_of_words_and_of_options(own, records):
         identify(own, table)
     with pytest.raises(DeviceError, match="give its stiffness"):
         identify(own, records(WALL), damping=1.0)
+
+
+def test_a_single_sweep_of_the_hand_s_force_is_not_said_to_predict_itself(own):
+    """Its last third has other frequencies than the rest: the share that was printed was far below 0."""
+    T, count = own.controller.sampling_period, 12_000
+    force = np.sin(0.6 * np.pi * np.arange(count) ** 2 / (2 * count))
+    table = {
+        "time_s": T * np.arange(count),
+        "handle_force_N": force,
+        "handle_position_m": readings(own.given_plant, T, force, 0.0),
+    }
+    result = identify(own, table)
+    assert np.isnan(result.validation)
+    assert "as in a single sweep" in failed(result, "validation")
+    assert result.estimates
+
+
+def test_a_wall_that_was_not_on_is_asked_for(own, records):
+    result = identify(own, records(None), stiffness=WALL[0], damping=WALL[1])
+    assert "was the wall of 1500 N/m on all the time?" in failed(result, "prediction")
+    unsaid = identify(own, records(WALL))
+    assert "was there no wall" in failed(unsaid, "prediction")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, plural
+from zwidth.identify.excitation import LEAST_SHARED, shared_power
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.impedance.local_spectra import LocalSpectra, local_spectra, merged, segment_length
 from zwidth.identify.impedance.spectra import (
@@ -57,6 +58,9 @@ FAR_OFF: Final = 2.3  # powers of ten
 OPPOSITE: Final = -0.5  # cosine of the phase between measured and predicted, of a force with the wrong sign
 BELOW_HALF: Final = 0.95  # of half the sampling rate up to which lines are used
 CLIPPED: Final = 0.15  # share of them, from which on the force is not what acted
+PREDICTED: Final = 0.5  # share of the unseen motion, below which a reader is warned
+UNLIKE: Final = 2.0  # times the predicted impedance, or less than its inverse, that is remarked at low frequency
+VALIDATED_ON: Final = "the last third of each record, its motion predicted from its force by the other two thirds"
 LOW_FREQUENCY: Final = (
     ("static stiffness felt", "N/m"),
     ("damping felt at low frequency", "N s/m"),
@@ -133,17 +137,19 @@ def identify_impedance(
             states.append(state)
     if not states:
         return Identification(KIND, device.label, tuple(checks))
-    checks += [check for state in states for check in _check_against(state)]
+    checks += [check for state in states for check in _check_against(state, wall)]
     if any(not (check.passed or check.warning) and check.what in ("units", "sign", "columns") for check in checks):
         return Identification(KIND, device.label, tuple(checks))
     share = _validation(states)
     return Identification(
         kind=KIND,
         label=device.label,
-        checks=tuple(checks),
+        checks=(*checks, *_check_validation(share)),
         estimates=tuple(one for state in states for one in _estimates(state)),
         validation=share,
-        validated_on="the last third of each record, its motion predicted from its force by the other two thirds",
+        validated_on=VALIDATED_ON
+        if np.isfinite(share)
+        else "nothing: no frequency is in both parts of the records",
         remarks=tuple(sentence for state in states for sentence in _sentences(state)),
         curves=_curves(states),
         details=_details(states),
@@ -287,7 +293,7 @@ def _predicted(
         return None
 
 
-def _check_against(state: _State) -> list[Check]:
+def _check_against(state: _State, wall: tuple[float, float] | None) -> list[Check]:
     """Whether the measured impedance has the size and the sense of the predicted one."""
     if state.predicted is None:
         text = (
@@ -317,8 +323,26 @@ def _check_against(state: _State) -> list[Check]:
     text = (
         f"{STATES[state.name]}: the predicted impedance lies in the band at {100.0 * np.mean(within):.0f} % of "
         f"the frequencies, and {decibels:.2g} dB from the measured one in the middle"
+        f"{_low_frequency_hint(state, wall)}"
     )
     return [Check("prediction", bool(np.mean(within) >= 0.9), text, warning=True)]
+
+
+def _low_frequency_hint(state: _State, wall: tuple[float, float] | None) -> str:
+    """What to look at where the measured impedance is far from the predicted one in the lowest octave; "" where it
+    is not: there a wall makes the difference."""
+    assert state.predicted is not None
+    f = state.impedance.frequency
+    lowest = f <= 2.0 * f[0]
+    times = float(np.median(np.abs(state.impedance.value[lowest] / state.predicted[lowest])))
+    if 1.0 / UNLIKE < times < UNLIKE:
+        return ""
+    question = (
+        f"was the wall of {wall[0]:g} N/m on all the time"
+        if state.name == "on" and wall is not None
+        else "was there no wall, and no spring that the file does not have"
+    )
+    return f"; from {f[0]:.3g} to {f[lowest][-1]:.3g} Hz it is {times:.2g} times the predicted one: {question}?"
 
 
 def _decibels(Z: Complexes, P: Complexes) -> Floats:
@@ -331,11 +355,27 @@ def _validation(states: Sequence[_State]) -> float:
     for state in states:
         if not (state.first.segments and state.second.segments):
             continue
+        if shared_power(state.first.power(0), state.second.power(0)) < LEAST_SHARED:
+            continue
         response, _ = state.first.fit(0, 1)
         used = np.isin(state.second.frequency, state.impedance.frequency)
         remains += float(np.sum(state.second.left_by(response)[used]))
         total += float(np.sum(state.second.power(1)[used])) * state.second.values
     return 1.0 - remains / total if total > 0.0 else float("nan")
+
+
+def _check_validation(share: float) -> list[Check]:
+    """Whether the last third of the motion follows the force as the rest does; [] where it does."""
+    if share > PREDICTED:
+        return []
+    text = (
+        f"only {100.0 * max(share, 0.0):.3g} % of the unseen motion is predicted: noise, friction, a wall that was "
+        "not on all the time, or a device that changes; record longer, with more force"
+        if np.isfinite(share)
+        else "the last third of the record has other frequencies than the rest, as in a single sweep, or no whole "
+        "segment: nothing can be predicted; sweep twice, or record longer"
+    )
+    return [Check("validation", False, text, warning=True)]
 
 
 def _estimates(state: _State) -> list[Estimate]:

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.hidden_walls import hidden_walls
 from zwidth.device.device import Device
+from zwidth.identify.excitation import LEAST_SHARED
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.records.columns import Columns
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import check_sampling
 from zwidth.identify.response.checks import check_prediction, check_responses
 from zwidth.identify.response.sweep_blocks import SweepBlocks, SweepRange
-from zwidth.identify.response.sweep_parts import LEAST_SHARED, shared_excitation
+from zwidth.identify.response.sweep_parts import shared_excitation
 from zwidth.loop.controller import Controller
 from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
 from zwidth.model.sweep_response import block_length, sweep_response_of_blocks
