@@ -13,7 +13,7 @@ LEAST_SHARED: Final = 0.2  # of the power, from which on one part tells of the o
 
 
 def shared_power(first: Floats, second: Floats) -> float:
-    """Share of two spectra (k,) of power that both have: the sum of the smaller one, each of sum 1; 0 if one has none.
+    """Share of two spectra (k,) of power that both have: the sum of the smaller one, each of sum 1; 0 if one is 0.
 
     >>> shared_power(np.array([1.0, 1.0, 0.0]), np.array([0.0, 4.0, 4.0]))
     0.5

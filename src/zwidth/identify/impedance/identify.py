@@ -369,8 +369,8 @@ def _check_validation(share: float) -> list[Check]:
     if share > PREDICTED:
         return []
     text = (
-        f"only {100.0 * max(share, 0.0):.3g} % of the unseen motion is predicted: noise, friction, a wall that was "
-        "not on all the time, or a device that changes; record longer, with more force"
+        f"only {100.0 * max(share, 0.0):.3g} % of the unseen motion is predicted: noise, friction, a wall that "
+        "was not on all the time, or a device that changes; record longer, with more force"
         if np.isfinite(share)
         else "the last third of the record has other frequencies than the rest, as in a single sweep, or no whole "
         "segment: nothing can be predicted; sweep twice, or record longer"
