@@ -134,6 +134,16 @@ def test_an_edge_that_does_not_close_has_no_answer(device, tmp_path):
     assert (stretch["low_Hz"], stretch["high_Hz"], stretch["on_edge"]) == (100.0, 400.0, True)
 
 
+def test_a_response_whose_phase_rises_is_told_so(device, tmp_path):
+    """It reaches half the sampling rate: more frequencies would not help."""
+    response, _ = measured_response(LOOP)
+    spectrum(tmp_path / "sweep.csv", response.frequency, response.value.conj())
+    ran = run_command("chart", device, "--json")
+    assert ran.code == 1
+    assert "turn the sign of the imaginary part" in ran.document["reason"]
+    assert "frequencies are missing" not in ran.document["reason"]
+
+
 @pytest.mark.parametrize("command", ["show", "report"])
 def test_what_needs_a_model_has_no_answer(device, command):
     ran = run_command(command, device, "--json")

@@ -117,6 +117,16 @@ def test_plants_operators_and_encoders_are_held_against_bounds(section, keys, sa
     assert says in fault.message
 
 
+def test_a_copy_of_a_sweep_looks_wrong():
+    """Two copies scatter by nothing, and every wall would be certain."""
+    f = np.linspace(1.0, 100.0, 50)
+    first = -1.0 / (2.0 * np.pi * f) ** 2 + 0j
+    for second, wrong in ((first, True), (1.001 * first, False)):
+        response = Response(f, first, sweeps=np.array([first, second]))
+        found = implausible(SimpleNamespace(document={}, label="swept", response=response))
+        assert [fault.key for fault in found] == ["response"] * wrong
+
+
 @pytest.mark.parametrize(("scale", "wrong"), [(1.0, False), (1e3, True), (1e6, True)])
 @pytest.mark.parametrize(("mass", "damping", "stiffness"), [(0.03, 0.0, 0.0), (0.3, 3.0, 0.0), (0.06, 0.5, 300.0)])
 def test_a_response_in_millimetres_shows_too_little_mass(mass, damping, stiffness, scale, wrong):

@@ -100,3 +100,11 @@ def test_noise_excites_both_parts_of_a_record_alike_and_a_sweep_does_not():
     assert shared(np.random.default_rng(0).normal(size=300)) > 0.5
     assert shared(np.concatenate([chirp(3000)] * 2)) > 0.3
     assert shared(chirp(9000)) < 0.05
+
+
+def test_a_copy_of_a_sweep_is_no_repetition():
+    device = one_mass(6.0)
+    record = shaken(device, 4000)
+    found = identify(device, "response", [record, record])
+    assert not found.estimates
+    assert "is sweep 1 again" in found.reason

@@ -247,7 +247,8 @@ def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
 
 
 def _response(response: Response) -> KeyMessages:
-    """The mass that the response shows, 1/(w^2 |P|), at the frequencies where it shows most of it."""
+    """The mass that the response shows, 1/(w^2 |P|), at the frequencies where it shows most of it; and whether
+    repeated sweeps are copies."""
     mass = 1.0 / ((2.0 * math.pi * response.frequency) ** 2 * np.maximum(np.abs(response.value), 1e-300))
     shown = float(np.quantile(mass, 0.9))
     if shown < LIGHTEST:
@@ -255,6 +256,13 @@ def _response(response: Response) -> KeyMessages:
             ("response",),
             f"looks wrong: nine tenths of it show less than {1e3 * shown:.2g} g of mass, 1/(w^2 |P|); it must be "
             "in m/N: if it is in mm/N, divide by 1000, if in um/N, by 1e6",
+        )
+    sweeps = () if response.sweeps is None else response.sweeps
+    if len({sweep.tobytes() for sweep in sweeps}) < len(sweeps):
+        yield (
+            ("response",),
+            "looks wrong: two of its sweeps are the same to the last digit; a copy does not show how far sweeps "
+            "differ, and walls count as certain that are not: measure again, or give it once",
         )
 
 

@@ -36,8 +36,23 @@ def check_responses(
     slope = float(np.polyfit(np.log(f), np.log(size), 1, w=1.0 / np.sqrt(f))[0])
     checks = [order_check(slope, float(f[-1] / f[0]), names), *_units(device, f, size)]
     if len(responses) > 1:
+        checks += _copies(responses, labels)
         checks.append(flip_check([(label, _gain(first, r)) for r, label in zip(responses, labels, strict=True)]))
     return checks
+
+
+def _copies(responses: Sequence[Response], labels: Sequence[str]) -> list[Check]:
+    """Whether a sweep is another one again, to the last digit; [] where none is."""
+    seen = dict[bytes, int]()
+    for number, response in enumerate(responses):
+        before = seen.setdefault(response.value.tobytes(), number)
+        if before != number:
+            text = (
+                f"sweep {number + 1} ({labels[number]}) is sweep {before + 1} again; a copy does not show how far "
+                "sweeps differ: measure again, or give it once"
+            )
+            return [Check("copies", False, text)]
+    return []
 
 
 def _coherent(response: Response) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -31,6 +31,11 @@ OPEN_EDGE: Final = (
     "sampling rate"
 )
 
+OPEN_WHOLE_EDGE: Final = (
+    "the measured edge does not close round the stable walls, although frequencies reach half the sampling rate: "
+    "the phase must fall with frequency; turn the sign of the imaginary part if it rises, and see that each row "
+    "has the reading and the force sent after it"
+)
 NO_CERTAIN_WALL: Final = (
     "the data leave no wall certain: within their error, none with K > 0 and B >= 0 is stable for every device "
     "that they may be of; record longer, with more force, or repeat the sweep"
@@ -101,13 +106,9 @@ class ChartCommand(Command):
             return f"this is undecided: {doubt}"
         if result.stiffness_max == result.stiffness_max:
             return None
-        if getattr(result, "open", False):
-            return OPEN_EDGE
-        if getattr(result, "band", None) is None:
-            return NO_WALL
-        from zwidth.chart.measured.hidden_walls import hidden_walls
+        from zwidth.chart.measured.chart import MeasuredChart
 
-        return "; ".join(filter(None, (NO_CERTAIN_WALL, hidden_walls(cast("MeasuredChart", result)))))
+        return no_measured_wall(result) if isinstance(result, MeasuredChart) else NO_WALL
 
     def pages(self, case: CommandLine, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
         if document.get("warning"):
@@ -188,6 +189,17 @@ def _stiffest(chart: Chart) -> str:
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
         f"at this limit it oscillates at {frequencies}"
     )
+
+
+def no_measured_wall(chart: MeasuredChart) -> str:
+    """Why a chart by a frequency response has no largest stiffness."""
+    from zwidth.chart.measured.hidden_walls import hidden_walls
+
+    if chart.open:
+        return OPEN_EDGE if chart.measured_up_to_share < 1.0 else OPEN_WHOLE_EDGE
+    if chart.band is None:
+        return NO_WALL
+    return "; ".join(filter(None, (NO_CERTAIN_WALL, hidden_walls(chart))))
 
 
 def unmeasured_warning(chart: MeasuredChart) -> str | None:
