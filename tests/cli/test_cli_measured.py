@@ -236,8 +236,8 @@ def test_a_response_that_nearly_reaches_half_the_sampling_rate_does_not_warn(tmp
 
 def test_the_band_of_two_equal_sweeps_holds_the_largest_stiffness(tmp_path):
     response, _ = measured_response(LOOP, np.linspace(1.0, 400.0, 400))
-    for name in ("one.csv", "two.csv"):
-        spectrum(tmp_path / name, response.frequency, response.value)
+    for name, by in (("one.csv", 1.0), ("two.csv", 1.0 + 1e-12)):  # copies to the last digit are warned of
+        spectrum(tmp_path / name, response.frequency, by * response.value)
     (tmp_path / "device.toml").write_text(DEVICE.format('files = ["one.csv", "two.csv"]'))
     chart = document_of("chart", tmp_path / "device.toml")
     band = chart["band"]
