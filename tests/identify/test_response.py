@@ -1,4 +1,4 @@
-"""What `identify response` says where errors hide every wall, and what a device file beside its data must say."""
+"""Records of one mass: what `identify response` and `modes` say of errors, single sweeps, copies, no resonance."""
 
 import numpy as np
 import pytest
@@ -108,3 +108,14 @@ def test_a_copy_of_a_sweep_is_no_repetition():
     found = identify(device, "response", [record, record])
     assert not found.estimates
     assert "is sweep 1 again" in found.reason
+
+
+def test_modes_of_a_mass_without_any_resonance_are_its_own_numbers():
+    """There is nothing that dampers could couple."""
+    plant = {"mass_kg": 0.1, "damping_Ns_per_m": 0.5}
+    device = from_document(
+        {"name": "a mass and a dashpot", "plant": plant, "loop": {"sampling_period_s": PERIOD}}, "mass"
+    )
+    found = identify(device, "modes", shaken(device, 8000))
+    for path, value in (("plant.mass_kg.0.0", 0.1), ("plant.damping_Ns_per_m.0.0", 0.5)):
+        assert found[path].value == pytest.approx(value, rel=1e-3)

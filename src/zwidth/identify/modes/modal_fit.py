@@ -371,8 +371,8 @@ def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coup
     columns.append(_Column(fast, fast**2))
     if coupled:
         joined = [(one.decay, one.squared) for one in columns[int(base == "free") : -1]]
-        slowest, *others = joined
-        columns += [_Column(a, w2, 1.0 / np.sqrt(max(w2, a**2)), slowest) for a, w2 in others]
+        # nothing is coupled where there is neither a brake nor a mode
+        columns += [_Column(a, w2, 1.0 / np.sqrt(max(w2, a**2)), joined[0]) for a, w2 in joined[1:]]
     return columns
 
 
