@@ -223,7 +223,7 @@ def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[s
         else []
     )
     said.append(
-        "beside --output sweep.csv, for a [response]: averages = "
+        "beside the file with this response, in a [response]: averages = "
         f"{response.averages:.4g}, integrators = {chart.integrators}"
     )
     if device.response is None:
