@@ -117,10 +117,26 @@ def test_a_push_of_a_hand_in_between_is_told_and_left_out(device, driven):
     assert one.low < JOINT.mass < one.high
 
 
-def test_a_bias_that_drifts_is_told(device, driven):
+@pytest.mark.parametrize("stiffness", [0.0, 60.0])
+@pytest.mark.parametrize("shape", [lambda u: u, lambda u: 1.0 - np.exp(-2.0 * u)], ids=["even", "warming"])
+def test_a_bias_that_drifts_is_told_and_is_no_spring(device, driven, stiffness, shape):
     """An amplifier's offset that grows by half the friction is in the motion, not in the command."""
-    drifting = driven["force_N"] + 0.3 * driven["time_s"] / driven["time_s"][-1]
-    result = identify_friction(device, [record({**driven, "force_N": drifting})], spring=False)
+    if stiffness:
+        driven = records_of([replace(JOINT, stiffness=stiffness, tones=2.0 * JOINT.tones)])[0]
+    offset = 0.3 * shape(driven["time_s"] / driven["time_s"][-1])
+    result = identify_friction(device, [record({**driven, "force_N": driven["force_N"] - offset})])
     (text,) = [check.reason for check in result.checks if check.what == "drift"]
-    drift = float(text.split("about ")[1].split()[0])
-    assert drift == pytest.approx(-0.3, rel=0.3)
+    assert float(text.split("about ")[1].split()[0]) == pytest.approx(offset[-1], rel=0.05)
+    assert ("spring" in [one.name for one in result.estimates]) == (stiffness > 0.0)
+    for name, value in (("plant.mass_kg", 0.12), ("friction.coulomb_N", 0.5), ("plant.damping_Ns_per_m", 0.8)):
+        assert result[name].low <= value <= result[name].high, name
+        assert result[name].high - result[name].low < 0.1 * value, name
+
+
+def test_a_force_that_no_mass_with_friction_explains_is_told(device, driven):
+    """A noisy force sensor is not an encoder's step: what remains is beyond the noise of the readings."""
+    noisy = driven["force_N"] + np.random.default_rng(4).normal(size=3000)
+    result = identify_friction(device, [record({**driven, "force_N": noisy})])
+    (text,) = [check.reason for check in result.checks if check.what == "remainder"]
+    assert "times the noise of the readings" in text
+    assert "remainder" not in failed(identify_friction(device, [record(driven)]))

@@ -23,6 +23,9 @@ Ints = NDArray[np.int64]
 LEVEL: Final = 0.95
 MASS, STIFFNESS = 0, 5  # indices among the numbers
 DELAY: Final = 6  # index of the force's delay behind the six numbers of the motion
+DRIFTS: Final = (7, 8, 9)  # indices of the bias's drift: even, bent and S-shaped
+COUNT: Final = 10  # numbers
+ONE: Final = np.eye(COUNT)  # ONE[MASS]: weights of the mass alone in a sum over the numbers
 STEP: Final = 1e-6  # of a derivative, of parameters in units of their effect
 MOST_STEPS: Final = 400  # of the optimiser: in a narrow bent valley, as of a joint that hardly slides, it creeps
 ARRIVED: Final = 1e-8  # relative fall of the sum of squares that ends it
@@ -46,6 +49,7 @@ class Windows:
     time             (W,) time of the first sample [s]
     run              (W,) number of the stretch without a gap, over all records, that a window belongs to
     driven           whether a force was recorded
+    clock            (n,) time of each row, from -1/2 at the beginning of all records to 1/2 at their end
     """
 
     position: Floats
@@ -56,6 +60,7 @@ class Windows:
     time: Floats
     run: Ints
     driven: bool
+    clock: Floats
 
     def chosen(self, which: NDArray[np.bool_]) -> Windows:
         """Some of the windows."""
@@ -77,6 +82,15 @@ class Windows:
         )
 
     @cached_property
+    def drifts(self) -> Floats:
+        """Shapes (3, n) of a bias that drifts: Legendre's polynomials of the clock, of mean 0 over even time.
+
+        The first grows by 1 from beginning to end, the third by 2, the second is alike at both ends.
+        """
+        s = self.clock
+        return np.array([s, 6.0 * s**2 - 0.5, 20.0 * s**3 - 3.0 * s])
+
+    @cached_property
     def rows(self) -> Ints:
         """Rows of all samples in windows, window by window."""
         return np.concatenate([np.arange(a, a + n) for a, n in zip(self.first, self.length, strict=True)])
@@ -86,7 +100,8 @@ class Windows:
 class Numbers:
     """What the motion hangs on.
 
-    values   (7,) m, b forward and backward, F forward and backward, k, and the force's delay [s]
+    values   (10,) m, b forward and backward, F forward and backward, k, the force's delay [s], and the drift of
+             the bias in three shapes, `Windows.drifts`
     free     those that are fitted
     tied     index of each number that follows another instead: backward ones where the joint never slid backward
     """
@@ -112,8 +127,9 @@ class Numbers:
 def predict(windows: Windows, values: Floats, starts: Floats) -> Floats:
     """Positions at `windows.rows` [m or rad], from the starts (W, 2) of position and velocity."""
     out = np.zeros(len(windows.position))
+    drift = values[list(DRIFTS)]
     follow_windows(
-        windows.force,
+        windows.force + drift @ windows.drifts if drift.any() else windows.force,
         windows.first,
         windows.length,
         windows.period,
@@ -172,14 +188,12 @@ class JointFit:
         return float(np.sum(self.residuals**2))
 
     def combination(self, weights: Floats) -> tuple[float, float, float]:
-        """Value, standard error and quantile of a sum over the numbers, weights (7,).
+        """Value of a sum over the numbers, weights (10,), its standard error, and the freedom of that.
 
-        The quantile is Student's with the degrees of freedom by Satterthwaite's rule, from the variances and
+        The degrees of freedom of Student's distribution follow by Satterthwaite's rule from the variances and
         covariances that the blocks' changes would have if the residuals were independent (Bell and McCaffrey 2002,
         known at second hand).
         """
-        from scipy.stats import t
-
         c = np.asarray(weights, dtype=float).copy()
         value = float(c @ self.numbers.values)
         for number, other in self.numbers.tied:
@@ -187,19 +201,20 @@ class JointFit:
         c = c[list(self.numbers.free)]
         known = c != 0.0
         if np.any(~np.isfinite(np.diag(self.covariance)[known])):
-            return value, np.inf, np.inf
+            return value, np.inf, 1.0
         spread = np.einsum("i,gihj,j->gh", c, self.weights, c)
         expected = float(np.trace(spread))
         if not expected > LEAST_SHARE * float(c @ self.working @ c):
-            return value, np.inf, np.inf
+            return value, np.inf, 1.0
         error = float(np.sqrt(np.sum((self.changes @ c) ** 2)))
-        freedom = expected**2 / float(np.sum(spread**2))
-        return value, error, float(t.ppf(0.5 + 0.5 * LEVEL, max(freedom, 1.0)))
+        return value, error, max(expected**2 / float(np.sum(spread**2)), 1.0)
 
     def interval(self, weights: Floats) -> tuple[float, float, float]:
-        """Value and ends of the interval of a sum over the numbers, weights (7,)."""
-        value, error, quantile = self.combination(weights)
-        half = error * quantile if np.isfinite(error) else np.inf
+        """Value and ends of the interval of a sum over the numbers, weights (10,)."""
+        from scipy.stats import t
+
+        value, error, freedom = self.combination(weights)
+        half = error * float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) if np.isfinite(error) else np.inf
         return value, value - half, value + half
 
 
@@ -230,7 +245,7 @@ class _Search:
             ) / step
         for j in range(2):
             starts = self.starts.copy()
-            step = STEP * self.scales[7 + j]
+            step = STEP * self.scales[COUNT + j]
             starts[:, j] += step
             columns[:, p + j] = (predict(self.windows, self.numbers.values, starts) - base) / step
         left = self.reading - base
@@ -290,7 +305,7 @@ class _Search:
 
 
 def bounded(values: Floats, windows: Windows) -> Floats:
-    """The seven numbers within what can be meant: a mass above 0, a delay of a few samples, and no friction or
+    """The numbers within what can be meant: a mass above 0, a delay of a few samples, and no friction or
     spring that drives the joint so that its motion grows by more than some orders within a window."""
     T, span = float(np.mean(windows.period)), float(np.max(windows.length * windows.period))
     least = max(LEAST_MASS * max(abs(values[1]), abs(values[2])) * T, 1e-6 * scales(windows)[MASS])
@@ -304,7 +319,7 @@ def bounded(values: Floats, windows: Windows) -> Floats:
 
 
 def scales(windows: Windows) -> Floats:
-    """Sizes (9,) of the seven numbers and of a start by what the record has of force, motion and time."""
+    """Sizes (12,) of the ten numbers and of a start by what the record has of force, motion and time."""
     y, T = windows.position, float(np.mean(windows.period))
     x = max(
         float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300
@@ -314,7 +329,7 @@ def scales(windows: Windows) -> Floats:
     a = v / (0.25 * length)
     f = float(np.std(windows.force)) if windows.driven else a
     f = f if f > 0.0 else a
-    return np.array([f / a, f / v, f / v, f, f, f / x, T, x, v])
+    return np.array([f / a, f / v, f / v, f, f, f / x, T, f, f, f, x, v])
 
 
 def assembled(blocks: Blocks, count: int) -> Floats:

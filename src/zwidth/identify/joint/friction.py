@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from zwidth.device.device import Device
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.joint.command import ALIKE, compare_with_command
-from zwidth.identify.joint.fit import DELAY, MASS, STIFFNESS, bias_of_windows
-from zwidth.identify.joint.identification import FittedJoint, fitted_joint
+from zwidth.identify.joint.fit import DELAY, DRIFTS, MASS, ONE, STIFFNESS
+from zwidth.identify.joint.identification import POOR, FittedJoint, fitted_joint
 from zwidth.identify.joint.joint import COLUMNS as COLUMNS
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
@@ -26,9 +26,6 @@ Floats = NDArray[np.float64]
 
 ALIKE_SPEEDS: Final = 0.98  # correlation of dry and viscous friction from which one speed is seen
 UNKNOWN_MASS: Final = 0.5  # half the interval over the mass, from which the mass is not known
-DRIFTING: Final = 4.0  # standard errors of a drift that is told
-FEWEST_FOR_DRIFT: Final = 8  # windows
-DRIFT_SHARE: Final = 0.05  # of the dry friction that it must have
 MASS_IN_FILE: Final = 0.5, 2.0  # ratios to the file's mass within which the two agree
 
 
@@ -79,7 +76,7 @@ def identify_friction(
         return refused("friction", device.label, checks) or Identification("friction", device.label, checks)
     estimates = [*friction_estimates(fitted), *mass_estimates(fitted)]
     checks += (check_speeds(fitted), *([check_mass(fitted)] if fitted.motion.driven else []), *check_drift(fitted))
-    checks += (*mass_in_file(fitted),)
+    checks += (*check_remainder(fitted), *mass_in_file(fitted))
     if (nothing := refused("friction", device.label, checks)) is not None:
         return nothing
     return identification("friction", device, fitted, checks, estimates)
@@ -137,12 +134,12 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
     estimates = []
     if both:
         estimates = [
-            _estimate(fitted, "dry friction", "force", [0, 0, 0, 0.5, 0.5, 0, 0], key="coulomb", least=0.0),
-            _estimate(fitted, "viscous friction", "damping", [0, 0.5, 0.5, 0, 0, 0, 0], key="damping", least=0.0),
-            _estimate(fitted, "bias", "force", [0, 0, 0, -0.5, 0.5, 0, 0]),
+            _estimate(fitted, "dry friction", "force", 0.5 * (ONE[3] + ONE[4]), key="coulomb", least=0.0),
+            _estimate(fitted, "viscous friction", "damping", 0.5 * (ONE[1] + ONE[2]), key="damping", least=0.0),
+            _estimate(fitted, "bias", "force", 0.5 * (ONE[4] - ONE[3])),
         ]
     else:
-        one = [0, 1, 0, 0, 0, 0, 0] if fitted.forward else [0, 0, 1, 0, 0, 0, 0]
+        one = ONE[1] if fitted.forward else ONE[2]
         estimates = [_estimate(fitted, "viscous friction", "damping", one, key="damping", least=0.0)]
     for there, way, level, damping in ((fitted.forward, "forward", 3, 1), (fitted.backward, "backward", 4, 2)):
         if not there:
@@ -151,17 +148,17 @@ def friction_estimates(fitted: FittedJoint) -> list[Estimate]:
         unit = fitted.joint.unit("position")
         # one letter: numbers of the joint themselves, never over a factor of the file
         estimates += [
-            _estimate(fitted, f"level {way}", "force", np.eye(7)[level]),
-            _estimate(fitted, f"viscous friction {way}", "damping", np.eye(7)[damping]),
+            _estimate(fitted, f"level {way}", "force", ONE[level]),
+            _estimate(fitted, f"viscous friction {way}", "damping", ONE[damping]),
             _estimate(
                 fitted,
                 f"friction {way} at {speed:.3g} {unit}/s",
                 "force",
-                np.eye(7)[level] + speed * np.eye(7)[damping],
+                ONE[level] + speed * ONE[damping],
             ),
         ]
     if STIFFNESS in fitted.fit.numbers.free:
-        spring = _estimate(fitted, "spring", "stiffness", np.eye(7)[STIFFNESS], key="stiffness")
+        spring = _estimate(fitted, "spring", "stiffness", ONE[STIFFNESS], key="stiffness")
         estimates.append(spring if spring.value > 0.0 else replace(spring, path=""))
     return estimates
 
@@ -170,9 +167,9 @@ def mass_estimates(fitted: FittedJoint) -> list[Estimate]:
     """The mass and the delay of the force, which driven motion tells."""
     if not fitted.motion.driven:
         return []
-    delay = fitted.fit.interval(np.eye(7)[DELAY])
+    delay = fitted.fit.interval(ONE[DELAY])
     return [
-        _estimate(fitted, fitted.joint.mass_name, "mass", np.eye(7)[MASS], key="mass", least=0.0),
+        _estimate(fitted, fitted.joint.mass_name, "mass", ONE[MASS], key="mass", least=0.0),
         Estimate("delay of the force", *delay, "s"),
     ]
 
@@ -233,7 +230,7 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
     needed  the mass is what was asked for: without it the data are refused
     """
     name, unit = fitted.joint.mass_name, fitted.joint.unit("mass")
-    value, low, high = fitted.fit.interval(np.eye(7)[MASS])
+    value, low, high = fitted.fit.interval(ONE[MASS])
     if isfinite(high) and high - value < UNKNOWN_MASS * value:
         return Check("acceleration", True, f"{name} is told to {100.0 * (high - value) / value:.2g} %")
     upper = f"only below {high:.3g} {unit}" if isfinite(high) else "not at all"
@@ -257,27 +254,38 @@ def mass_in_file(fitted: FittedJoint) -> list[Check]:
 
 def check_drift(fitted: FittedJoint) -> list[Check]:
     """Whether the bias drifts: a warning, or nothing."""
-    windows = fitted.fit.windows
-    if not (fitted.forward and fitted.backward) or len(windows.first) < FEWEST_FOR_DRIFT:
+    if not {*DRIFTS} & {*fitted.fit.numbers.free}:
         return []
-    difference, weight = bias_of_windows(fitted.fit)
-    time = windows.time - np.average(windows.time, weights=weight)
-    spread = float(weight @ time**2)
-    if not spread > 0.0:
-        return []
-    slope = float((weight * time) @ difference) / spread
-    error = float(np.sqrt(np.sum((weight * time * (difference - slope * time)) ** 2))) / spread
-    level = 0.5 * abs(float(fitted.fit.numbers.values[3] + fitted.fit.numbers.values[4]))
-    drift = slope * float(np.ptp(time))
-    if abs(slope) < DRIFTING * error or abs(drift) < DRIFT_SHARE * level:
-        return []
+    value, low, high = fitted.fit.interval(ONE[DRIFTS[0]] + 2.0 * ONE[DRIFTS[2]])
     unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s^2"
-    text = f"the bias drifts by about {drift:.3g} {unit} over {np.ptp(time):.4g} s"
+    ends = f"{low:.3g} to {high:.3g}" if isfinite(high) else "without bounds"
     return [
         Check(
             "drift",
             False,
-            f"{text}; the numbers are those of its mean: let amplifier and sensor warm up",
+            f"the bias drifts by about {value:.3g} {unit} ({ends}) over {fitted.motion.duration:.4g} s; the fit "
+            "allows for it as long as it is slow, and the bias is that in the middle: let amplifier and sensor warm up",
+            warning=True,
+        )
+    ]
+
+
+def check_remainder(fitted: FittedJoint) -> list[Check]:
+    """Whether more remains than the readings' noise: a warning, or nothing.
+
+    What scatters from window to window is in the intervals; what is alike in all of them, as a friction that hangs
+    on the load, is not.
+    """
+    if not POOR < fitted.misfit < inf:
+        return []
+    cause = "noise of the force, or a" if fitted.motion.driven else "a"
+    return [
+        Check(
+            "remainder",
+            False,
+            f"what the fit leaves is {fitted.misfit:.2g} times the noise of the readings: {cause} friction that "
+            "hangs on load, place, warmth or slow speed; numbers may miss by more than their intervals: compare "
+            "records of other forces and speeds",
             warning=True,
         )
     ]

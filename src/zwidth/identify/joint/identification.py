@@ -14,8 +14,11 @@ from zwidth.device.faults import fail
 from zwidth.identify.identification import Check
 from zwidth.identify.joint.checks import checks_of, directions
 from zwidth.identify.joint.fit import (
+    COUNT,
     DELAY,
+    DRIFTS,
     MASS,
+    ONE,
     STIFFNESS,
     JointFit,
     Numbers,
@@ -42,7 +45,7 @@ MOST_OUTLYING: Final = 0.25  # share of the windows that may be left out for it
 LEAST_EXPLAINED: Final = 0.7  # of the unseen motion
 WELL_EXPLAINED: Final = 0.99  # of it, below which other causes are tried
 POOR: Final = 5.0  # times the readings' noise, which then remains
-SHOWN: Final = 3.0  # standard errors by which the data show a spring
+SHOWN: Final = 0.9973  # confidence, of three standard errors, with which a spring or a drift is told from 0
 
 
 @dataclass(frozen=True)
@@ -185,9 +188,9 @@ def _numbers(motion: Motion, forward: bool, backward: bool, mass: float, spring:
     free: tuple[int, ...] = (MASS, DELAY) if motion.driven else ()
     free += (1, 3) if forward else ()
     free += (2, 4) if backward else ()
-    free += (STIFFNESS,) if spring else ()
+    free += (STIFFNESS, DRIFTS[0]) if spring else (DRIFTS[0],)
     tied = () if forward and backward else ((2, 1), (4, 3)) if forward else ((1, 2), (3, 4))
-    return Numbers(np.array([mass, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), tuple(sorted(free)), tied)
+    return Numbers(mass * ONE[MASS], tuple(sorted(free)), tied)
 
 
 def _unseen(windows: Windows) -> NDArray[np.bool_]:
@@ -209,22 +212,52 @@ def _fit(
     seen = windows.chosen(~_unseen(windows))
     guess, starts = search_guess(seen, numbers, motion.resolution, motion.deviation)
     fit = fit_joint(seen, guess, starts)
+    doubtful = [n for n in (STIFFNESS, *DRIFTS) if n in guess.free and (spring is None or n != STIFFNESS)]
+    hidden = not_shown(fit, doubtful)
+    if DRIFTS[0] not in hidden or _mean_square(fit, motion) > POOR**2 * motion.deviation**2:
+        wider = replace(fit.numbers, free=tuple(sorted({*fit.numbers.free, *DRIFTS})))
+        fit = fit_joint(seen, wider, fit.starts)
+        hidden = not_shown(fit, [*doubtful, *DRIFTS[1:]])
     edges = np.cumsum(seen.length) - seen.length
     means = np.add.reduceat(fit.residuals**2, edges) / seen.length
     bad = means > OUTLYING**2 * _mean_square(fit, motion)
-    if bad.any() and np.mean(bad) <= MOST_OUTLYING:
-        fit = fit_joint(seen.chosen(~bad), fit.numbers, fit.starts[~bad])
-    else:
+    if not bad.any() or np.mean(bad) > MOST_OUTLYING:
         bad[:] = False
-    if spring is None and STIFFNESS in numbers.free:
-        value, error, _ = fit.combination(np.eye(7)[STIFFNESS])
-        if not abs(value) > SHOWN * error:
-            free = tuple(i for i in numbers.free if i != STIFFNESS)
-            plain = replace(
-                fit.numbers, free=free, values=np.where(np.arange(7) == STIFFNESS, 0.0, fit.numbers.values)
-            )
-            fit = fit_joint(fit.windows, plain, fit.starts)
+    if hidden or bad.any():
+        free = tuple(i for i in fit.numbers.free if i not in hidden)
+        values = np.where(np.isin(np.arange(COUNT), hidden), 0.0, fit.numbers.values)
+        fit = fit_joint(seen.chosen(~bad), replace(fit.numbers, free=free, values=values), fit.starts[~bad])
     return fit, tuple(seen.time[bad].tolist())
+
+
+def not_shown(fit: JointFit, numbers: Sequence[int]) -> list[int]:
+    """Those of some numbers that the data do not tell from 0, by Student's test, a bent drift together with its
+    even part.
+
+    Of two that look alike, as a spring and a drift do where the joint creeps one way, neither need be shown by
+    itself, and one of them is there all the same: both are kept where 0 for both of them is as unlikely, by the F
+    test with the lesser of their degrees of freedom.
+    """
+    from scipy.stats import f, t
+
+    tests = {number: fit.combination(ONE[number]) for number in numbers}
+    hidden = [
+        number
+        for number, (value, error, freedom) in tests.items()
+        if not abs(value) > error * t.ppf(0.5 + 0.5 * SHOWN, freedom)
+    ]
+    shown = max((number for number in numbers if number in DRIFTS and number not in hidden), default=0)
+    hidden = [number for number in hidden if number not in DRIFTS or number > shown]
+    if len(hidden) < 2:
+        return hidden
+    places = [fit.numbers.free.index(number) for number in hidden]
+    spread = fit.covariance[np.ix_(places, places)]
+    if not np.all(np.isfinite(spread)):
+        return hidden
+    z = fit.numbers.values[hidden]
+    squares = float(z @ np.linalg.pinv(spread, hermitian=True) @ z)
+    freedom = min(tests[number][2] for number in hidden)
+    return [] if squares > len(hidden) * f.ppf(SHOWN, len(hidden), freedom) else hidden
 
 
 def _no_minimum(fit: JointFit) -> Check:

@@ -9,6 +9,7 @@ from zwidth.identify.identification import Check, Identification, refused
 from zwidth.identify.joint.friction import (
     check_drift,
     check_mass,
+    check_remainder,
     friction_estimates,
     identification,
     mass_estimates,
@@ -40,7 +41,7 @@ def identify_mass(
         checks += (Check("force", False, reason),)
         fitted = None
     elif fitted is not None:
-        checks += (check_mass(fitted, needed=True), *mass_in_file(fitted), *check_drift(fitted))
+        checks += (check_mass(fitted, needed=True), *mass_in_file(fitted), *check_drift(fitted), *check_remainder(fitted))
     nothing = refused("mass", device.label, checks)
     if fitted is None or nothing is not None:
         return nothing or Identification("mass", device.label, checks)

@@ -74,6 +74,16 @@ class Motion:
         return max(self.step / float(np.sqrt(12.0)), self.noise)
 
     @property
+    def time(self) -> Floats:
+        """Time of each reading [s]."""
+        return np.concatenate([one.time + one.period * np.arange(len(one.position)) for one in self.sections])
+
+    @property
+    def duration(self) -> float:
+        """From the first reading of all records to the last [s]."""
+        return float(np.ptp(self.time))
+
+    @property
     def positions(self) -> Floats:
         """All readings that are kept."""
         return np.concatenate([one.position for one in self.sections])
@@ -197,4 +207,10 @@ def _cut(motion: Motion, length: int) -> Windows:
         np.array(time),
         np.array(run, dtype=np.int64),
         motion.driven,
+        _clock(motion),
     )
+
+
+def _clock(motion: Motion) -> Floats:
+    """Time of each sample (n,) as a share of that of all records, from -1/2 to 1/2."""
+    return np.asarray((motion.time - np.min(motion.time)) / motion.duration - 0.5)

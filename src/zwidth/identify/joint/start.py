@@ -32,7 +32,7 @@ DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
 class Guess:
     """A first guess.
 
-    values     (7,) as `friction_fit.Numbers` has them
+    values     (10,) as `fit.Numbers` has them
     explained  share of the weighted force that is explained
     error      standard error of the mass over the mass; inf where it is no positive number
     """
@@ -130,7 +130,7 @@ def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
         numbers = np.append(1.0, numbers)
     m, b, forward, backward = numbers[:4]
     stiffness = float(numbers[4]) if len(numbers) > 4 else 0.0
-    return Guess(np.array([m, b, b, forward, backward, stiffness, delay]), explained, error)
+    return Guess(np.array([m, b, b, forward, backward, stiffness, delay, 0.0, 0.0, 0.0]), explained, error)
 
 
 def first_starts(windows: Windows, values: Floats, starts: Floats | None = None) -> Floats:
@@ -235,4 +235,4 @@ def _in_bursts(windows: Windows, share: float) -> Floats:
     short = windows.cut(max(int(np.median(windows.length) * T / (2.0 * burst)), 1))
     way = np.array([np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)])
     moved = max(float(np.quantile(way, 0.8)), 1e-300)
-    return np.array([max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T])
+    return np.array([max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T, 0.0, 0.0, 0.0])
