@@ -59,7 +59,10 @@ def test_stretches_are_the_same_however_the_record_is_cut(monkeypatch):
     ("time", "words"),
     [
         (np.arange(50.0), ["50 rows", "at least 100"]),
-        (np.zeros(200), ["falls or stands still"]),
+        (np.zeros(200), ["stands still", "more digits"]),
+        (np.round(1e-3 * np.arange(200.0), 2), ["stands still", "more digits"]),
+        (-np.arange(200.0), ["falls", "sort"]),
+        (np.r_[np.arange(150.0), np.arange(149.0, 300.0)], ["149 s once more", "row 150", "more digits", "twice"]),
         (np.r_[np.arange(150.0), np.arange(150.0)], ["goes from 149 to 0 s", "row 150", "sort"]),
         (np.cumsum(np.random.default_rng(2).uniform(0.2, 1.8, 500)), ["do not follow", "row"]),
     ],

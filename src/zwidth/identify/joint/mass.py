@@ -41,7 +41,12 @@ def identify_mass(
         checks += (Check("force", False, reason),)
         fitted = None
     elif fitted is not None:
-        checks += (check_mass(fitted, needed=True), *mass_in_file(fitted), *check_drift(fitted), *check_remainder(fitted))
+        checks += (
+            check_mass(fitted, needed=True),
+            *mass_in_file(fitted),
+            *check_drift(fitted),
+            *check_remainder(fitted),
+        )
     nothing = refused("mass", device.label, checks)
     if fitted is None or nothing is not None:
         return nothing or Identification("mass", device.label, checks)

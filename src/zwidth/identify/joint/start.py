@@ -235,4 +235,6 @@ def _in_bursts(windows: Windows, share: float) -> Floats:
     short = windows.cut(max(int(np.median(windows.length) * T / (2.0 * burst)), 1))
     way = np.array([np.ptp(windows.position[a : a + n]) for a, n in zip(short.first, short.length, strict=True)])
     moved = max(float(np.quantile(way, 0.8)), 1e-300)
-    return np.array([max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T, 0.0, 0.0, 0.0])
+    return np.array(
+        [max(most - level, 0.1 * most) * burst**2 / (4.0 * moved), 0.0, 0.0, level, level, 0.0, T, 0.0, 0.0, 0.0]
+    )

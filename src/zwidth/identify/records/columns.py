@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from zwidth.device.text_file import header_fault
 
+BRACKETS: Final = re.compile(r"(?P<quantity>[^\[\](){}]+)[\[({](?P<unit>[^\[\](){}]+)[\])}]")
 EACH: Final = ".*"  # behind a name: of each part of the device that it is followed by
 
 # Unit that a column is named by -> units that people record it in, and by what they are multiplied.
@@ -65,26 +67,58 @@ class Columns:
             elif not present:
                 faults.append(f"column {' or '.join(choices)} is missing{self._other_unit(choices, names)}")
             chosen += present if several else present[:1]
-        chosen += [name for one in (*self.optional, *self.text) for name in _matching(one, names)]
+        optional = [name for one in (*self.optional, *self.text) for name in _matching(one, names)]
+        if not optional:  # a force in another unit must not be taken for none
+            hints = {one: self._other_unit((one,), names) for one in self.optional}
+            faults += [f"column {one} is missing{hint}" for one, hint in hints.items() if hint]
+        chosen += optional
         if twice := header_fault(names, [], chosen).partition(";")[0]:
             faults.append(twice)
-        if faults and not any("multiply" in fault for fault in faults):
+        if faults and not any(" is there: " in fault for fault in faults):
             separated = header_fault(names, chosen or ["?"]).partition(": ")[2] if len(names) == 1 else ""
-            faults.append(separated or f"needed are {self.listed}")
+            faults.append(separated or _no_header(names) or f"needed are {self.listed}")
         return chosen, "; ".join(faults)
 
     @staticmethod
     def _other_unit(choices: Sequence[str], names: Sequence[str]) -> str:
-        """A hint where a column of the same quantity in another unit is there."""
+        """A hint where a column of the same quantity is there, written otherwise or in another unit."""
+        written = {plain_name(name).lower(): name for name in reversed(names)}
+        plain = [plain_name(name) for name in names]
         for choice in choices:
+            if not choice.endswith(EACH) and choice.lower() in written:
+                return f"; '{written[choice.lower()]}' is there: name it {choice}"
             quantity, _, unit = choice.removesuffix(EACH).partition("_")
             each = EACH if choice.endswith(EACH) else ""
             for other, factor in OTHER_UNITS.get(unit, {}).items():
-                for there in _matching(f"{quantity}_{other}{each}", names):
+                for there in _matching(f"{quantity}_{other}{each}", plain):
                     by = f"multiply by {factor}" if factor else "multiply by the value of one"
                     named = there.replace(f"{quantity}_{other}", f"{quantity}_{unit}", 1)
-                    return f"; {there} is there: {by} and name it {named}"
+                    return f"; {names[plain.index(there)]} is there: {by} and name it {named}"
         return ""
+
+
+def plain_name(name: str) -> str:
+    """A column's name as this project writes it, of one with its unit in brackets; others stay as they are.
+
+    >>> [plain_name(name) for name in ("Time [s]", "torque (mN m)", "motor angle_rad")]
+    ['time_s', 'torque_mNm', 'motor angle_rad']
+    """
+    found = BRACKETS.fullmatch(name.strip())
+    if found is None:
+        return name
+    quantity, unit = found["quantity"].strip().lower(), re.sub(r"[\s*·.]", "", found["unit"])
+    return f"{quantity.replace(' ', '_')}_{unit.replace('/', '_per_')}"
+
+
+def _no_header(names: Sequence[str]) -> str:
+    """What stands where the names of columns should; "" where names do."""
+    if names and names[0].startswith(("#", "%", "//")):
+        return "the line is a comment; begin with the line that names the columns"
+    try:
+        [float(name) for name in names]
+    except ValueError:
+        return ""
+    return "the line holds numbers; write the names of the columns above them" if names else ""
 
 
 def _matching(wanted: str, names: Sequence[str]) -> list[str]:

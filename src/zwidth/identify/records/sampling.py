@@ -20,6 +20,7 @@ FIRST: Final = 20_000  # rows from which the period is read at first
 FEWEST: Final = 100  # rows of a record
 ROUNDING: Final = 1e-8  # share of the period by which steps differ as numbers are rounded
 SAME_PERIOD: Final = 1e-3  # relative, by which the record's period may differ from the computer's
+MORE_DIGITS: Final = "write it with more digits, as seconds from the beginning of the record"
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[Samplin
         return failed(f"{plural(rows, 'row')} in {record.label}, at least {FEWEST} are needed; record longer")
     usual = _usual_step(first["time_s"][:FIRST])
     if not usual > 0.0:
-        return failed(f"time_s of {record.label} falls or stands still; sort the rows by rising time")
+        what = "falls; sort the rows by rising time" if usual < 0.0 else f"stands still; {MORE_DIGITS}"
+        return failed(f"time_s of {record.label} {what}")
     row, missing, uneven, sums, runs = 0, 0, 0, np.zeros(3), list[NDArray[np.int64]]()
     last, last_whole, first_uneven = np.nan, False, -1
     for piece in chain([first], pieces):
@@ -107,6 +109,11 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[Samplin
         falling = np.flatnonzero(steps <= 0.0)
         if len(falling):
             i = int(falling[0])
+            if time[i + 1] == time[i]:
+                again = f"is {time[i]:.9g} s once more at {record.place(row + i)}"
+                return failed(
+                    f"time_s of {record.label} {again}; {MORE_DIGITS}, or leave out the row that is twice"
+                )
             return failed(
                 f"time_s of {record.label} goes from {time[i]:.9g} to {time[i + 1]:.9g} s at "
                 f"{record.place(row + i)}; sort the rows by rising time"

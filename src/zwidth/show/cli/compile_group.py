@@ -106,7 +106,11 @@ def identify_friction_of_a_step() -> None:
     windows = Windows(
         force, force, np.array([0]), one, np.array([0.001]), np.zeros(1), np.zeros(1, int), True, np.zeros(40)
     )
-    predict(windows, Numbers(np.array([0.1, 0.2, 0.2, 0.3, 0.3, 4.0, 0.001, 0.1, 0.0, 0.0]), ()).values, np.zeros((1, 2)))
+    predict(
+        windows,
+        Numbers(np.array([0.1, 0.2, 0.2, 0.3, 0.3, 4.0, 0.001, 0.1, 0.0, 0.0]), ()).values,
+        np.zeros((1, 2)),
+    )
 
 
 # What no short command line reaches, by group.
