@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import zwidth
-from tests.identify.spring_bench import bench_record, bent_angles, random_bench
+from tests.identify.spring_bench import bench_record, bent_angles, random_bench, triangle
 from zwidth.device.faults import DeviceError
 from zwidth.identify.identification import IdentificationError
 from zwidth.identify.stiffness.spring_fit import fit_spring
@@ -190,6 +190,53 @@ def test_one_direction_is_said_to_tell_one_stiffness(device):
     assert not directions.passed
     assert found["stiffness"].value == pytest.approx(0.45, rel=0.01)
     assert "backward stiffness" not in [one.name for one in found.estimates]
+
+
+def test_a_noisy_torque_is_not_taken_for_the_end_of_a_sensor(device):
+    record = bench_record(5, forward=0.45, torque_noise=0.01)
+    assert holds(identified(device, record), "stiffness", 0.45)
+
+
+# --- real transmissions ------------------------------------------------------------------------------
+
+
+def test_friction_that_grows_with_the_torque_is_told_from_dry_friction(device):
+    """A rope on a pulley: the elastic torque lags within a share of itself, too."""
+    torque = triangle(6000, 6, 0.06)
+    elastic, held = np.empty_like(torque), 0.0
+    for row, now in enumerate(torque):
+        held = min(
+            max(held, (now - 0.002) / (1.0 + 0.08 * np.sign(now))), (now + 0.002) / (1.0 - 0.08 * np.sign(now))
+        )
+        elastic[row] = held
+    angle = STEP * np.round(elastic / 0.45 / STEP)
+    found = identified(device, {"torque_Nm": torque, "angle_rad": angle})
+    assert holds(found, "stiffness", 0.45)
+    assert found["friction per torque"].value == pytest.approx(0.08, rel=0.05)
+    assert found[f"{DRIVE}.coulomb_Nm"].value == pytest.approx(0.002, rel=0.1)
+    assert any("grows with the torque" in remark for remark in found.remarks)
+
+
+def test_friction_that_comes_back_slowly_behind_a_turn_is_no_preload(device):
+    """Ten elements that stick in turn make a loop with round corners."""
+    torque = triangle(6000, 6, 0.06)
+    parts = [bent_angles(torque, level, forward=0.45) for level in np.linspace(0.0, 0.008, 10)]
+    found = identified(device, {"torque_Nm": torque, "angle_rad": np.mean(parts, axis=0)})
+    names = [one.name for one in found.estimates]
+    assert not {"preload", "backward stiffness", "hardening", "backlash"} & {*names}
+    assert found["stiffness"].value == pytest.approx(0.45, rel=3e-3)
+    assert found["way over which friction turns"].value == pytest.approx(0.004, rel=0.5)
+
+
+@pytest.mark.parametrize("offset", [0.004, 0.02])
+def test_a_torque_sensor_whose_zero_is_off_moves_the_place_where_the_stiffness_changes(device, offset):
+    record = bench_record(6, forward=0.45, backward=0.35, offset=offset, angle_noise=4e-4)
+    found = identified(device, record)
+    assert holds(found, "stiffness", 0.45)
+    assert holds(found, "backward stiffness", 0.35)
+    assert not {"preload", "backlash", "hardening"} & {one.name for one in found.estimates}
+    (text,) = [remark for remark in found.remarks if "zero" in remark]
+    assert float(text.split("reads ")[1].split()[0]) == pytest.approx(offset, rel=0.1)
 
 
 # --- records that are refused ------------------------------------------------------------------------

@@ -264,7 +264,7 @@ def check_drift(fitted: FittedJoint) -> list[Check]:
             "drift",
             False,
             f"the bias drifts by about {value:.3g} {unit} ({ends}) over {fitted.motion.duration:.4g} s; the fit "
-            "allows for it as long as it is slow, and the bias is that in the middle: let amplifier and sensor warm up",
+            "allows for it as long as it is slow, and the bias is its mean: let amplifier and sensor warm up",
             warning=True,
         )
     ]

@@ -17,6 +17,7 @@ from zwidth.identify.stiffness.strokes import (
     Strokes,
     joined,
     resolution_of,
+    smoothed,
     strokes_of,
     without_spikes,
 )
@@ -28,6 +29,8 @@ FEWEST_COUNTS: Final = 10.0  # of the angle's range
 NOISE_SHARE: Final = 0.05  # of the angle's range, that its noise may have
 MOST_SPIKES: Final = 0.02  # share of the readings
 HELD: Final = 0.15  # share of one range, over which the other may stand still at its end
+NOISY: Final = 0.02  # share of the range that the noise of the column that goes on has, where it is averaged
+SHORTEST_HOLD: Final = 400  # share of a record, 1 in so many, over which
 ONE_SIDED: Final = 0.1  # share of the torque's range to the lesser side, below which it was bent one way only
 WIDEST: Final = pi  # rad by which a blocked drive bends at most
 UNLIKELY: Final = 20.0  # times the stiffness in the device file
@@ -258,6 +261,8 @@ def _held_share(values: Floats, others: Floats, end: float, margin: float) -> fl
     """Share of its range over which the other column rises while this one is at its upper end; 0 where it is
     little. Only before the other column's own turning point, since behind it friction holds the shaft."""
     at_end = values >= end - margin
+    if resolution_of(others).noise > NOISY * float(np.ptp(others)):
+        others = smoothed(others, len(others) // SHORTEST_HOLD)  # the largest of many noisy readings is no rise
     most, span = 0.0, float(np.ptp(others))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(np.int8), [0]])))
     for first, behind in edges.reshape(-1, 2):

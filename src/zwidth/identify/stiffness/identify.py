@@ -189,15 +189,21 @@ def _estimates(fit: SpringFit, strokes: Strokes, drive: Drive, side: str) -> Ite
         yield estimate("stiffness", forward, {"forward": 1.0}, "N m/rad", "stiffness_Nm_per_rad")
     if "hardening" in fit.names:
         yield estimate("hardening", k3, {"hardening": 1.0}, "N m/rad^3", "hardening_Nm_per_rad3")
-    if "preload" in fit.names:
+    if fit["preload"] > 0.0:
         yield estimate("preload", fit["preload"], {"preload": 1.0}, "N m", "preload_Nm")
     if "play" in fit.names:
         yield estimate("backlash", fit["play"], {"play": 1.0}, "rad")
     friction = estimate("dry friction", fit["friction"], {"friction": 1.0}, "N m")
     path = f"{drive.path}.coulomb_Nm" if side == "motor" and friction.low > 0.0 else ""
     yield replace(friction, low=max(friction.low, 0.0), value=max(friction.value, 0.0), path=path)
+    if "load" in fit.names:
+        yield estimate("friction per torque", fit["load"], {"load": 1.0}, "1")
+    if "reversal" in fit.names:
+        yield estimate("way over which friction turns", fit["reversal"], {"reversal": 1.0}, "rad")
     way = 2.0 * float(np.ptp(bend))
-    loss = estimate("hysteresis loss per cycle", way * fit["friction"], {"friction": way}, "J")
+    loaded = way * float(np.mean(np.abs(fit.elastic(np.linspace(np.min(bend), np.max(bend), 1001)))))
+    lost = way * fit["friction"] + loaded * fit["load"]
+    loss = estimate("hysteresis loss per cycle", lost, {"friction": way, "load": loaded}, "J")
     yield replace(loss, low=max(loss.low, 0.0), value=max(loss.value, 0.0))
 
 
@@ -215,6 +221,20 @@ def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str
                 f"the {name.split()[0]} drifts by {fit[name]:.{DIGITS}g} {unit} over a record, {share:.2g} % of "
                 "its range"
             )
+    if fit["preload"] < 0.0:
+        yield (
+            f"the stiffness changes where the torque reads {-fit['preload']:.{DIGITS}g} N m: the sensor's zero is "
+            "off by as much, or the drive is pulled one way while it rests; it is taken out"
+        )
+    if "load" in fit.names:
+        yield (
+            f"friction grows with the torque, by {fit['load']:.3g} of it, as of a rope on a pulley: dry friction is "
+            "what remains without torque, and the device file has no key for the rest"
+        )
+    if "reversal" in fit.names:
+        yield (
+            f"behind a turn friction comes back over {fit['reversal']:.3g} rad: before dry friction slides, it bends"
+        )
     if "hardening" in fit.names:
         yield f"the transmission {'stiffens' if fit['hardening'] > 0.0 else 'softens'} as it is bent"
 

@@ -4,7 +4,9 @@
 
     g(d) = k d (1 for d > 0) + k_b d (for d < 0) + k_3 d^3        and, where the data show them,
     play        g stays 0 over a width b about rest
-    preload     the stiffness becomes k_b only below d = -p/k
+    preload     the stiffness becomes k_b only below d = -p/k; above, p < 0, where the torque's reading is shifted
+    load        friction grows with the torque, as of a rope on a pulley: T_c + mu |g(d)|
+    reversal    friction turns over a way w behind a turning point: T_c (1 - 2 exp(-way/w))  (Dahl's model)
 
 with a rest angle for each record, s the sign of the motion and t the time, for a drift of one of the two.
 
@@ -25,7 +27,7 @@ from zwidth.identify.stiffness.strokes import Resolution, Strokes
 Floats = NDArray[np.float64]
 
 BASE: Final = ("forward", "backward", "rest", "friction")
-EXTENSIONS: Final = ("hardening", "play", "preload", "angle drift", "torque drift")
+EXTENSIONS: Final = ("hardening", "play", "preload", "load", "reversal", "angle drift", "torque drift")
 # Kinks of two kinds, and drifts of two kinds, of which one record tells one.
 EXCLUSIVE: Final = ({"play", "preload"}, {"angle drift", "torque drift"})
 SEEN: Final = 4.0  # standard errors from zero, from which an extension counts
@@ -33,6 +35,8 @@ WORTH: Final = 0.9  # of the sum of squares, that an extension must at least bri
 CLUSTERS: Final = 24  # that are wanted for the intervals
 MOST_CLUSTERS: Final = 120  # of several strokes each where there are many
 FEWEST_STROKES: Final = 10  # from which each is a cluster of its own
+END: Final = 0.1  # share of the bend's range, at least on either side of a kink
+SHORTEST: Final = 1e-4  # share of the angle's range, of the way over which friction turns
 OUTLIER: Final = 6.0  # robust standard deviations
 MOST_OUTLIERS: Final = 0.05  # share of the bins
 
@@ -79,6 +83,10 @@ class SpringFit:
         """The parameters by their names."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
+    def elastic(self, bend: Floats) -> Floats:
+        """Torque (n,) of the fitted spring at bends [rad], without friction."""
+        return _elastic(self.by_name, bend)
+
     def bend(self, strokes: Strokes) -> Floats:
         """By how much the spring is bent (n,) [rad]."""
         return _bend(self.by_name, strokes)
@@ -88,9 +96,10 @@ class SpringFit:
         d = self.bend(strokes)
         reach = 2.0 * float(np.max(np.abs(d)))
         grid = np.linspace(-reach, reach, 4001)
-        torque = strokes.torque - self["friction"] * strokes.sign - self["torque drift"] * strokes.time
+        torque = strokes.torque - _dry(self.by_name, strokes) - self["torque drift"] * strokes.time
+        torque = torque / (1.0 + self["load"] * strokes.sign * np.sign(torque))
         # across play every angle has the same torque: a small slope makes the inverse one
-        elastic = _elastic(self.by_name, grid) + 1e-9 * self["forward"] * grid
+        elastic = self.elastic(grid) + 1e-9 * self["forward"] * grid
         return np.interp(torque, np.maximum.accumulate(elastic), grid)
 
 
@@ -123,24 +132,27 @@ def _best_extension(
     best, least = None, float(np.sum(fit.residuals[kept] ** 2))
     limit = WORTH * least
     for name in EXTENSIONS:
-        if (
-            name in fit.names
-            or (name == "preload" and not both_sides)
-            or {name, *fit.names} >= {"play", "preload"}
-        ):
+        alternative = any({name, *fit.names} >= pair for pair in EXCLUSIVE)
+        if name in fit.names or alternative or (name == "preload" and not both_sides):
             continue
         tried = _fit((*fit.names, name), strokes, resolution, kept, fit)
         rest = float(np.sum(tried.residuals[kept] ** 2))
-        if rest < limit and _is_seen(tried, name):
+        if rest < limit and _is_seen(tried, name, strokes):
             best, limit = tried, rest
     return best
 
 
-def _is_seen(fit: SpringFit, name: str) -> bool:
-    """Whether an extension differs from zero; a preload only where the stiffness beyond it differs, too."""
+def _is_seen(fit: SpringFit, name: str, strokes: Strokes) -> bool:
+    """Whether an extension differs from zero; a preload only where the stiffness beyond it differs, too, and is
+    seen over a part of the bend that is more than the end of a stroke."""
     change = {"forward": 1.0, "backward": -1.0}
-    if name == "preload" and abs(fit["forward"] - fit["backward"]) <= SEEN * fit.combination(change):
-        return False
+    if name == "preload":
+        low, high = np.min(fit.bend(strokes)), np.max(fit.bend(strokes))
+        place = (-fit["preload"] / fit["forward"] - low) / (high - low)
+        if not (
+            END < place < 1.0 - END and abs(fit["forward"] - fit["backward"]) > SEEN * fit.combination(change)
+        ):
+            return False
     return abs(fit[name]) > SEEN * fit.combination({name: 1.0})
 
 
@@ -178,7 +190,14 @@ def _bend(x: dict[str, float], strokes: Strokes) -> Floats:
 def _torque(names: tuple[str, ...], values: Floats, strokes: Strokes) -> Floats:
     x = dict(zip(names, values.tolist(), strict=True))
     elastic = _elastic(x, _bend(x, strokes), strokes.reach)
-    return np.asarray(elastic + x["friction"] * strokes.sign + x.get("torque drift", 0.0) * strokes.time)
+    loaded = x.get("load", 0.0) * np.abs(elastic) * strokes.sign
+    return np.asarray(elastic + _dry(x, strokes) + loaded + x.get("torque drift", 0.0) * strokes.time)
+
+
+def _dry(x: dict[str, float], strokes: Strokes) -> Floats:
+    """Dry friction (n,) that the torque overcomes, without what grows with the torque."""
+    turned = 1.0 - 2.0 * np.exp(-strokes.since / x["reversal"]) if "reversal" in x else 1.0
+    return np.asarray(x["friction"] * strokes.sign * turned)
 
 
 def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -> tuple[Floats, Floats]:
@@ -201,11 +220,13 @@ def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -
         "hardening": usual / span_angle**2,
         "play": 0.05 * span_angle,
         "preload": 0.1 * span_torque,
+        "load": 0.1,
+        "reversal": 0.05 * span_angle,
         "angle drift": 0.1 * span_angle,
         "torque drift": 0.1 * span_torque,
     }
     sizes |= dict.fromkeys(_rests(strokes), span_angle)
-    first = {"play": 0.05 * span_angle, "preload": 0.1 * span_torque}
+    first = {"play": 0.05 * span_angle, "preload": 0.1 * span_torque, "reversal": 0.05 * span_angle}
     return (
         np.array([guess.get(name, first.get(name, 0.0)) for name in names]),
         np.array([sizes[name] for name in names]),
@@ -219,12 +240,13 @@ def _fit(
     kept: NDArray[np.bool_],
     before: SpringFit | None = None,
 ) -> SpringFit:
-    """Least squares over the kept bins. Play and preload are not negative."""
+    """Least squares over the kept bins. Play, friction by the load and the way of a reversal are not negative."""
     from scipy.optimize import least_squares
 
     used = strokes.select(kept)
     start, size = _start(names, used, before)
-    lower = np.array([0.0 if name in ("play", "preload") else -np.inf for name in names])
+    least = {"play": 0.0, "load": 0.0, "reversal": SHORTEST * float(np.ptp(strokes.angle))}
+    lower = np.array([least.get(name, -np.inf) for name in names]) / size
     scale = max(float(np.ptp(used.torque)), 1e-300)
 
     def residuals(scaled: Floats) -> Floats:

@@ -49,6 +49,7 @@ class Strokes:
     stroke         (n,) number of the stroke, ascending over all runs
     time           (n,) middle of the bin as a share of its record, 0 to 1
     run            (n,) number of the record
+    since          (n,) way from the turn before [rad]; infinite in a record's first stroke, which begins anywhere
     """
 
     torque: Floats
@@ -59,6 +60,7 @@ class Strokes:
     stroke: NDArray[np.int64]
     time: Floats
     run: NDArray[np.int64]
+    since: Floats
 
     @property
     def count(self) -> int:
@@ -144,11 +146,12 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
             place = float(np.mean(part)) / max(len(angle) - 1, 1)
             reach = 0.5 * abs(float(angle[part[-1]] - angle[part[0]])) if len(part) > 1 else 0.0
             mean = float(np.mean(torque[part])), float(np.mean(angle[part]))
-            columns.append((*mean, reach, len(part), sign, number, place, run))
+            since = abs(mean[1] - float(angle[start])) if start else np.inf
+            columns.append((*mean, reach, len(part), sign, number, place, run, since))
         number += 1
-    torques, angles, reaches, samples, signs, numbers, places, runs = np.array(columns).reshape(-1, 8).T
+    torques, angles, reaches, samples, signs, numbers, places, runs, since = np.array(columns).reshape(-1, 9).T
     whole = numbers.astype(np.int64), runs.astype(np.int64)
-    return Strokes(torques, angles, reaches, samples, signs, whole[0], places, whole[1])
+    return Strokes(torques, angles, reaches, samples, signs, whole[0], places, whole[1], since)
 
 
 def _moving(torque: Floats, angle: Floats, stuck: float) -> NDArray[np.int64]:
@@ -158,11 +161,16 @@ def _moving(torque: Floats, angle: Floats, stuck: float) -> NDArray[np.int64]:
     The largest of a smoothed torque may be late by half of what is smoothed over.
     """
     width = max(len(torque) // SMOOTHED, 1) | 1
-    padded = np.pad(torque, width // 2, mode="edge")
-    smooth = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
     free = angle - angle[0] > stuck
     first = int(np.argmax(free)) if free.any() else len(angle)
-    return np.arange(first, int(np.argmax(smooth)) + 1 - width // 2)
+    return np.arange(first, int(np.argmax(smoothed(torque, width))) + 1 - width // 2)
+
+
+def smoothed(values: Floats, width: int) -> Floats:
+    """Moving average of values (n,) over so many, an odd number, those at the ends repeated."""
+    width = max(width, 1) | 1
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
 def joined(strokes: list[Strokes]) -> Strokes:
