@@ -228,12 +228,13 @@ def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str
         )
     if "load" in fit.names:
         yield (
-            f"friction grows with the torque, by {fit['load']:.3g} of it, as of a rope on a pulley: dry friction is "
-            "what remains without torque, and the device file has no key for the rest"
+            f"friction grows with the torque, by {fit['load']:.3g} of it, as of a rope on a pulley: dry friction "
+            "is what remains without torque, and the device file has no key for the rest"
         )
     if "reversal" in fit.names:
         yield (
-            f"behind a turn friction comes back over {fit['reversal']:.3g} rad: before dry friction slides, it bends"
+            f"behind a turn friction comes back over {fit['reversal']:.3g} rad: before dry friction slides, it "
+            "bends"
         )
     if "hardening" in fit.names:
         yield f"the transmission {'stiffens' if fit['hardening'] > 0.0 else 'softens'} as it is bent"

@@ -146,8 +146,8 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
             place = float(np.mean(part)) / max(len(angle) - 1, 1)
             reach = 0.5 * abs(float(angle[part[-1]] - angle[part[0]])) if len(part) > 1 else 0.0
             mean = float(np.mean(torque[part])), float(np.mean(angle[part]))
-            since = abs(mean[1] - float(angle[start])) if start else np.inf
-            columns.append((*mean, reach, len(part), sign, number, place, run, since))
+            way = abs(mean[1] - float(angle[start])) if start else np.inf
+            columns.append((*mean, reach, len(part), sign, number, place, run, way))
         number += 1
     torques, angles, reaches, samples, signs, numbers, places, runs, since = np.array(columns).reshape(-1, 9).T
     whole = numbers.astype(np.int64), runs.astype(np.int64)
