@@ -212,6 +212,20 @@ def _million():
     return header + "".join(line * 250 for line in lines)
 
 
+def _offset_drifting():
+    """The amplifier's offset grows by half of the dry friction while it warms up; the command lacks it."""
+    warm = driven()["time_s"] / driven()["time_s"][-1]
+    return driven() | {"force_N": driven()["force_N"] - 0.3 * (1.0 - np.exp(-2.0 * warm))}
+
+
+def _friction_by_load():
+    """A tenth of the first joint's torque is lost in its bearings, whichever way it turns."""
+    columns = arm()[1]
+    torque, rate = columns["torque_Nm.link-1"], np.gradient(columns["angle_rad.link-1"], columns["time_s"])
+    lost = np.sign(np.convolve(rate, np.full(25, 0.04), mode="same")) * np.abs(torque)
+    return columns | {"torque_Nm.link-1": torque + 0.1 * lost}
+
+
 UNIT_MASS = ("--set", "plant.mass_kg=0.1")  # the file's mass; that of the bench is 0.12
 GAPS = "a gap of missing samples"
 DRIFT = "the readings drift"
@@ -239,6 +253,32 @@ RECORDS: tuple[FaultyRecord, ...] = (
         0,
         UNIT_MASS,
         {"plant.mass_kg": 0.12},
+    ),
+    FaultyRecord(
+        "the amplifier's offset drifts",
+        "friction",
+        lambda: (_offset_drifting(),),
+        "drift",
+        "the bias drifts by about",
+        0,
+        UNIT_MASS,
+        {"plant.mass_kg": 0.12, "friction.coulomb_N": 0.5},
+    ),
+    FaultyRecord(
+        "the torque sensor's zero is off by 4 mN m",
+        "stiffness",
+        lambda: (strokes() | {"torque_Nm": strokes()["torque_Nm"] + 0.004},),
+        "remark",
+        "the sensor's zero is off",
+        0,
+    ),
+    FaultyRecord(
+        "friction that grows with the torque",
+        "arm",
+        lambda: (_friction_by_load(),),
+        "remainder",
+        "friction that grows with the torque",
+        0,
     ),
     FaultyRecord(
         FLIP,
@@ -277,6 +317,13 @@ RECORDS: tuple[FaultyRecord, ...] = (
         lambda: (changed(felt(), handle_force_N=_turned_half_way),),
         "coherence",
         "has a sign flipped",
+    ),
+    FaultyRecord(
+        "a sign flips in the middle of a run",
+        "arm",
+        lambda: (changed(arm()[1], **{"torque_Nm.link-1": _turned_half_way}),),
+        "validation",
+        "of the unseen torque are explained only",
     ),
     FaultyRecord(
         FADED,
@@ -449,6 +496,14 @@ RECORDS: tuple[FaultyRecord, ...] = (
         lambda: (renamed(edge(), stiffness_N_per_m="damping_Ns_per_m", damping_Ns_per_m="stiffness_N_per_m"),),
         "columns",
         "swapped",
+    ),
+    FaultyRecord(
+        "units in brackets behind the names",
+        "friction",
+        lambda: (renamed(driven(), time_s="Time [s]", position_m="Position [mm]"),),
+        "fault",
+        "name it time_s",
+        2,
     ),
     FaultyRecord(
         "a column named in degrees",

@@ -22,7 +22,11 @@ FEWEST: Final = 25  # torques of all joints that are compared for each base para
 UNSEEN: Final = 10  # samples to validate, at least
 WORSE: Final = 3.0  # deviations per base parameter by which a consistent set may miss
 POOR: Final = 0.5  # share explained, below which a reader is warned
+WRONG: Final = -0.2  # share below which nothing is given: noise alone makes it no less than about 0
 GRAVITY: Final = 0.3  # share of the unexplained torque that gravity explains, from which it is told
+REMAINDER: Final = 0.3  # the same of other friction, and of a drift
+SLOW: Final = 0.1  # share of the usual speed over which friction at low speed falls
+LEAST_OTHER: Final = 1e-6  # share of a column that must not be in the others
 SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
 
 
@@ -106,6 +110,49 @@ def gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Ch
     return Check("gravity", False, f"{reason}; state gravity, as gravity = (0, 0, -9.81)", warning=True)
 
 
+def remainder_check(
+    drives: Sequence[str], seen: Sequence[Compared], base: BaseParameters, best: Floats
+) -> Check | None:
+    """That no friction of another kind, and no drift, makes up much of what is left of a joint's torque."""
+    torques, columns = (np.concatenate([getattr(one, name) for one in seen]) for name in ("torques", "columns"))
+    time = np.concatenate([one.time for one in seen])
+    causes = list[str]()
+    for i, drive in enumerate(drives):
+        names = [f"coulomb({drive})", f"viscous({drive})"]
+        if not {*names} <= {*base.names}:
+            continue
+        X, torque = columns[:, i], torques[:, i]
+        sign, rate = (X[:, base.names.index(name)] for name in names)
+        slow = np.exp(-np.abs(rate) / max(SLOW * float(np.std(rate)), 1e-300))
+        further = {
+            "friction that grows with the torque": sign * np.abs(torque),
+            "friction that grows at low speed": sign * slow,
+            "friction that changes in time": sign * (time - np.mean(time)),
+            "an offset that drifts": time - np.mean(time),
+        }
+        shares = _shares_left(X, torque - X @ best, list(further.values()))
+        most = int(np.argmax(shares))
+        if shares[most] > REMAINDER:
+            causes.append(f"{100.0 * shares[most]:.3g} % of that of {drive} goes with {list(further)[most]}")
+    if not causes:
+        return None
+    reason = f"of the torque that is left unexplained, {comma_list(causes)}"
+    advice = "the model has none, so numbers may miss by more than their intervals"
+    return Check("remainder", False, f"{reason}; {advice}", warning=True)
+
+
+def _shares_left(X: Floats, residual: Floats, further: Sequence[Floats]) -> Floats:
+    """Share of what columns (n, p) leave that each further column (n,) explains beside them."""
+    size = np.linalg.norm(X, axis=0)
+    Q = np.linalg.qr(X[:, size > 0.0] / size[size > 0.0])[0]
+    G = np.stack([column / max(float(np.linalg.norm(column)), 1e-300) for column in further], axis=1)
+    G, left = G - Q @ (Q.T @ G), residual - Q @ (Q.T @ residual)
+    squares = np.sum(G**2, axis=0)
+    seen = squares > LEAST_OTHER
+    total = max(float(left @ left), 1e-300)
+    return np.where(seen, (G.T @ left) ** 2 / np.where(seen, squares, 1.0) / total, 0.0)
+
+
 def consistency_check(links: ConsistentLinks) -> Check:
     if links.deviation < WORSE:
         reason = f"links that can exist have these base parameters, to {links.deviation:.2g} deviations"
@@ -118,9 +165,13 @@ def consistency_check(links: ConsistentLinks) -> Check:
 
 
 def validation_check(drives: Sequence[str], shares: Sequence[float]) -> Check:
+    """That torques which were not fitted are predicted; refused where no prediction at all would be better."""
     listed = comma_list([f"{name} {100.0 * share:.4g} %" for name, share in zip(drives, shares, strict=True)])
     if min(shares) > POOR:
         return Check("validation", True, f"of the unseen torque are explained: {listed}")
     reason = f"of the unseen torque are explained only: {listed}"
+    if min(shares) < WRONG:
+        advice = "has a sign flipped in between, or do the torques only shake what the counts cannot show?"
+        return Check("validation", False, f"{reason}; {advice}")
     advice = "what acts there is not in the model, or torques are noise"
     return Check("validation", False, f"{reason}; {advice}", warning=True)

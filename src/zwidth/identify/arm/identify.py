@@ -42,6 +42,7 @@ from zwidth.identify.arm.fit_checks import (
     gravity_check,
     length_check,
     positive_check,
+    remainder_check,
     timing_check,
     validation_check,
 )
@@ -376,6 +377,7 @@ class _Work:
             excitation_check(fit, base, beta),
             positive_check(self.drives, base, beta, self._start(), self._known_rotors()),
             gravity_check(seen, fit, beta) if weights else None,
+            remainder_check(self.drives, seen, base, np.append(beta, fit.delay)),
             timing_check(fit, band.period, self.torque),
         ]
         return [one for one in checks if one is not None]
