@@ -16,6 +16,7 @@ import numpy as np
 import zwidth
 from tests.identify.arm_benches import chain_columns, chain_device, moved_records, random_chains
 from tests.identify.boundary_cases import measured
+from tests.identify.changed_columns import Columns, changed, renamed, without
 from tests.identify.impedance_bench import DOCUMENT, pushed
 from tests.identify.modes_bench import quantised, readings
 from tests.identify.spring_bench import bench_record
@@ -24,8 +25,6 @@ from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.load import from_document
 from zwidth.model.plant import Plant
 from zwidth.show.output import csv_text
-
-Columns = dict[str, Any]
 
 PERIOD = 1e-3
 STEP = 1e-7  # m, of the benches' encoder
@@ -151,25 +150,6 @@ class FaultyRecord:
     code: int = 1
     options: tuple[str, ...] = ()
     truth: Mapping[str, float] | None = None
-
-
-def changed(columns: Columns, **more: Callable[[Any], Any]) -> Columns:
-    """Columns of which some are changed, each by a function of itself."""
-    return {name: more.get(name, _same)(values) for name, values in columns.items()}
-
-
-def without(columns: Columns, first: int, behind: int) -> Columns:
-    """Columns of which some rows are not there."""
-    return {name: np.delete(np.asarray(values), slice(first, behind)) for name, values in columns.items()}
-
-
-def renamed(columns: Columns, **names: str) -> Columns:
-    """Columns under other names, two of them perhaps exchanged."""
-    return {names.get(name, name): values for name, values in columns.items()}
-
-
-def _same(values):
-    return values
 
 
 def _times(factor):

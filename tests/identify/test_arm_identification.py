@@ -47,6 +47,17 @@ def result(chain):
     return identified(chain_device(chain[0], 0, wrong=1.3), chain[1])
 
 
+def test_what_is_left_of_the_torque_is_named_only_where_it_follows_a_cause(chain, result):
+    assert check(result, "remainder") is None
+    columns = dict(chain[1])
+    drift = np.linspace(0.0, 0.5 * np.std(columns["torque_Nm.link-2"]), len(columns["time_s"]))
+    columns["torque_Nm.link-2"] = columns["torque_Nm.link-2"] + drift
+    remainder = check(identified(chain_device(chain[0], 0, wrong=1.3), columns), "remainder")
+    assert remainder.warning
+    assert "of that of motor-2 goes with an offset that drifts" in remainder.reason
+    assert "motor-1" not in remainder.reason
+
+
 # --- numbers ------------------------------------------------------------------------------------------------
 
 
