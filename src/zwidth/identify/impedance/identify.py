@@ -37,6 +37,7 @@ from zwidth.identify.records.columns import Columns
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling, check_sampling
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.encoder_step import encoder_step
 from zwidth.progress import Progress
 
 __all__ = ["COLUMNS", "identify_impedance"]
@@ -201,8 +202,7 @@ def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
         for name in (force, position):
             low[name] = min(low[name], float(np.min(piece[name])))
             high[name] = max(high[name], float(np.max(piece[name])))
-        steps = np.abs(np.diff(piece[position]))
-        step = min(step, float(np.min(steps[steps > 0.0], initial=np.inf)))
+        step = min(step, encoder_step([piece[position]]) or np.inf)
         for limit in (float(np.max(piece[force])), float(np.min(piece[force]))):
             at_limit[limit] = at_limit.get(limit, 0) + int(np.sum(piece[force] == limit))
         total += len(piece[force])
@@ -210,9 +210,11 @@ def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
         if not high[name] > low[name]:
             text = f"{name} of {record.label} is {low[name] + 0.0:g} all the time; move the handle while recording"
             return [Check(what, False, text)]
-    counts = (high[position] - low[position]) / step
-    seen = f"the handle moves over {high[position] - low[position]:.3g} m, {counts:.4g} steps of its reading"
-    if counts < COUNTS:
+    span = high[position] - low[position]
+    seen = f"the handle moves over {span:.3g} m"
+    if step < np.inf:
+        seen += f", {span / step:.4g} steps of its reading"
+    if span < COUNTS * step < np.inf:
         return [Check("motion", False, f"{seen}; move it over {COUNTS:g} steps or more")]
     checks = [Check("motion", True, seen)]
     held = max(at_limit.get(high[force], 0), at_limit.get(low[force], 0))

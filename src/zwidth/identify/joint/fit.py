@@ -425,23 +425,6 @@ def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int
     return JointFit(windows, search.numbers, search.starts, covariance, working, left, changes, weights, converged)
 
 
-def bias_of_windows(fit: JointFit) -> tuple[Floats, Floats]:
-    """By how much the bias in each window differs from that of all, the other numbers as they are fitted.
-
-    Returns  (W,) differences, linearised, and (W,) the squares that they rest on: their weights
-    """
-    numbers = replace(fit.numbers, free=(3, 4), tied=())
-    sums, _ = _Search(fit.windows, numbers, fit.starts, 0).linearised()
-    turn = np.zeros((4, 3))  # bias alone: less of the level forward, more of that backward; and the start
-    turn[0, 0], turn[1, 0], turn[2, 1], turn[3, 2] = -1.0, 1.0, 1.0, 1.0
-    gram, slope = turn.T @ sums.gram @ turn, sums.gradient @ turn
-    back = np.linalg.pinv(gram[:, 1:, 1:], rcond=1e-12, hermitian=True) @ gram[:, 1:, :1]
-    weight = gram[:, 0, 0] - np.einsum("wi,wij->w", gram[:, 0, 1:], back)
-    score = slope[:, 0] - np.einsum("wi,wij->w", slope[:, 1:], back)
-    felt = weight > 1e-9 * np.max(gram[:, 0, 0])
-    return np.where(felt, score / np.where(felt, weight, 1.0), 0.0), np.where(felt, weight, 0.0)
-
-
 def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Spread of the free numbers by what each block of a linearised fit adds to them.
 

@@ -14,6 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.model.encoder_step import encoder_step
+
 Floats = NDArray[np.float64]
 
 BINS: Final = 24  # of a stroke
@@ -30,7 +32,7 @@ SPIKE_NOISE, SPIKE_COUNTS = 12.0, 3.0  # beyond both of the middle of five neigh
 class Resolution:
     """Steps and noise of readings.
 
-    step   the smallest difference between two readings; 0 where they are not rounded
+    step   of which all differences between readings are multiples; 0 where they show none
     noise  standard deviation of single readings about their smooth course
     """
 
@@ -75,14 +77,9 @@ class Strokes:
 def resolution_of(values: Floats, known_step: float = 0.0) -> Resolution:
     """Step and noise of readings (n,).
 
-    known_step  the sensor's, from the device's file; 0: read off the values, where many are alike
+    known_step  the sensor's, from the device's file; 0: read off the values
     """
-    distinct = np.unique(values)
-    gaps = np.diff(distinct)
-    gaps = gaps[gaps > 1e-9 * np.ptp(values)] if len(gaps) else gaps
-    step = known_step
-    if not step and 2 * len(distinct) < len(values) and len(gaps):
-        step = float(np.min(gaps))
+    step = known_step or encoder_step([values])
     second = np.diff(values, n=2)
     # of white noise the second difference has 6 times the variance; the median does not see turns and spikes
     noise = float(np.median(np.abs(second))) / 0.6745 / np.sqrt(6.0) if len(second) else 0.0
