@@ -25,9 +25,15 @@ POINTS: Final = 30  # frequencies by which they are compared
 GOOD, ENOUGH = 1.05, 25.0  # times the sum of squares of the modes alone, or so much more: a fit has arrived
 FAR: Final = np.log(1e4)  # beyond which no number is looked for
 ABOUT: Final = (0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of a mode's frequency, where starts are compared, too
+FOLDED: Final = (0.5, 1.5)  # of half the sampling rate: where a mode and its mirror image look much alike
+UNSURE: Final = (0.8, 1.2)  # likewise: where the response tells little of a mode
+AROUND, AROUND_TRIED = (
+    3.0,
+    24,
+)  # factor about the file's numbers, and starts within it, where one mode tells little
 DAMPED: Final = (0.1, 1.0, 10.0)  # times the damping of a mode about half the sampling rate
 RIVAL: Final = 8.0  # by which a sum of squares may exceed the least one, and still set an interval's end
-ELSEWHERE: Final = 0.05  # how far from the least one, in logarithms
+RIVALS, ELSEWHERE = 3, 0.3  # such minima at most, and how far from each other in logarithms
 HEAVY: Final = 10.0  # weight of a mode's frequency beside that of a point of the response
 LOST_START: Final = 50.0
 LOST: Final = 1e6  # residual where there is no such device
@@ -61,8 +67,8 @@ class PhysicalFit:
 def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period: float) -> PhysicalFit:
     """The numbers that explain the response best, each with its interval by the profile likelihood.
 
-    From the file's numbers first. Where that does not end at what the modes alone explain, from many others about
-    them within a factor of six, chosen by the logarithm of the response, in which a wrong frequency still pulls.
+    From the file's numbers first, and from others where these may not lead there (`_minima`). Where a response
+    says little of a mode, several minima are hardly different, and all of them set the ends of intervals.
     """
     rows = len(data.target)
 
@@ -75,16 +81,8 @@ def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period:
     timed = [i for i, one in enumerate(model.quantities) if not one.positive and one.unit == "s"]
     if timed and modal.count:
         start[timed[0]] = np.clip(modal.delay, 0.0, high[timed[0]])
-    good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
-    minima = [_descended(residuals, start, low, high)]
-    if minima[0][1] > good and modal.chi_squared < HOPELESS * rows:
-        for x in _starts(data, model, modal, start, low, high, period):
-            minima.append(_descended(residuals, x, low, high))
-            if minima[-1][1] <= good:
-                break
-    best, _ = min(minima, key=lambda one: one[1])
-    minima += [_descended(residuals, x, low, high) for x in _unfolded(model, best, low, high, period)]
-    best, rivals = _lowest(minima)
+    minima = _minima(residuals, data, model, modal, start, low, high, period)
+    best, *rivals = _lowest(minima)
     fit = fit_least_squares(residuals, best, lower=low, upper=high, rivals=rivals)
     return PhysicalFit(
         model.values(fit.values),
@@ -94,6 +92,38 @@ def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period:
         fit.sum_of_squares,
         rows,
     )
+
+
+def _minima(
+    residuals: Residuals,
+    data: LocalResponse,
+    model: SampledModel,
+    modal: ModalFit,
+    start: Floats,
+    low: Floats,
+    high: Floats,
+    period: float,
+) -> list[tuple[Floats, float]]:
+    """Where searches end, each with its sum of squares.
+
+    Where the one from `start` does not come to what the modes alone explain: from many others within a factor of
+    six, chosen by the logarithm of the response, in which a wrong frequency still pulls. Where a mode lies about
+    half the sampling rate: from its mirror image. Where the response hides a mode: from many within a factor of
+    three.
+    """
+    good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
+    found = [_descended(residuals, start, low, high)]
+    if found[0][1] > good and modal.chi_squared < HOPELESS * len(data.target):
+        for x in _starts(data, model, modal, start, low, high, period):
+            found.append(_descended(residuals, x, low, high))
+            if found[-1][1] <= good:
+                break
+    best, _ = min(found, key=lambda one: one[1])
+    others = _unfolded(model, best, low, high, period)
+    shares = _rates(model, best) * period / np.pi
+    if np.sum(shares < FOLDED[1]) > modal.count or np.any((shares > UNSURE[0]) & (shares < UNSURE[1])):
+        others += _spread_starts(model, start, np.log(AROUND), AROUND_TRIED, low, high)
+    return found + [_descended(residuals, x, low, high) for x in others]
 
 
 def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
@@ -124,10 +154,15 @@ def _rates(model: SampledModel, x: Floats) -> Floats:
     return np.sqrt(squared[squared > 0.0])
 
 
-def _lowest(minima: Sequence[tuple[Floats, float]]) -> tuple[Floats, list[Floats]]:
-    """The lowest minimum; and the next one elsewhere, where it is hardly higher."""
-    (best, least), *others = sorted(minima, key=lambda one: one[1])
-    return best, [x for x, height in others if height < least + RIVAL and np.max(np.abs(x - best)) > ELSEWHERE][:1]
+def _lowest(minima: Sequence[tuple[Floats, float]]) -> list[Floats]:
+    """The lowest minimum, and some others elsewhere that are hardly higher."""
+    found = list[Floats]()
+    least = min(height for _, height in minima)
+    for x, height in sorted(minima, key=lambda one: one[1]):
+        apart = all(np.max(np.abs(x - other)) > ELSEWHERE for other in found)
+        if apart and height < least + RIVAL and len(found) <= RIVALS:
+            found.append(x)
+    return found
 
 
 def _unfolded(model: SampledModel, best: Floats, low: Floats, high: Floats, period: float) -> list[Floats]:
@@ -137,12 +172,24 @@ def _unfolded(model: SampledModel, best: Floats, low: Floats, high: Floats, peri
     dampers = np.array([one.unit in DAMPERS for one in model.quantities])
     starts = list[Floats]()
     for rate in _rates(model, best):
-        if 0.5 * np.pi / period < rate < 1.5 * np.pi / period:
+        if FOLDED[0] < rate * period / np.pi < FOLDED[1]:
             mirrored = 2.0 * np.pi / period - rate
             for factor, damped in product(np.log([1.0, mirrored / rate]), np.log(DAMPED)):
                 x = best + 2.0 * factor * springs + (factor + damped) * dampers
                 starts.append(np.clip(x, low, high))
     return starts
+
+
+def _spread_starts(
+    model: SampledModel, start: Floats, spread: float, count: int, low: Floats, high: Floats
+) -> list[Floats]:
+    """So many starts spread evenly (Sobol) within `spread` about a start, in logarithms, with its delay."""
+    from scipy.stats import qmc
+
+    positive = np.array([one.positive for one in model.quantities])
+    cube = qmc.Sobol(len(start), scramble=False).random(1 << count.bit_length())[1 : count + 1]
+    tried = np.where(positive, start + spread * (2.0 * cube - 1.0), np.minimum(start, high))
+    return list(np.clip(tried, low + 1e-12, high))
 
 
 def _starts(
@@ -156,7 +203,6 @@ def _starts(
 ) -> list[Floats]:
     """Starts about the file's numbers, refined on the logarithm of the response, best first."""
     from scipy.optimize import least_squares
-    from scipy.stats import qmc
 
     peaks = modal.rates[:, None] * period * np.array(ABOUT)
     theta = np.sort(np.append(np.geomspace(data.theta.min(), 0.99 * data.theta.max(), POINTS), peaks.ravel()))
@@ -173,10 +219,7 @@ def _starts(
         apart[: len(own)] = HEAVY * np.log(own / rates[: len(own)])
         return np.concatenate([ratio.real, ratio.imag, apart])
 
-    positive = np.array([one.positive for one in model.quantities])
-    cube = qmc.Sobol(len(start), scramble=False).random(128)[1 : TRIED + 1]
-    tried = np.where(positive, start + SPREAD * (2.0 * cube - 1.0), np.minimum(start, high))
-    tried = np.clip(np.vstack([start, tried]), low + 1e-12, high)
+    tried = [np.clip(start, low + 1e-12, high), *_spread_starts(model, start, SPREAD, TRIED, low, high)]
     costs = np.array([np.sum(off(x) ** 2) for x in tried])
     refined = list[tuple[float, Floats]]()
     for i in np.argsort(costs)[:REFINED]:
