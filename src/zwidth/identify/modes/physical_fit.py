@@ -23,6 +23,7 @@ SPREAD: Final = np.log(6.0)  # about the file's numbers, within which a start is
 TRIED, REFINED = 96, 3  # starts that are compared, and refined
 POINTS: Final = 30  # frequencies by which they are compared
 GOOD, ENOUGH = 1.05, 25.0  # times the sum of squares of the modes alone, or so much more: a fit has arrived
+CLOSE: Final = 10.0  # more than that sum, from which on other starts are tried all the same
 FAR: Final = np.log(1e4)  # beyond which no number is looked for
 ABOUT: Final = (0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of a mode's frequency, where starts are compared, too
 FOLDED: Final = (0.5, 1.5)  # of half the sampling rate: where a mode and its mirror image look much alike
@@ -108,8 +109,8 @@ def _minima(
 
     Where the one from `start` does not come to what the modes alone explain: from many others within a factor of
     six, chosen by the logarithm of the response, in which a wrong frequency still pulls. Where a mode lies about
-    half the sampling rate: from its mirror image. Where the response hides a mode: from many within a factor of
-    three.
+    half the sampling rate: from its mirror image. Where the response hides a mode, or the modes alone explain a
+    little more: from many within a factor of three.
     """
     good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
     found = [_descended(residuals, start, low, high)]
@@ -118,10 +119,11 @@ def _minima(
             found.append(_descended(residuals, x, low, high))
             if found[-1][1] <= good:
                 break
-    best, _ = min(found, key=lambda one: one[1])
+    best, least = min(found, key=lambda one: one[1])
     others = _unfolded(model, best, low, high, period)
     shares = _rates(model, best) * period / np.pi
-    if np.sum(shares < FOLDED[1]) > modal.count or np.any((shares > UNSURE[0]) & (shares < UNSURE[1])):
+    hidden = np.sum(shares < FOLDED[1]) > modal.count or np.any((shares > UNSURE[0]) & (shares < UNSURE[1]))
+    if hidden or modal.chi_squared + CLOSE < least <= good:
         others += _spread_starts(model, start, np.log(AROUND), AROUND_TRIED, low, high)
     return found + [_descended(residuals, x, low, high) for x in others]
 
