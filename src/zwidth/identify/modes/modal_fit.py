@@ -23,7 +23,7 @@ RATIOS: Final = (0.005, 0.04, 0.3)  # damping ratios among which a further mode 
 POINTS: Final = 100  # frequencies among which it is
 FIRST_DELAYS: Final = (0.0, 1.0, 2.0)  # samples
 REFINED: Final = 2  # places of a further mode that are refined
-FOLDED: Final = 0.5  # of half the sampling rate, above which modes beyond it may show
+FOLDED: Final = (0.5, 1.5)  # of half the sampling rate: where a mode and its mirror image look much alike
 MOST_MODES: Final = 6
 PROFILED: Final = 3  # modes at most whose intervals follow the likelihood; of more, its curvature
 UNEXPLAINED, HELPFUL = 2.0, 0.7  # misfit beyond which a third mode must lower the sum of squares to such a share
@@ -176,7 +176,7 @@ def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
     A[n:, :n] = -np.linalg.solve(plant.mass, plant.stiffness)
     A[n:, n:] = -np.linalg.solve(plant.mass, plant.damping)
     poles = np.linalg.eigvals(A)
-    low, fast = np.log(SLOWEST * data.theta.min() / T), np.log((2.0 - FOLDED) * np.pi / T)
+    low, fast = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
     real = np.sort(
         np.abs(poles[(np.abs(poles.imag) < 1e-9 * np.abs(poles)) & (np.log(np.abs(poles) + 1e-300) > low)].real)
     )
@@ -189,8 +189,7 @@ def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
         if low < np.log(w) < fast:
             vector += [np.log(w), np.log(max(ratio, 2.0 * LEAST_RATIO))]
     start = _solved(data, "free", T, np.array(vector))
-    ways = (False, True) if start.count else (False,)  # dampers couple modes, where there are some
-    fits = [_on_base(data, replace(start, coupled=coupled), base) for base in BASES for coupled in ways]
+    fits = [_on_base(data, replace(start, coupled=coupled), base) for base in BASES for coupled in (False, True)]
     return min((_refined(data, fit) for fit in fits), key=lambda fit: fit.criterion)
 
 
@@ -228,7 +227,7 @@ def _with_mode(data: LocalResponse, fit: ModalFit) -> list[ModalFit]:
     rest = data.target - q @ (q.T @ data.target)
     f = np.unique(data.theta)
     f = f[np.unique(np.linspace(0, len(f) - 1, POINTS).astype(int))]
-    f = np.append(f, 2.0 * np.pi - f[f > FOLDED * np.pi])
+    f = np.append(f, 2.0 * np.pi - f[f > FOLDED[0] * np.pi])
     choices = [(np.log(t / fit.period), np.log(zeta)) for t in f for zeta in RATIOS]
     pairs = [(float(np.exp(zeta + w)), float(np.exp(2.0 * w))) for w, zeta in choices]
     rows = data.apply(_rows(pairs, fit.period, float(fit.vector[0]), data.theta))
@@ -273,7 +272,7 @@ def _residuals(data: LocalResponse, fit: ModalFit) -> Callable[[Floats], Floats]
 
 def _limits(fit: ModalFit, data: LocalResponse) -> tuple[Floats, Floats]:
     T = fit.period
-    slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log((2.0 - FOLDED) * np.pi / T)
+    slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
     braked = fit.base == "free, braked"
     low = [LEAST_DELAY, *([np.log(1e-3 * data.theta.min() / T)] * braked)]
     high = [MOST_DELAY, *([np.log(10.0 / T)] * braked)]

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.identify.modes.local_response import LocalResponse
-from zwidth.identify.modes.modal_fit import ModalFit
+from zwidth.identify.modes.modal_fit import FOLDED, ModalFit
 from zwidth.identify.modes.model import SampledModel
-from zwidth.identify.profile_likelihood import Fit, Residuals, fit_least_squares
+from zwidth.identify.profile_likelihood import Fit, fit_least_squares
 from zwidth.model.modes import undamped_modes
 
 Floats = NDArray[np.float64]
@@ -26,8 +26,7 @@ GOOD, ENOUGH = 1.05, 25.0  # times the sum of squares of the modes alone, or so 
 CLOSE: Final = 10.0  # more than that sum, from which on other starts are tried all the same
 FAR: Final = np.log(1e4)  # beyond which no number is looked for
 ABOUT: Final = (0.8, 0.9, 0.97, 1.0, 1.03, 1.1, 1.25)  # of a mode's frequency, where starts are compared, too
-FOLDED: Final = (0.5, 1.5)  # of half the sampling rate: where a mode and its mirror image look much alike
-UNSURE: Final = (0.8, 1.2)  # likewise: where the response tells little of a mode
+UNSURE: Final = (0.8, 1.2)  # of half the sampling rate: where the response tells little of a mode
 AROUND, AROUND_TRIED = (
     3.0,
     24,
@@ -68,64 +67,25 @@ class PhysicalFit:
 def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period: float) -> PhysicalFit:
     """The numbers that explain the response best, each with its interval by the profile likelihood.
 
-    From the file's numbers first, and from others where these may not lead there (`_minima`). Where a response
+    From the file's numbers first, and from others where these may not lead there (`_Search`). Where a response
     says little of a mode, several minima are hardly different, and all of them set the ends of intervals.
     """
-    rows = len(data.target)
-
-    def residuals(x: Floats) -> Floats:
-        P = model.response(x, data.theta)
-        return data.residuals(P) if np.isfinite(P).all() else np.full(rows, LOST)
-
     low, high = _limits(model, period)
     start = np.clip(model.vector(np.maximum(model.start, 1e-300)), low, high)
     timed = [i for i, one in enumerate(model.quantities) if not one.positive and one.unit == "s"]
     if timed and modal.count:
         start[timed[0]] = np.clip(modal.delay, 0.0, high[timed[0]])
-    minima = _minima(residuals, data, model, modal, start, low, high, period)
-    best, *rivals = _lowest(minima)
-    fit = fit_least_squares(residuals, best, lower=low, upper=high, rivals=rivals)
+    search = _Search(data, model, modal, period, start, low, high)
+    best, *rivals = _lowest(search.minima())
+    fit = fit_least_squares(search.residuals, best, lower=low, upper=high, rivals=rivals)
     return PhysicalFit(
         model.values(fit.values),
         model.values(fit.low),
         model.values(fit.high),
         fit,
         fit.sum_of_squares,
-        rows,
+        len(data.target),
     )
-
-
-def _minima(
-    residuals: Residuals,
-    data: LocalResponse,
-    model: SampledModel,
-    modal: ModalFit,
-    start: Floats,
-    low: Floats,
-    high: Floats,
-    period: float,
-) -> list[tuple[Floats, float]]:
-    """Where searches end, each with its sum of squares.
-
-    Where the one from `start` does not come to what the modes alone explain: from many others within a factor of
-    six, chosen by the logarithm of the response, in which a wrong frequency still pulls. Where a mode lies about
-    half the sampling rate: from its mirror image. Where the response hides a mode, or the modes alone explain a
-    little more: from many within a factor of three.
-    """
-    good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
-    found = [_descended(residuals, start, low, high)]
-    if found[0][1] > good and modal.chi_squared < HOPELESS * len(data.target):
-        for x in _starts(data, model, modal, start, low, high, period):
-            found.append(_descended(residuals, x, low, high))
-            if found[-1][1] <= good:
-                break
-    best, least = min(found, key=lambda one: one[1])
-    others = _unfolded(model, best, low, high, period)
-    shares = _rates(model, best) * period / np.pi
-    hidden = np.sum(shares < FOLDED[1]) > modal.count or np.any((shares > UNSURE[0]) & (shares < UNSURE[1]))
-    if hidden or modal.chi_squared + CLOSE < least <= good:
-        others += _spread_starts(model, start, np.log(AROUND), AROUND_TRIED, low, high)
-    return found + [_descended(residuals, x, low, high) for x in others]
 
 
 def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
@@ -136,24 +96,6 @@ def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
         else:
             low[i], high[i] = 0.0, max(20.0 * period, 4.0 * one.start) if one.unit == "s" else np.inf
     return low, high
-
-
-def _descended(residuals: Residuals, x: Floats, low: Floats, high: Floats) -> tuple[Floats, float]:
-    """Parameters near x with a small sum of squares, and that sum."""
-    from scipy.optimize import least_squares
-
-    solved = least_squares(residuals, x, bounds=(low, high), x_scale="jac", ftol=1e-6, xtol=1e-7, max_nfev=40)
-    return np.asarray(solved.x), 2.0 * float(solved.cost)
-
-
-def _rates(model: SampledModel, x: Floats) -> Floats:
-    """Natural frequencies of the flexible modes [rad/s], ascending; () where there is no such device."""
-    try:
-        plant = model.loop_of(model.values(x)).plant
-    except ValueError:
-        return np.zeros(0)
-    squared = undamped_modes(plant.mass, plant.stiffness)[0]
-    return np.sqrt(squared[squared > 0.0])
 
 
 def _lowest(minima: Sequence[tuple[Floats, float]]) -> list[Floats]:
@@ -167,64 +109,116 @@ def _lowest(minima: Sequence[tuple[Floats, float]]) -> list[Floats]:
     return found
 
 
-def _unfolded(model: SampledModel, best: Floats, low: Floats, high: Floats, period: float) -> list[Floats]:
-    """Starts with a mode on the other side of half the sampling rate, and with other damping: sampling
-    makes all of them look much alike. Springs and dampers are scaled."""
-    springs = np.array([one.unit in SPRINGS for one in model.quantities])
-    dampers = np.array([one.unit in DAMPERS for one in model.quantities])
-    starts = list[Floats]()
-    for rate in _rates(model, best):
-        if FOLDED[0] < rate * period / np.pi < FOLDED[1]:
-            mirrored = 2.0 * np.pi / period - rate
-            for factor, damped in product(np.log([1.0, mirrored / rate]), np.log(DAMPED)):
-                x = best + 2.0 * factor * springs + (factor + damped) * dampers
-                starts.append(np.clip(x, low, high))
-    return starts
+@dataclass(frozen=True)
+class _Search:
+    """A search for the parameters of `model` within low and high (p,), from a start (p,).
 
+    modal   modes that explain the same response by themselves
+    period  of the loop [s]
+    """
 
-def _spread_starts(
-    model: SampledModel, start: Floats, spread: float, count: int, low: Floats, high: Floats
-) -> list[Floats]:
-    """So many starts spread evenly (Sobol) within `spread` about a start, in logarithms, with its delay."""
-    from scipy.stats import qmc
+    data: LocalResponse
+    model: SampledModel
+    modal: ModalFit
+    period: float
+    start: Floats
+    low: Floats
+    high: Floats
 
-    positive = np.array([one.positive for one in model.quantities])
-    cube = qmc.Sobol(len(start), scramble=False).random(1 << count.bit_length())[1 : count + 1]
-    tried = np.where(positive, start + spread * (2.0 * cube - 1.0), np.minimum(start, high))
-    return list(np.clip(tried, low + 1e-12, high))
+    def residuals(self, x: Floats) -> Floats:
+        """What parameters leave of the response (r,)."""
+        P = self.model.response(x, self.data.theta)
+        return self.data.residuals(P) if np.isfinite(P).all() else np.full(len(self.data.target), LOST)
 
+    def minima(self) -> list[tuple[Floats, float]]:
+        """Where searches end, each with its sum of squares.
 
-def _starts(
-    data: LocalResponse,
-    model: SampledModel,
-    modal: ModalFit,
-    start: Floats,
-    low: Floats,
-    high: Floats,
-    period: float,
-) -> list[Floats]:
-    """Starts about the file's numbers, refined on the logarithm of the response, best first."""
-    from scipy.optimize import least_squares
+        Where the one from `start` does not come to what the modes alone explain: from many others within a factor
+        of six, chosen by the logarithm of the response, in which a wrong frequency still pulls. Where a mode lies
+        about half the sampling rate: from its mirror image. Where the response hides a mode, or the modes alone
+        explain a little more: from many within a factor of three.
+        """
+        modal = self.modal
+        good = max(GOOD * modal.chi_squared, modal.chi_squared + ENOUGH)
+        found = [self._descended(self.start)]
+        if found[0][1] > good and modal.chi_squared < HOPELESS * len(self.data.target):
+            for x in self._by_logarithm():
+                found.append(self._descended(x))
+                if found[-1][1] <= good:
+                    break
+        best, least = min(found, key=lambda one: one[1])
+        others = self._unfolded(best)
+        shares = self._rates(best) * self.period / np.pi
+        unsure = bool(np.any((shares > UNSURE[0]) & (shares < UNSURE[1])))
+        hidden = int(np.sum(shares < FOLDED[1])) > modal.count
+        if unsure or hidden or modal.chi_squared + CLOSE < least <= good:
+            others += self._spread(np.log(AROUND), AROUND_TRIED)
+        return found + [self._descended(x) for x in others]
 
-    peaks = modal.rates[:, None] * period * np.array(ABOUT)
-    theta = np.sort(np.append(np.geomspace(data.theta.min(), 0.99 * data.theta.max(), POINTS), peaks.ravel()))
-    theta = theta[theta < 0.999 * np.pi]
-    wanted, rates = modal.response(theta), modal.clear_rates
+    def _descended(self, x: Floats) -> tuple[Floats, float]:
+        """Parameters near x with a small sum of squares, and that sum."""
+        from scipy.optimize import least_squares
 
-    def off(x: Floats) -> Floats:
-        P = model.response(x, theta)
-        if not np.isfinite(P).all() or np.any(P == 0.0):
-            return np.full(2 * len(theta) + len(rates), LOST_START)
-        ratio = np.log(wanted / P)
-        own = _rates(model, x)[: len(rates)]
-        apart = np.zeros(len(rates))
-        apart[: len(own)] = HEAVY * np.log(own / rates[: len(own)])
-        return np.concatenate([ratio.real, ratio.imag, apart])
+        bounds = self.low, self.high
+        solved = least_squares(self.residuals, x, bounds=bounds, x_scale="jac", ftol=1e-6, xtol=1e-7, max_nfev=40)
+        return np.asarray(solved.x), 2.0 * float(solved.cost)
 
-    tried = [np.clip(start, low + 1e-12, high), *_spread_starts(model, start, SPREAD, TRIED, low, high)]
-    costs = np.array([np.sum(off(x) ** 2) for x in tried])
-    refined = list[tuple[float, Floats]]()
-    for i in np.argsort(costs)[:REFINED]:
-        solved = least_squares(off, tried[i], bounds=(low, high), loss="soft_l1", max_nfev=40)
-        refined.append((float(solved.cost), np.asarray(solved.x)))
-    return [x for _, x in sorted(refined, key=lambda one: one[0])]
+    def _rates(self, x: Floats) -> Floats:
+        """Natural frequencies of the flexible modes [rad/s], ascending; () where there is no such device."""
+        try:
+            plant = self.model.loop_of(self.model.values(x)).plant
+        except ValueError:
+            return np.zeros(0)
+        squared = undamped_modes(plant.mass, plant.stiffness)[0]
+        return np.sqrt(squared[squared > 0.0])
+
+    def _unfolded(self, best: Floats) -> list[Floats]:
+        """Starts with a mode on the other side of half the sampling rate, and with other damping: sampling
+        makes all of them look much alike. Springs and dampers are scaled."""
+        springs = np.array([one.unit in SPRINGS for one in self.model.quantities])
+        dampers = np.array([one.unit in DAMPERS for one in self.model.quantities])
+        starts = list[Floats]()
+        for rate in self._rates(best):
+            if FOLDED[0] < rate * self.period / np.pi < FOLDED[1]:
+                mirrored = 2.0 * np.pi / self.period - rate
+                for factor, damped in product(np.log([1.0, mirrored / rate]), np.log(DAMPED)):
+                    x = best + 2.0 * factor * springs + (factor + damped) * dampers
+                    starts.append(np.clip(x, self.low, self.high))
+        return starts
+
+    def _spread(self, spread: float, count: int) -> list[Floats]:
+        """So many starts spread evenly (Sobol) within `spread` about the start, in logarithms, with its delay."""
+        from scipy.stats import qmc
+
+        positive = np.array([one.positive for one in self.model.quantities])
+        cube = qmc.Sobol(len(self.start), scramble=False).random(1 << count.bit_length())[1 : count + 1]
+        tried = np.where(positive, self.start + spread * (2.0 * cube - 1.0), np.minimum(self.start, self.high))
+        return list(np.clip(tried, self.low + 1e-12, self.high))
+
+    def _by_logarithm(self) -> list[Floats]:
+        """Starts about the file's numbers, refined on the logarithm of the response, best first."""
+        from scipy.optimize import least_squares
+
+        peaks = self.modal.rates[:, None] * self.period * np.array(ABOUT)
+        lowest, highest = self.data.theta.min(), self.data.theta.max()
+        theta = np.sort(np.append(np.geomspace(lowest, 0.99 * highest, POINTS), peaks.ravel()))
+        theta = theta[theta < 0.999 * np.pi]
+        wanted, rates = self.modal.response(theta), self.modal.clear_rates
+
+        def off(x: Floats) -> Floats:
+            P = self.model.response(x, theta)
+            if not np.isfinite(P).all() or np.any(P == 0.0):
+                return np.full(2 * len(theta) + len(rates), LOST_START)
+            ratio = np.log(wanted / P)
+            own = self._rates(x)[: len(rates)]
+            apart = np.zeros(len(rates))
+            apart[: len(own)] = HEAVY * np.log(own / rates[: len(own)])
+            return np.concatenate([ratio.real, ratio.imag, apart])
+
+        tried = [np.clip(self.start, self.low + 1e-12, self.high), *self._spread(SPREAD, TRIED)]
+        costs = np.array([np.sum(off(x) ** 2) for x in tried])
+        refined = list[tuple[float, Floats]]()
+        for i in np.argsort(costs)[:REFINED]:
+            solved = least_squares(off, tried[i], bounds=(self.low, self.high), loss="soft_l1", max_nfev=40)
+            refined.append((float(solved.cost), np.asarray(solved.x)))
+        return [x for _, x in sorted(refined, key=lambda one: one[0])]
