@@ -22,6 +22,7 @@ Damping = Literal["viscous", "hysteretic"]
 RATIOS: Final = (0.005, 0.04, 0.3)  # damping ratios among which a further mode is looked for
 POINTS: Final = 100  # frequencies among which it is
 FIRST_DELAYS: Final = (0.0, 1.0, 2.0)  # samples
+TRIED: Final = 64  # of them at once: all together would take a gigabyte for a long record
 REFINED: Final = 2  # places of a further mode that are refined
 FOLDED: Final = (0.5, 1.5)  # of half the sampling rate: where a mode and its mirror image look much alike
 MOST_MODES: Final = 6
@@ -230,10 +231,13 @@ def _with_mode(data: LocalResponse, fit: ModalFit) -> list[ModalFit]:
     f = np.append(f, 2.0 * np.pi - f[f > FOLDED[0] * np.pi])
     choices = [(np.log(t / fit.period), np.log(zeta)) for t in f for zeta in RATIOS]
     pairs = [(float(np.exp(zeta + w)), float(np.exp(2.0 * w))) for w, zeta in choices]
-    rows = data.apply(_rows(pairs, fit.period, float(fit.vector[0]), data.theta))
-    rows -= q @ (q.T @ rows)
-    size = np.sum(rows**2, axis=0)
-    gain = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
+    gain = np.empty(len(pairs))
+    for first in range(0, len(pairs), TRIED):
+        part = slice(first, first + TRIED)
+        rows = data.apply(_rows(pairs[part], fit.period, float(fit.vector[0]), data.theta))
+        rows -= q @ (q.T @ rows)
+        size = np.sum(rows**2, axis=0)
+        gain[part] = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
     above = np.repeat(f > np.pi, len(RATIOS))
     best = [int(np.argmax(np.where(which, gain, -1.0))) for which in (~above, above) if which.any()]
     vectors = [np.r_[fit.vector, choices[i]] for i in best]
