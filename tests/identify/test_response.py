@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.identify.modes_bench import columns, readings
+from tests.identify.modes_bench import columns, readings, two_mass_device
 from zwidth.chart.measured.chart import measured_chart
 from zwidth.device.load import from_document
 from zwidth.identify.kinds import identify
@@ -119,3 +119,21 @@ def test_modes_of_a_mass_without_any_resonance_are_its_own_numbers():
     found = identify(device, "modes", shaken(device, 8000))
     for path, value in (("plant.mass_kg", 0.1), ("plant.damping_Ns_per_m", 0.5)):
         assert found[path].value == pytest.approx(value, rel=1e-3)
+
+
+def test_a_sweep_that_passes_low_frequencies_in_no_time_is_said_to_and_repeated_it_answers():
+    """Columns that are right are not said to be shifted."""
+    device = two_mass_device((0.9, 0.15), 2.5, 2e4, PERIOD)
+
+    def swept(times):
+        force = np.tile(chirp(8000), times)
+        position = readings(device.at().plant, PERIOD, force, 0.0)
+        noise = 5e-6 * np.random.default_rng(0).normal(size=len(force))
+        return identify(device, "response", columns(force, position + noise, PERIOD))
+
+    (chart,) = (check for check in swept(1).checks if check.what == "chart")
+    assert not chart.passed
+    assert "where a free device differs from a held one, it is not known" in chart.reason
+    assert "shifted" not in chart.reason
+    (stiffness,) = swept(4).estimates
+    assert stiffness.low < device.chart(decay=False).stiffness_max < stiffness.high

@@ -37,6 +37,7 @@ LIMITED: Final = 0.05  # share of the samples at the largest and the smallest fo
 FIRST_LEVELS: Final = 100_000  # samples among which the force's levels are counted
 FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
 FEWEST_USABLE: Final = 0.2  # share of the frequencies
+UNKNOWN_BELOW: Final = 10.0  # lowest frequencies of the record, from which on it does not show a free device
 
 
 def identify_response(
@@ -198,17 +199,31 @@ def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | 
         chart = measured_chart(response, computer)
     except ResponseError as error:
         return None, str(error)
-    if not np.isfinite(chart.stiffness_max_nominal):
-        if hidden := hidden_walls(chart):
-            return None, (
-                f"the data leave no wall certain: {hidden}; record longer, so that a resonance spans many "
-                "frequencies, with more force there, or repeat the sweep"
-            )
+    if np.isfinite(chart.stiffness_max_nominal):
+        return chart, f"poles at z = 1: {chart.integrators}"
+    unknown = _unknown_below(response)
+    if hidden := hidden_walls(chart):
         return None, (
-            "no wall with a stiffness above 0 is stable by this response; write in each row the reading and the "
-            "force sent after it, as commanded: a force that was measured, or rows that are shifted, come too late"
+            f"the data leave no wall certain: {hidden}; record longer, so that a resonance spans many "
+            f"frequencies, with more force there, or repeat the sweep{unknown}"
         )
-    return chart, f"poles at z = 1: {chart.integrators}"
+    misplaced = (
+        "; write in each row the reading and the force sent after it, as commanded: a force that was measured, or "
+        "rows that are shifted, come too late"
+    )
+    return None, f"no wall with a stiffness above 0 is stable by this response{unknown or misplaced}"
+
+
+def _unknown_below(response: Response) -> str:
+    """That low frequencies, which a single sweep passes in no time, are not known, and what helps; "" if they are."""
+    assert response.coherence is not None
+    lowest = float(response.frequency[response.coherence >= LEAST_COHERENCE][0])
+    if lowest <= UNKNOWN_BELOW * float(response.frequency[0]):
+        return ""
+    return (
+        f"; below {lowest:.3g} Hz, where a free device differs from a held one, it is not known: excite low "
+        "frequencies longer, by a sweep that is slower there, or one that is repeated"
+    )
 
 
 def _largest_stiffness(chart: MeasuredChart) -> Estimate:
