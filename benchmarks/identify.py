@@ -46,10 +46,13 @@ class Process(NamedTuple):
 
 
 def process_of(kind: str, side: str, file: Path) -> Process:
-    """Identify in a process of its own. Raises CalledProcessError where it fails."""
+    """Identify in a process of its own, with one thread of linear algebra as the command line has it: more wait
+    for each other where the processor has other work. Raises CalledProcessError where it fails.
+    """
     command = [sys.executable, "-m", "benchmarks._identify", kind, side, str(file)]
     begun = perf_counter()
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stdout is not None
         printed = process.stdout.read()
         _, status, usage = os.wait4(process.pid, 0)

@@ -39,6 +39,7 @@ NARROW: Final = 0.6  # s f of the analysed band's kernel
 ABOVE: Final = 6.0  # times the floor of the spectrum, from which on it is motion
 RESOLUTION: Final = 2048  # samples of a piece of which spectra are averaged, at least
 LONGEST: Final = 300_000  # samples that are analysed, at most: longer records in a narrower band
+AT_ONCE: Final = 1 << 20  # numbers that are convolved together: transforms of all take several times their memory
 SHORTEST: Final = 40.0  # periods of the analysed band's edge in the longest stretch, at least
 
 
@@ -159,8 +160,14 @@ def convolved(signals: Floats, taps: Floats, down: int = 1) -> Floats:
     """Columns (n, ...) convolved with taps (2 h + 1,) where they overlap in full, one sample of `down`."""
     from scipy.signal import oaconvolve
 
-    kernel = taps.reshape((-1,) + (1,) * (signals.ndim - 1))
-    return np.asarray(oaconvolve(signals, kernel, mode="valid", axes=0)[::down])
+    columns = signals.reshape(len(signals), int(np.prod(signals.shape[1:])))
+    several = max(AT_ONCE // len(signals), 1)
+    parts = [
+        oaconvolve(columns[:, first : first + several], taps[:, None], mode="valid", axes=0)[::down].copy()
+        for first in range(0, columns.shape[1], several)
+    ]
+    made = np.concatenate(parts, axis=1) if parts else columns[: len(signals) - len(taps) + 1 : down]
+    return np.asarray(made.reshape(len(made), *signals.shape[1:]))
 
 
 def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highest: float = np.inf) -> Band:

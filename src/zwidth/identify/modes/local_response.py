@@ -47,7 +47,9 @@ NODES: Final = np.cos((2 * np.arange(TERMS) + 1) * np.pi / (2 * TERMS))
 TO_LEGENDRE: Final = np.linalg.inv(legendre.legvander(NODES, DEGREE))
 NEIGHBOURS: Final = 300.0  # lines over which the noise is averaged
 EXACT: Final = 1e-18  # of the power: what is taken for noise where a record has none
+LEAST: Final = 1e-200  # noise, which has a logarithm, also where a slope goes on below
 CLEAR: Final = 4.0  # standard deviations beyond which the noise has a slope
+STEEPEST: Final = 8.0  # power of the frequency with which noise goes on: that of a force moves a mass with f^-4
 BELOW: Final = 1e-4  # of the lowest band's frequency: down to there the slope goes on
 
 
@@ -469,7 +471,7 @@ def _noise(middle: Floats, rests: Floats, counts: Floats, period: float) -> Nois
     """
     from scipy.special import digamma
 
-    own = np.maximum(rests / counts / differenced_twice(middle, period), 1e-300)
+    own = np.maximum(rests / counts / differenced_twice(middle, period), LEAST)
     level, x = np.log(own) - digamma(counts) + np.log(counts), np.log(middle)
     smooth, slope = np.empty(len(own)), 0.0
     for i in reversed(range(len(own))):
@@ -482,7 +484,7 @@ def _noise(middle: Floats, rests: Floats, counts: Floats, period: float) -> Nois
         slope = float(np.sum(w * about * level[part])) / max(spread, 1e-300)
         slope = slope if abs(slope) * np.sqrt(spread) > CLEAR else 0.0
         smooth[i] = np.average(level[part], weights=w) + slope * (x[i] - np.average(x[part], weights=w))
-    first = smooth[0] + slope * (np.log(BELOW))
+    first = smooth[0] + np.clip(slope, -STEEPEST, STEEPEST) * np.log(BELOW)
     return NoiseCurve(np.append(BELOW * middle[0], middle), np.exp(np.append(first, smooth)), period)
 
 

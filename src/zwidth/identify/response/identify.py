@@ -215,7 +215,7 @@ def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | 
 
 
 def _unknown_below(response: Response) -> str:
-    """That low frequencies, which a single sweep passes in no time, are not known, and what helps; "" if they are."""
+    """That low frequencies, which one sweep passes in no time, are not known, and what helps; "" if they are."""
     assert response.coherence is not None
     lowest = float(response.frequency[response.coherence >= LEAST_COHERENCE][0])
     if lowest <= UNKNOWN_BELOW * float(response.frequency[0]):
