@@ -218,7 +218,7 @@ RECORDS: tuple[FaultyRecord, ...] = (
         "response",
         lambda: (shaken(noise=2e-5),),
         "validation",
-        "of the unseen motion is predicted",
+        "of the unseen acceleration is predicted",
         0,
         (),
         {"largest stiffness": 14724.0},

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 FEWEST: Final = 8  # coherent frequencies
 ALIKE: Final = 0.8  # share of them at which the response must be off by the same factor
-PREDICTED: Final = 0.5  # share of the unseen motion, below which a reader is warned
+PREDICTED: Final = 0.5  # share of the unseen acceleration, below which a reader is warned
 
 
 def check_responses(
@@ -98,12 +98,12 @@ def check_prediction(share: float) -> list[Check]:
         return []
     if share > 0.0:
         text = (
-            f"only {100.0 * share:.3g} % of the unseen motion is predicted: noise, friction, or a device that "
-            "changes; record longer, with more force"
+            f"only {100.0 * share:.3g} % of the unseen acceleration is predicted: noise, friction, or a device "
+            "that changes; record longer, with more force"
         )
         return [Check("validation", False, text, warning=True)]
     text = (
-        "nothing of the unseen motion is predicted: the last third of the record is not of the device that the "
-        "first two are of; has a sign flipped, a column stood still, or something been moved in between?"
+        "nothing of the unseen acceleration is predicted: the last third of the record is not of the device that "
+        "the first two are of; has a sign flipped, a column stood still, or something been moved in between?"
     )
     return [Check("validation", False, text)]

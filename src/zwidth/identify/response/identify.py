@@ -265,16 +265,16 @@ def _validated_on(sweeps: int, once: bool) -> str:
     if once and sweeps == 1:
         return "nothing: the sweep has each frequency at one time only"
     if once:
-        return f"the motion in each of the {sweeps} sweeps by the response of another one, {where}"
-    return (
-        f"the motion in the last third of {f'each of the {sweeps} sweeps' if sweeps > 1 else 'the sweep'}, {where}"
-    )
+        return f"the acceleration in each of the {sweeps} sweeps by the response of another one, {where}"
+    last = f"the last third of each of the {sweeps} sweeps" if sweeps > 1 else "the last third of the sweep"
+    return f"the acceleration in {last}, {where}"
 
 
 def _share_explained(response: Response, unseen: SweepBlocks, length: int, period: float) -> float:
-    """Share of the unseen motion's power that the response predicts from the force, where it can be relied on.
+    """Share of the unseen acceleration's power that the response predicts from the force, where it is reliable.
 
-    The position is differenced twice, and both are weighted by a Hann window, since a device that drifts leaks.
+    Of the motion itself low frequencies alone would count, at which a free device moves most. The position is
+    differenced twice, and both are weighted by a Hann window, since a device that drifts leaks.
 
     length  of the blocks that are transformed at once, at most [samples]
     """
