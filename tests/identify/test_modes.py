@@ -10,6 +10,7 @@ import pytest
 
 from tests import systems
 from tests.identify.modes_bench import columns, quantised, random_bench, readings, two_mass_device
+from tests.identify.record_benches import three_masses
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.identify.modes.identify import COLUMNS, identify_modes
@@ -334,3 +335,14 @@ def test_drives_of_a_mechanism():
     assert holds(found["mechanism.drives.motor-right.stiffness_Nm_per_rad"], 0.45)
     assert holds(found["mechanism.drives.motor-left.stiffness_Nm_per_rad"], 0.75)
     assert holds(found["mechanism.damping.mode_ratio"], 0.05)
+
+
+def test_rounding_of_the_record_does_not_show_in_the_numbers():
+    """As processors round differently. The ringing of poles far from a line is no direction of its own."""
+    record = three_masses()
+    rounding = 1e-14 * np.random.default_rng(0).normal(size=len(record["position_m"]))
+    close = record | {"position_m": record["position_m"] * (1.0 + rounding)}
+    both = [identified(one, fitted="modes") for one in (record, close)]
+    for name in ("natural frequency of mode 1", "natural frequency of mode 2", "damping ratio of mode 2"):
+        values = [found[name].value for found in both]
+        assert values[0] == pytest.approx(values[1], rel=1e-6)

@@ -47,6 +47,7 @@ NODES: Final = np.cos((2 * np.arange(TERMS) + 1) * np.pi / (2 * TERMS))
 TO_LEGENDRE: Final = np.linalg.inv(legendre.legvander(NODES, DEGREE))
 NEIGHBOURS: Final = 300.0  # lines over which the noise is averaged
 EXACT: Final = 1e-18  # of the power: what is taken for noise where a record has none
+ALIKE: Final = 1e-6  # of a ringing column, what must be left of it beside the smooth ones
 LEAST: Final = 1e-200  # noise, which has a logarithm, also where a slope goes on below
 CLEAR: Final = 4.0  # standard deviations beyond which the noise has a slope
 STEEPEST: Final = 8.0  # power of the frequency with which noise goes on: that of a force moves a mass with f^-4
@@ -187,10 +188,8 @@ class BandedRecord:
         weight = 1.0 / np.sqrt(self.noise(f) / self.noise(band.middle))
         x = (f - band.middle) / (0.5 * (band.high - band.low))
         L = legendre.legvander(x, DEGREE) * weight[:, None]
-        smooth = [L[:, : TRANSIENT + 1].astype(complex)]
-        if e - a >= FEWEST + 4 * len(band.poles):
-            smooth += [column * weight[:, None] for column in self._ringing(band, f)]
-        across, _ = np.linalg.qr(np.concatenate(smooth, axis=1))
+        few = e - a < FEWEST + 4 * len(band.poles)
+        across = _across(L[:, : TRANSIENT + 1], [] if few else self._ringing(band, f), weight)
         X, y = U[:, None] * L, Y * weight
         X, y = X - across @ (across.conj().T @ X), y - across @ (across.conj().T @ y)
         sums = self.sums
@@ -215,21 +214,20 @@ class BandedRecord:
         f, U, Y = lines.frequency[a:e], lines.force[a:e], lines.position[a:e]
         x = (f - band.middle) / (0.5 * (band.high - band.low))
         z = np.exp(2j * np.pi * f * self.period)
-        smooth = legendre.legvander(x, SMOOTH).astype(complex)
-        basis = np.concatenate([smooth, *self._ringing(band, f)], axis=1)
+        ringing = self._ringing(band, f)
         # what transients of unknown poles leave must not weigh at the lowest lines
         flat = np.full(len(f), float(self.noise(band.high)))
         weight = 1.0 / np.sqrt(flat if band.search and not band.poles else self.noise(f))
-        q, _ = np.linalg.qr(basis * weight[:, None], mode="complete")
-        rest = q[:, basis.shape[1] :].conj().T * weight
+        across = _across(legendre.legvander(x, SMOOTH) * weight[:, None], ringing, weight)
+        q, _ = np.linalg.qr(across, mode="complete")
+        rest = q[:, across.shape[1] :].conj().T * weight
         y, matrix = rest @ Y, rest * (U * (z - 1.0) ** 2)
         self.sums.rows.append((b, y, f, matrix))
         # what no smooth P with these poles makes of the lines is noise
-        near = np.concatenate([legendre.legvander(x, DEGREE).astype(complex), *self._ringing(band, f)], axis=1)
-        q, _ = np.linalg.qr((rest * U) @ near)
-        left = float(np.sum(np.abs(y - q @ (q.conj().T @ y)) ** 2) + EXACT * np.sum(np.abs(y) ** 2))
+        known = _across((rest * U) @ legendre.legvander(x, DEGREE), [(rest * U) @ one for one in ringing])
+        left = float(np.sum(np.abs(y - known @ (known.conj().T @ y)) ** 2) + EXACT * np.sum(np.abs(y) ** 2))
         self.sums.power[b] += left * float(self.noise(band.middle))
-        self.sums.lines[b] += max(len(y) - near.shape[1], 0)
+        self.sums.lines[b] += max(len(y) - known.shape[1], 0)
 
     def _ringing(self, band: Band, frequency: Floats) -> list[Complexes]:
         """What transients of the poles near a band are at its lines, columns (n, 4) for each pole: of the pole and
@@ -240,6 +238,23 @@ class BandedRecord:
             both = [near, near**2 / np.max(np.abs(near)), mirrored, mirrored**2 / np.max(np.abs(mirrored))]
             columns.append(np.column_stack(both[: 2 if p.imag == 0.0 else 4]))
         return columns
+
+
+def _across(smooth: Floats | Complexes, ringing: Sequence[Complexes], weight: Floats | float = 1.0) -> Complexes:
+    """An orthonormal basis (n, r) of smooth columns (n, s), weighted already, and of ringing ones, weighted here.
+
+    The ringing of a pole far from the lines is smooth among them. Directions in which it is nothing else are left
+    out: rounding would choose them.
+    """
+    q, _ = np.linalg.qr(smooth.astype(complex))
+    if not ringing:
+        return np.asarray(q)
+    columns = np.concatenate(ringing, axis=1) * np.reshape(weight, (-1, 1))
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), LEAST)
+    for _ in range(2):  # once more, for what rounding leaves
+        columns = columns - q @ (q.conj().T @ columns)
+    further, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.concatenate([q, further[:, size > ALIKE]], axis=1)
 
 
 @dataclass(frozen=True)
