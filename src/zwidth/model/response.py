@@ -17,6 +17,7 @@ Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
 LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
+SAME_FREQUENCY: Final = 1e-9  # relative difference of two frequencies that are one
 UNSURE: Final = 0.5  # relative error of the response, up to which the lowest frequencies are left out
 
 # Phase of P (z - 1)^m at the lowest frequency, beyond which m is not believed [rad]
@@ -148,11 +149,15 @@ def usable_frequencies(response: Response) -> Flags:
     """Which frequencies (n,) a chart is made of: the response finite, not zero, and coherent enough.
 
     Of the lowest, those before the first whose error is small are left out: there a device is as simple as what is
-    fitted to it (`low_frequencies`), and that is surer.
+    fitted to it (`low_frequencies`), and that is surer. Of frequencies that differ by rounding alone, as where
+    grids are joined, the first counts: nothing can be interpolated between them.
     """
     good = np.isfinite(response.value) & (response.value != 0.0)
     if response.coherence is not None:
         good &= response.coherence >= LEAST_COHERENCE
+    kept = np.flatnonzero(good)
+    f = response.frequency[kept]
+    good[kept[1:][np.diff(f) <= SAME_FREQUENCY * f[1:]]] = False
     radius = joint_radius(response)
     if radius is not None and np.any(sure := good & (radius <= UNSURE)):
         good[: np.flatnonzero(sure)[0]] = False

@@ -420,3 +420,14 @@ def test_an_unstable_device_has_no_stable_wall():
     hopeless = Response(f, -0.001 / (z - 0.5) / z**3, integrators=0)
     with pytest.raises(ResponseError):
         measured_chart(hopeless, Controller(0.00125))
+
+
+def test_frequencies_that_differ_by_rounding_alone_count_once():
+    """As where two grids are joined, on some processors; nothing can be interpolated between them."""
+    response, controller = measured_response(systems.random_loop(np.random.default_rng(102), DAMPED))
+    at = np.arange(100, len(response.frequency) - 100, 5)
+    frequency = np.insert(response.frequency, at, np.nextafter(response.frequency[at], 0.0))
+    twice = replace(response, frequency=frequency, value=np.insert(response.value, at, response.value[at]))
+    slower = replace(controller, sampling_period=0.999 * controller.sampling_period)
+    once, both = (measured_chart(one, slower).stiffness_max for one in (response, twice))
+    assert both == pytest.approx(once, rel=1e-12)
