@@ -346,3 +346,23 @@ def test_rounding_of_the_record_does_not_show_in_the_numbers():
     for name in ("natural frequency of mode 1", "natural frequency of mode 2", "damping ratio of mode 2"):
         values = [found[name].value for found in both]
         assert values[0] == pytest.approx(values[1], rel=1e-6)
+
+
+def test_a_spring_to_the_ground_is_a_number_beside_the_entry_of_the_matrix_that_it_is_a_part_of():
+    grounded = replace(
+        PLANT, stiffness=PLANT.stiffness + np.diag([3e3, 0.0]), damping=PLANT.damping + np.diag([4.0, 0.0])
+    )
+    force, rng = bench()[0], np.random.default_rng(13)
+    position = readings(grounded, T, force, 1.0) + 1e-9 * rng.normal(size=N)
+    given = {
+        "plant.stiffness_N_per_m": (1.1 * grounded.stiffness).tolist(),
+        "plant.damping_Ns_per_m": (0.8 * grounded.damping).tolist(),
+    }
+    found = identified(columns(force, position, T), of=device(**given))
+    assert found["stiffness of coordinate 0 to the ground"].value == pytest.approx(3e3, rel=1e-3)
+    assert found["stiffness between coordinates 0 and 1"].value == pytest.approx(1e5, rel=1e-3)
+    assert found["plant.stiffness_N_per_m.0.0"].value == pytest.approx(1.03e5, rel=1e-3)
+    shown = [one.path or one.within for one in found.read]
+    assert shown.count("plant.stiffness_N_per_m") == 2
+    assert "plant.stiffness_N_per_m.0.0" not in shown
+    assert "plant.mass_kg.0.0" in shown

@@ -39,6 +39,8 @@ class Estimate:
     low, high  ends of the interval; -inf or inf where the data set no bound
     unit   in words as users read it; "" for a share
     path   of the number in the device file, as `--set` takes it; "" where the file has no such key
+    within  key of the file's matrix whose entries the number makes, as a spring's stiffness does; with a path: it
+            is one of these entries; "" where it belongs to none
     """
 
     name: str
@@ -47,6 +49,7 @@ class Estimate:
     high: float
     unit: str
     path: str = ""
+    within: str = ""
 
     def document(self) -> dict[str, Any]:
         """The number as --json has it; an end without bound is null."""
@@ -107,6 +110,11 @@ class Identification(Result):
         raise IdentificationError(f"{name!r} was not identified: {self.reason or f'identified are {names}'}")
 
     @property
+    def read(self) -> tuple[Estimate, ...]:
+        """The numbers that people read: without the entries of matrices that they make."""
+        return tuple(one for one in self.estimates if not (one.path and one.within))
+
+    @property
     def settings(self) -> dict[str, float]:
         """Path -> value of all numbers that a device file holds, as `Device.with_` takes them."""
         return {one.path: one.value for one in self.estimates if one.path}
@@ -131,7 +139,7 @@ class Identification(Result):
         lines = [f"Identification of {self.kind}, {self.label}"]
         if self.reason:
             return "\n".join([*lines, f"  nothing fitted: {self.reason}"])
-        for one in self.estimates:
+        for one in self.read:
             lines.append(f"  {one.path or one.name} = {value_text(one)}, {interval(one)} {one.unit}".rstrip())
         return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
 

@@ -122,11 +122,13 @@ def coherence_check(spectra: Spectra, excited: NDArray[np.bool_], closed: bool) 
     middle = float(np.median(coherence[excited & (f <= top)]))
     if top < 0.8 * last:
         reason = (
-            f"{middle:.3g} in the middle up to {top:.4g} Hz; above, up to {last:.4g} Hz, it has collapsed, and "
+            f"its median is {middle:.3g} up to {top:.4g} Hz; above, up to {last:.4g} Hz, it has collapsed, and "
             "what is there is not used: drive harder there to know more"
         )
         return Check("coherence", False, reason, warning=True), top
-    return Check("coherence", True, f"{middle:.3g} in the middle of {f[excited][0]:.4g} to {last:.4g} Hz"), np.inf
+    return Check(
+        "coherence", True, f"its median is {middle:.3g} from {f[excited][0]:.4g} to {last:.4g} Hz"
+    ), np.inf
 
 
 def slope_of(spectra: Spectra) -> tuple[float, float]:
@@ -231,11 +233,10 @@ def flip_check(gains: Sequence[tuple[str, float]]) -> Check:
             "position was turned between the runs; turn it back, or leave the run out"
         )
         return Check("runs agree", False, reason)
+    if len(gains) < 2:
+        return Check("runs agree", True, "there is one stretch, and no other to compare it with")
     least, most = (f(g for _, g in gains) for f in (min, max))
-    reason = (
-        f"all {plural(len(gains), 'stretch', 'stretches')} move as the first does, {least:.3g} to {most:.3g} "
-        "times as far"
-    )
+    reason = f"all {len(gains)} stretches move as the first does, {least:.3g} to {most:.3g} times as far"
     return Check("runs agree", True, reason)
 
 

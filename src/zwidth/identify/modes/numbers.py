@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Final
 
@@ -77,9 +78,11 @@ def device_estimates(
             estimates.append(Estimate(one.name, value, low, high, one.unit))
             remarks.append(_not_told(one.name, low, high, one.unit, model.hand))
             continue
-        composed = timing or len(one.entries) != 1  # no number of the file by itself
+        # no number of the file by itself: it makes several, or a part of one
+        composed = timing or len(one.entries) != 1 or len(paths[one.entries[0][0]]) > 1
+        within = "" if timing or not composed else _matrices(path for path, _, _ in one.entries)
         if composed:
-            estimates.append(Estimate(one.name, value, low, high, one.unit))
+            estimates.append(Estimate(one.name, value, low, high, one.unit, within=within))
         if not one.entries:
             remarks.append(f"{one.name}: the file has no such number; write {value:.5g} {one.unit} there by hand")
         for path, _, _ in one.entries:
@@ -88,9 +91,15 @@ def device_estimates(
             seen.add(path)
             name = "delay" if timing else f"{one.name}, in {path.partition('.')[2]}" if composed else one.name
             unit = ("samples" if path == DELAYS[0] else "s") if timing else one.unit
-            estimates.append(Estimate(name, *_entry(device, model, found, path, paths[path], timing), unit, path))
+            entry = _entry(device, model, found, path, paths[path], timing)
+            estimates.append(Estimate(name, *entry, unit, path, within))
     remarks += _sum_of_delays(device, model, told)
     return estimates, remarks
+
+
+def _matrices(paths: Iterable[str]) -> str:
+    """The keys of the matrices whose entries these are: plant.damping_Ns_per_m of plant.damping_Ns_per_m.0.1."""
+    return ", ".join(dict.fromkeys(re.sub(r"(\.\d+)+$", "", path) for path in paths))
 
 
 def _is_told(low: float, high: float, positive: bool) -> bool:

@@ -140,7 +140,7 @@ class IdentifyCommand(Command):
         )  # fmt: skip
         if result.reason is not None:
             return
-        yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.estimates])
+        yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.read])
         share = result.validation
         explained = f"{100.0 * share:.6g} % of the variance explained, " if share == share else ""
         yield f"validation: {explained}{result.validated_on}"
@@ -210,7 +210,7 @@ _write = click.Option(
 def _row(estimate: Estimate) -> tuple[str, ...]:
     from zwidth.identify.identification import interval, value_text
 
-    path = estimate.path.removeprefix("mechanism.")
+    path = (estimate.path or estimate.within).removeprefix("mechanism.")
     return estimate.name, value_text(estimate), interval(estimate), estimate.unit or "1", path
 
 
