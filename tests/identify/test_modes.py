@@ -260,18 +260,20 @@ def multisine(lines, period, repeats, seed=0):
     return spectrum, np.tile(np.fft.irfft(spectrum), repeats)
 
 
-@pytest.mark.slow
-def test_a_loss_factor_is_told_from_a_damper():
-    """Steady vibration: each line of a multisine is the response's, without the package's spectra."""
+@pytest.mark.parametrize("seed", [6, 9, 11])
+def test_a_loss_factor_is_told_from_a_damper(seed):
+    """Steady vibration: each line of a multisine is the response's, without the package's spectra. No mode stands
+    for what dampers do not explain."""
     period, lines = 1024, np.arange(3, 512, 2)
     spectrum, force = multisine(lines, period, 4)
     lossy = replace(PLANT, damping=0.0 * PLANT.damping, hysteresis=0.1 * PLANT.stiffness)
     spectrum[lines] *= sampled_response(Loop(lossy, Controller(T, 1.0)), 2 * np.pi * lines / period)
     position = np.tile(np.fft.irfft(spectrum), 4)
-    position = quantised(position + STEP * np.random.default_rng(6).normal(size=len(position)), STEP)
+    position = quantised(position + STEP * np.random.default_rng(seed).normal(size=len(position)), STEP)
     found = identified(columns(force, position, T), fitted="modes")
     assert found.details["damping_criterion_difference"] < -10.0
-    assert holds(found["loss factor of mode 1"], 0.1)
+    assert found["loss factor of mode 1"].value == pytest.approx(0.1, rel=2e-3)
+    assert [one.name for one in found.estimates if "factor" in one.name] == ["loss factor of mode 1"]
     assert found.details["period_samples"] == period
 
 

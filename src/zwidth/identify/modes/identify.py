@@ -37,7 +37,7 @@ from zwidth.identify.modes.local_response import (
     explained_share,
     local_response,
 )
-from zwidth.identify.modes.modal_fit import ModalFit, against_hysteresis, fit_modes, modal_intervals, modes_of
+from zwidth.identify.modes.modal_fit import ModalFit, fit_modes, modal_intervals, modes_of, with_either_damping
 from zwidth.identify.modes.model import SampledModel, model_of, sampled_response
 from zwidth.identify.modes.numbers import device_estimates, modal_estimates
 from zwidth.identify.modes.overview import Survey, survey_of
@@ -274,9 +274,9 @@ def _fitted(
         if found.misfit < modal.misfit:
             loop = numbers.loop_of(found.values)
             modal = min(modal, modes_of(response, loop), key=lambda fit: fit.criterion)
-    lossy = against_hysteresis(response, modal) if modal.count else modal
-    difference = lossy.criterion - modal.criterion
-    modal = lossy if difference < -STRONG else modal
+    viscous, lossy = with_either_damping(response, modal) if modal.count else (modal, modal)
+    difference = lossy.criterion - viscous.criterion
+    modal = lossy if difference < -STRONG else viscous
     profiled, spread = modal_intervals(response, modal)
     turns = data.sources[0].channels.turns
     estimates = modal_estimates(modal, profiled, spread, modal.damping == "hysteretic", turns)

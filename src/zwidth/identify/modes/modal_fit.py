@@ -147,7 +147,7 @@ def fit_modes(
         tried = [one for d in delays for one in _with_mode(data, replace(best, vector=np.r_[d, best.vector[1:]]))]
         tried.sort(key=lambda fit: fit.chi_squared)
         longer = min((_refined(data, one) for one in tried[:REFINED]), key=lambda fit: fit.chi_squared)
-        if best.count and not best.coupled:
+        if best.count and not best.coupled and best.damping == "viscous":
             # dampers that couple the modes are no further mode; with them the base shows
             bases = BASES if best.count > 1 else ("free, braked",)  # one mode alone is coupled to nothing else
             mixed = (_refined(data, _on_base(data, replace(best, coupled=True), base)) for base in bases)
@@ -157,6 +157,12 @@ def fit_modes(
                 continue
         if longer.criterion > best.criterion - STRONG:
             break
+        if best.count and best.damping == "viscous":
+            # nor are loss factors: modes that stand for them lead the delay astray
+            lossy = _refined(data, _damped(data, best, "hysteretic"))
+            if lossy.criterion < min(best.criterion - STRONG, longer.criterion):
+                best = lossy
+                continue
         if best.count > 1 and best.misfit > UNEXPLAINED and longer.chi_squared > HELPFUL * best.chi_squared:
             break  # what is left is no mode
         best = longer
@@ -333,10 +339,17 @@ def modal_intervals(data: LocalResponse, fit: ModalFit, *, profiled: bool = True
     return found, found.scale * np.sqrt(np.maximum(np.diag(inverse)[len(start) :], 0.0))
 
 
-def against_hysteresis(data: LocalResponse, fit: ModalFit) -> ModalFit:
-    """The same modes with loss factors in place of dampers: the criteria of both tell which explains the response
-    better. Modes that stood for what dampers do not explain fall away."""
-    return _pruned(data, _refined(data, _solved(data, fit.base, fit.period, fit.vector, "hysteretic")))
+def _damped(data: LocalResponse, fit: ModalFit, damping: Damping) -> ModalFit:
+    """The same modes with another damping, not coupled."""
+    return _solved(data, fit.base, fit.period, fit.vector, damping)
+
+
+def with_either_damping(data: LocalResponse, fit: ModalFit) -> tuple[ModalFit, ModalFit]:
+    """The same modes with dampers, and with loss factors: the criteria of both tell which explains the response
+    better. Modes that stood for what the other damping does not explain fall away."""
+    another: Damping = "hysteretic" if fit.damping == "viscous" else "viscous"
+    other = _pruned(data, _refined(data, _damped(data, fit, another)))
+    return (fit, other) if fit.damping == "viscous" else (other, fit)
 
 
 # --- columns ----------------------------------------------------------------------------------------------------
