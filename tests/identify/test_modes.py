@@ -272,6 +272,7 @@ def test_a_loss_factor_is_told_from_a_damper(seed):
     position = quantised(position + STEP * np.random.default_rng(seed).normal(size=len(position)), STEP)
     found = identified(columns(force, position, T), fitted="modes")
     assert found.details["damping_criterion_difference"] < -10.0
+    assert holds(found["loss factor of mode 1"], 0.1)
     assert found["loss factor of mode 1"].value == pytest.approx(0.1, rel=2e-3)
     assert [one.name for one in found.estimates if "factor" in one.name] == ["loss factor of mode 1"]
     assert found.details["period_samples"] == period
@@ -364,7 +365,7 @@ def test_a_spring_to_the_ground_is_a_number_beside_the_entry_of_the_matrix_that_
     assert found["stiffness of coordinate 0 to the ground"].value == pytest.approx(3e3, rel=1e-3)
     assert found["stiffness between coordinates 0 and 1"].value == pytest.approx(1e5, rel=1e-3)
     assert found["plant.stiffness_N_per_m.0.0"].value == pytest.approx(1.03e5, rel=1e-3)
-    shown = [one.path or one.within for one in found.read]
+    shown = [one.path or one.within for one in found.listed]
     assert shown.count("plant.stiffness_N_per_m") == 2
     assert "plant.stiffness_N_per_m.0.0" not in shown
     assert "plant.mass_kg.0.0" in shown

@@ -110,8 +110,8 @@ class Identification(Result):
         raise IdentificationError(f"{name!r} was not identified: {self.reason or f'identified are {names}'}")
 
     @property
-    def read(self) -> tuple[Estimate, ...]:
-        """The numbers that people read: without the entries of matrices that they make."""
+    def listed(self) -> tuple[Estimate, ...]:
+        """The numbers that a table lists: a spring or a damper, not each entry of a matrix that it makes."""
         return tuple(one for one in self.estimates if not (one.path and one.within))
 
     @property
@@ -139,7 +139,7 @@ class Identification(Result):
         lines = [f"Identification of {self.kind}, {self.label}"]
         if self.reason:
             return "\n".join([*lines, f"  nothing fitted: {self.reason}"])
-        for one in self.read:
+        for one in self.listed:
             lines.append(f"  {one.path or one.name} = {value_text(one)}, {interval(one)} {one.unit}".rstrip())
         return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
 

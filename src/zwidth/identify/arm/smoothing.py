@@ -161,13 +161,12 @@ def convolved(signals: Floats, taps: Floats, down: int = 1) -> Floats:
     from scipy.signal import oaconvolve
 
     columns = signals.reshape(len(signals), int(np.prod(signals.shape[1:])))
+    made = np.empty((len(range(0, len(signals) - len(taps) + 1, down)), columns.shape[1]))
     several = max(AT_ONCE // len(signals), 1)
-    parts = [
-        oaconvolve(columns[:, first : first + several], taps[:, None], mode="valid", axes=0)[::down].copy()
-        for first in range(0, columns.shape[1], several)
-    ]
-    made = np.concatenate(parts, axis=1) if parts else columns[: len(signals) - len(taps) + 1 : down]
-    return np.asarray(made.reshape(len(made), *signals.shape[1:]))
+    for first in range(0, columns.shape[1], several):
+        some = slice(first, first + several)
+        made[:, some] = oaconvolve(columns[:, some], taps[:, None], mode="valid", axes=0)[::down]
+    return made.reshape(len(made), *signals.shape[1:])
 
 
 def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highest: float = np.inf) -> Band:

@@ -126,9 +126,8 @@ def coherence_check(spectra: Spectra, excited: NDArray[np.bool_], closed: bool) 
             "what is there is not used: drive harder there to know more"
         )
         return Check("coherence", False, reason, warning=True), top
-    return Check(
-        "coherence", True, f"its median is {middle:.3g} from {f[excited][0]:.4g} to {last:.4g} Hz"
-    ), np.inf
+    reason = f"its median is {middle:.3g} from {f[excited][0]:.4g} to {last:.4g} Hz"
+    return Check("coherence", True, reason), np.inf
 
 
 def slope_of(spectra: Spectra) -> tuple[float, float]:

@@ -48,7 +48,7 @@ TO_LEGENDRE: Final = np.linalg.inv(legendre.legvander(NODES, DEGREE))
 NEIGHBOURS: Final = 300.0  # lines over which the noise is averaged
 EXACT: Final = 1e-18  # of the power: what is taken for noise where a record has none
 ALIKE: Final = 1e-6  # of a ringing column, what must be left of it beside the smooth ones
-LEAST: Final = 1e-200  # noise, which has a logarithm, also where a slope goes on below
+LEAST: Final = 1e-200  # so that a noise has a logarithm, also where a slope goes on below, and a column a length
 CLEAR: Final = 4.0  # standard deviations beyond which the noise has a slope
 STEEPEST: Final = 8.0  # power of the frequency with which noise goes on: that of a force moves a mass with f^-4
 BELOW: Final = 1e-4  # of the lowest band's frequency: down to there the slope goes on
@@ -188,8 +188,10 @@ class BandedRecord:
         weight = 1.0 / np.sqrt(self.noise(f) / self.noise(band.middle))
         x = (f - band.middle) / (0.5 * (band.high - band.low))
         L = legendre.legvander(x, DEGREE) * weight[:, None]
-        few = e - a < FEWEST + 4 * len(band.poles)
-        across = _across(L[:, : TRANSIENT + 1], [] if few else self._ringing(band, f), weight)
+        ringing = self._ringing(band, f) * weight[:, None]
+        if e - a < FEWEST + 4 * len(band.poles):
+            ringing = ringing[:, :0]  # too few lines to give some to them
+        across = _basis(L[:, : TRANSIENT + 1], ringing)
         X, y = U[:, None] * L, Y * weight
         X, y = X - across @ (across.conj().T @ X), y - across @ (across.conj().T @ y)
         sums = self.sums
@@ -218,39 +220,37 @@ class BandedRecord:
         # what transients of unknown poles leave must not weigh at the lowest lines
         flat = np.full(len(f), float(self.noise(band.high)))
         weight = 1.0 / np.sqrt(flat if band.search and not band.poles else self.noise(f))
-        across = _across(legendre.legvander(x, SMOOTH) * weight[:, None], ringing, weight)
+        across = _basis(legendre.legvander(x, SMOOTH) * weight[:, None], ringing * weight[:, None])
         q, _ = np.linalg.qr(across, mode="complete")
         rest = q[:, across.shape[1] :].conj().T * weight
         y, matrix = rest @ Y, rest * (U * (z - 1.0) ** 2)
         self.sums.rows.append((b, y, f, matrix))
         # what no smooth P with these poles makes of the lines is noise
-        known = _across((rest * U) @ legendre.legvander(x, DEGREE), [(rest * U) @ one for one in ringing])
+        known = _basis((rest * U) @ legendre.legvander(x, DEGREE), (rest * U) @ ringing)
         left = float(np.sum(np.abs(y - known @ (known.conj().T @ y)) ** 2) + EXACT * np.sum(np.abs(y) ** 2))
         self.sums.power[b] += left * float(self.noise(band.middle))
         self.sums.lines[b] += max(len(y) - known.shape[1], 0)
 
-    def _ringing(self, band: Band, frequency: Floats) -> list[Complexes]:
-        """What transients of the poles near a band are at its lines, columns (n, 4) for each pole: of the pole and
-        of its conjugate, and of their squares, as they are not known exactly."""
-        z, columns = np.exp(2j * np.pi * frequency * self.period), list[Complexes]()
+    def _ringing(self, band: Band, frequency: Floats) -> Complexes:
+        """What transients of the poles near a band are at its lines, four columns (n, 4 p) for each pole: of the
+        pole and of its conjugate, and of their squares, as they are not known exactly; two of a real one."""
+        z = np.exp(2j * np.pi * frequency * self.period)
+        columns = [np.zeros((len(z), 0), dtype=complex)]
         for p in np.exp(np.array(band.poles, dtype=complex) * self.period):
             near, mirrored = 1.0 / (z - p), 1.0 / (z - np.conj(p))
             both = [near, near**2 / np.max(np.abs(near)), mirrored, mirrored**2 / np.max(np.abs(mirrored))]
             columns.append(np.column_stack(both[: 2 if p.imag == 0.0 else 4]))
-        return columns
+        return np.concatenate(columns, axis=1)
 
 
-def _across(smooth: Floats | Complexes, ringing: Sequence[Complexes], weight: Floats | float = 1.0) -> Complexes:
-    """An orthonormal basis (n, r) of smooth columns (n, s), weighted already, and of ringing ones, weighted here.
+def _basis(smooth: Floats | Complexes, ringing: Complexes) -> Complexes:
+    """An orthonormal basis (n, r) of smooth columns (n, s) and of ringing ones (n, p).
 
     The ringing of a pole far from the lines is smooth among them. Directions in which it is nothing else are left
     out: rounding would choose them.
     """
     q, _ = np.linalg.qr(smooth.astype(complex))
-    if not ringing:
-        return np.asarray(q)
-    columns = np.concatenate(ringing, axis=1) * np.reshape(weight, (-1, 1))
-    columns /= np.maximum(np.linalg.norm(columns, axis=0), LEAST)
+    columns = ringing / np.maximum(np.linalg.norm(ringing, axis=0), LEAST)
     for _ in range(2):  # once more, for what rounding leaves
         columns = columns - q @ (q.conj().T @ columns)
     further, size, _ = np.linalg.svd(columns, full_matrices=False)

@@ -84,9 +84,9 @@ def _units(device: Device, f: Floats, size: Floats) -> list[Check]:
 
 
 def check_prediction(share: float) -> list[Check]:
-    """Whether the response holds for the part of the motion that it is not made of; [] where it does.
+    """Whether the response holds for the part of the record that it is not made of; [] where it does.
 
-    share  of that motion that it predicts; nan: there is none
+    share  of the acceleration there that it predicts; nan: there is none
     """
     if np.isnan(share):
         text = (

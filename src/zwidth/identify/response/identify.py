@@ -37,7 +37,7 @@ LIMITED: Final = 0.05  # share of the samples at the largest and the smallest fo
 FIRST_LEVELS: Final = 100_000  # samples among which the force's levels are counted
 FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
 FEWEST_USABLE: Final = 0.2  # share of the frequencies
-UNKNOWN_BELOW: Final = 10.0  # lowest frequencies of the record, from which on it does not show a free device
+UNKNOWN_BELOW: Final = 10.0  # times the lowest frequency: from there on a free device does not show as one
 
 
 def identify_response(

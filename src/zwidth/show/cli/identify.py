@@ -140,7 +140,7 @@ class IdentifyCommand(Command):
         )  # fmt: skip
         if result.reason is not None:
             return
-        yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.read])
+        yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.listed])
         share = result.validation
         explained = f"{100.0 * share:.6g} % of the variance explained, " if share == share else ""
         yield f"validation: {explained}{result.validated_on}"
