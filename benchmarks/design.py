@@ -45,7 +45,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import table_of_points
 from zwidth.model.plant import Plant
-from zwidth.study.sweep import sweep
+from zwidth.study.designs.sweep import sweep
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 WANTED = 1_000_000

@@ -16,8 +16,8 @@ from benchmarks._timing import machine, print_table, seconds
 from zwidth.contact.stability_trial import StabilityTrial, observe
 from zwidth.device.load import load
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.study.experiment import measure_boundary
-from zwidth.study.experiment_plan import Plan
+from zwidth.study.boundary.experiment import measure_boundary
+from zwidth.study.boundary.experiment_plan import Plan
 
 TARGET = 10.0  # s
 

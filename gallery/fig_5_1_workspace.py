@@ -23,8 +23,8 @@ from gallery.five_bar import brute_force_loop, bundled
 from gallery.five_bar_designs import REFERENCE, device, measure_values
 from gallery.shared_loops import write_page
 from zwidth.measures.impedance_range import rigid_range, sprung_range
-from zwidth.study.map import workspace_map
-from zwidth.study.plane_grid import plane_of
+from zwidth.study.workspace.map import workspace_map
+from zwidth.study.workspace.plane_grid import plane_of
 
 ASSEMBLY = device.reference_assembly
 plane = plane_of(device, cells=(121, 61))

@@ -25,8 +25,8 @@ from gallery import fig_5_1_workspace as maps
 from gallery.five_bar import bundled
 from gallery.five_bar_designs import REFERENCE, device
 from gallery.shared_loops import write_page
-from zwidth.study.common_area import common_area
-from zwidth.study.requirement import parse_requirement
+from zwidth.study.designs.requirement import parse_requirement
+from zwidth.study.workspace.common_area import common_area
 
 BOUNDS = {"manipulability": 0.015, "isotropy": 1.3, "mass": 0.2}
 MASSES = ("link_side_mass", "rigid_mass")

@@ -15,7 +15,7 @@ import numpy as np
 from zwidth.chart.chart import StabilityChart
 from zwidth.device.device import Device
 from zwidth.device.load import from_document, load
-from zwidth.study.bending import BendingNumbers, bending
+from zwidth.study.load.bending import BendingNumbers, bending
 
 DISTAL, DRIVEN = ("distal-right", "distal-left"), ("upper-right", "upper-left")
 RIGID = "rigid links"

@@ -96,7 +96,7 @@ from zwidth import show
 from ..loop import hold
 from . import closure
 def lazily():
-    from ..study.sweep import run
+    from ..study.designs.sweep import run
 if TYPE_CHECKING:
     from zwidth.show import output
 """
@@ -106,7 +106,7 @@ if TYPE_CHECKING:
         "zwidth.show",
         "zwidth.loop.hold",
         "zwidth.model.closure",
-        "zwidth.study.sweep.run",
+        "zwidth.study.designs.sweep.run",
     }
     source = "from .forward_kinematics import f\nfrom .. import chart"
     assert set(imports(source, "zwidth.model", is_package=True)) == {

@@ -40,10 +40,10 @@ from .model.reduction import ModelError as ModelError
 from .model.response import Response as Response
 from .model.response import ResponseError as ResponseError
 from .model.sweep_response import sweep_response as sweep_response
-from .study.map import workspace_map as workspace_map
-from .study.robust import robust_study as robust_study
-from .study.study_file import read_study as read_study
-from .study.sweep import run_study as run_study
-from .study.sweep import sweep as sweep
+from .study.designs.study_file import read_study as read_study
+from .study.designs.sweep import run_study as run_study
+from .study.designs.sweep import sweep as sweep
+from .study.robust.robust_study import robust_study as robust_study
+from .study.workspace.map import workspace_map as workspace_map
 
 __version__: str

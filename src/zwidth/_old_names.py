@@ -85,7 +85,7 @@ def _warn(old: str, new: str, depth: int = 4) -> None:
 
 def sweep_of_study(study: Any, *more: Any) -> Any:
     """Result of `zwidth.sweep(study)`, from before it took a device and axes. Warns DeprecationWarning."""
-    from zwidth.study.sweep import run_study
+    from zwidth.study.designs.sweep import run_study
 
     _warn("zwidth.sweep(study)", "zwidth.run_study(study)", 5)
     return run_study(study, *(one for one in more if one))

@@ -39,11 +39,11 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.progress import Progress
     from zwidth.result import Result
-    from zwidth.study.bending import Bending
-    from zwidth.study.experiment_plan import Plan
-    from zwidth.study.load_path import LoadPath
-    from zwidth.study.measured_boundary import Experiment
-    from zwidth.study.sensitivity_result import Sensitivities
+    from zwidth.study.boundary.experiment_plan import Plan
+    from zwidth.study.boundary.measured_boundary import Experiment
+    from zwidth.study.load.bending import Bending
+    from zwidth.study.load.load_path import LoadPath
+    from zwidth.study.sensitivity.result import Sensitivities
     from zwidth.study.validity import Validity
 
 
@@ -66,7 +66,7 @@ def device_held_by(device: Device, operator: Any) -> Device:
 
 
 def device_sensitivities(device: Device, point: OperatingPoint, progress: Progress | None) -> Sensitivities:
-    from zwidth.study.sensitivity import sensitivities
+    from zwidth.study.sensitivity.sensitivities import sensitivities
 
     return sensitivities(device, point, progress)
 
@@ -74,13 +74,13 @@ def device_sensitivities(device: Device, point: OperatingPoint, progress: Progre
 def device_load_path(
     device: Device, push: float, count: int, point: OperatingPoint | None, progress: Progress | None
 ) -> LoadPath:
-    from zwidth.study.load_path import load_path
+    from zwidth.study.load.load_path import load_path
 
     return load_path(device, push, count, point, progress)
 
 
 def device_bending(device: Device, point: OperatingPoint | None) -> Bending | None:
-    from zwidth.study.bending import bending
+    from zwidth.study.load.bending import bending
 
     return bending(device, point)
 
@@ -200,7 +200,7 @@ def limit_cycles(
 def measure_boundary(
     point: OperatingPoint, plan: Plan | None, user_points: Any, file: Any, progress: Any
 ) -> Experiment:
-    from zwidth.study.experiment import measure_boundary
+    from zwidth.study.boundary.experiment import measure_boundary
 
     return measure_boundary(point, plan, user_points, file=file, progress=progress)
 

@@ -18,8 +18,8 @@ from zwidth.device.load import load
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import table_of_loops
-from zwidth.study.map import workspace_map
-from zwidth.study.plane_grid import plane_of
+from zwidth.study.workspace.map import workspace_map
+from zwidth.study.workspace.plane_grid import plane_of
 
 RANDOM = 3  # loops besides the two known ones
 

@@ -229,7 +229,7 @@ def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, comma
 
     monkeypatch.chdir(tmp_path)
     import_module("zwidth.show.report.report")  # whatever imports the chart has done so before it is replaced
-    monkeypatch.setattr(import_module("zwidth.study.what_if"), "stability_chart", open_edge)
+    monkeypatch.setattr(import_module("zwidth.study.sensitivity.what_if"), "stability_chart", open_edge)
     monkeypatch.setattr("zwidth.chart.chart.stability_chart", open_edge)
     ran = run_command(command, TWO_MASS, "--json")
     assert ran.code == 1

@@ -17,8 +17,8 @@ from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
 from zwidth.contact.boundary_experiment import StableExtent
 from zwidth.show.cli.experiment_page import point_rows, sentences, warning
-from zwidth.study.experiment_plan import Plan
-from zwidth.study.measured_boundary import Experiment, MeasuredPoint
+from zwidth.study.boundary.experiment_plan import Plan
+from zwidth.study.boundary.measured_boundary import Experiment, MeasuredPoint
 
 FEW = ("--stiffnesses", 2, "--tips", 1)
 FEWEST = ("--stiffnesses", 1, "--tips", 0)
@@ -203,7 +203,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     words = ["experiment", TWO_MASS, "--operator", "thesis-arm", "--stiffnesses", "1", "--tips", "0"]
     words += ["--subjects", "3", "--trials", "3", "--output", "points.csv"]
     journal = folder / "points.csv.progress"
-    code, _, err = stopped_by_ctrl_c(words, "zwidth.study.journal:Journal.get_or_compute", 4, folder)
+    code, _, err = stopped_by_ctrl_c(words, "zwidth.study.jobs.journal:Journal.get_or_compute", 4, folder)
     assert code == 130
     assert "points.csv.progress keeps the finished work" in err
     assert not (folder / "points.csv").exists()
@@ -225,7 +225,7 @@ def test_a_journal_of_ones_own_is_kept_and_a_changed_question_begins_anew(folder
     kept = Path("run.progress").read_bytes()
     with monkeypatch.context() as patched:
         for name in ("find_stable_walls", "measure_edges", "measure_tips"):
-            patched.setattr(f"zwidth.study.experiment.{name}", fail_if_measured)
+            patched.setattr(f"zwidth.study.boundary.experiment.{name}", fail_if_measured)
         assert document_of(*asked)["points"] == first
     assert Path("run.progress").read_bytes() == kept
     assert document_of(*asked, "--disturbance", 0.002)["points"]

@@ -16,7 +16,7 @@ from zwidth.device.load import load
 from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.definition import STATUS
 from zwidth.show.cli.options import EXTREMES
-from zwidth.study import extreme_direction
+from zwidth.study.workspace import extreme_direction
 
 FEW = ("--cells", "7,5")
 DOCS = Path(__file__).parents[2] / "docs"

@@ -129,7 +129,7 @@ def test_a_fixed_range_is_allowed():
 
 
 def test_an_interruption_leaves_nothing_behind(tmp_path, monkeypatch):
-    from zwidth.study import robust as module
+    from zwidth.study.robust import robust_study as module
 
     def interrupted(*_):
         raise KeyboardInterrupt

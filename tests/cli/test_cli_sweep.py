@@ -15,9 +15,9 @@ import xarray as xr
 
 from tests.cli.command_runner import document_of, parse_strict_json, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
-from zwidth.study.store import Store
-from zwidth.study.study_file import read_study
-from zwidth.study.sweep_job import sweep_job
+from zwidth.study.designs.study_file import read_study
+from zwidth.study.designs.sweep_job import sweep_job
+from zwidth.study.jobs.store import Store
 
 PAGE = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
 ZWIDTH = Path(sys.executable).with_name("zwidth")
@@ -196,7 +196,7 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     """Ctrl-C once three batches are on disk."""
     (folder / "study.toml").write_text(MANY.format(count=200))
     words = ["sweep", "study.toml", "--output", "designs.csv", "--workers", "2", "--json"]
-    code, out, err = stopped_by_ctrl_c(words, "zwidth.study.store:Store.write_batch", 3, folder)
+    code, out, err = stopped_by_ctrl_c(words, "zwidth.study.jobs.store:Store.write_batch", 3, folder)
     assert (code, out) == (130, "")
     assert "designs.csv.progress keeps the finished work; the same command continues from it" in err
     assert "Traceback" not in err
@@ -215,7 +215,7 @@ def test_a_stop_within_compiled_code_is_a_stop(folder, monkeypatch):
     def stopped(*_):
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
-    monkeypatch.setattr("zwidth.study.executor._compute_ranges", stopped)
+    monkeypatch.setattr("zwidth.study.jobs.executor._compute_ranges", stopped)
     ran = run_command("sweep", "study.toml", "--output", "out.csv")
     assert ran.code == 130
     assert "out.csv.progress keeps the finished work; the same command continues from it" in ran.err
@@ -242,7 +242,7 @@ def test_a_lost_process_is_one_clear_line(folder):
     (folder / "slow.py").write_text(text)
     (folder / "study.toml").write_text(MANY.format(count=40))
     program = (
-        "import os, sys, zwidth.study.executor as e\n"
+        "import os, sys, zwidth.study.jobs.executor as e\n"
         "os.environ['FIRST'] = str(os.getpid())\n"
         "from zwidth.show.cli.main import run as command\n"
         "def impatient(job, store, progress, workers, **more):\n"
@@ -289,9 +289,9 @@ def test_the_page_s_python_runs(arms):
 
 
 def test_the_page_names_every_key():
-    from zwidth.study.column import STATISTICS
-    from zwidth.study.sampling import CIRCUMSTANCES
-    from zwidth.study.study_schema import AxisSection, StudyFile, StudyWorkspaceSection, TieSection
+    from zwidth.study.designs.column import STATISTICS
+    from zwidth.study.designs.sampling import CIRCUMSTANCES
+    from zwidth.study.designs.study_schema import AxisSection, StudyFile, StudyWorkspaceSection, TieSection
 
     for section in (StudyFile, AxisSection, TieSection, StudyWorkspaceSection):
         for key in section.model_fields:

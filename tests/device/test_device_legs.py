@@ -17,7 +17,7 @@ from zwidth.device.load import from_document
 from zwidth.device.new_device import new_device
 from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH
 from zwidth.model.posture import BeyondLimit, OutOfReach, solve_posture
-from zwidth.study.plane_grid import plane_of
+from zwidth.study.workspace.plane_grid import plane_of
 
 DELTA = tomllib.loads(new_device("Delta", "delta"))
 PLACES = np.array([[0.0, 0.0, -0.12], [0.01, 0.02, -0.13], [-0.02, 0.01, -0.115]])

@@ -11,7 +11,7 @@ from tests.cli.command_runner import run_command
 from zwidth.device.load import bundled, from_document, load
 from zwidth.device.plausibility import ImplausibleNumber, implausible
 from zwidth.model.response import Response
-from zwidth.study.study_file import study_of
+from zwidth.study.designs.study_file import study_of
 
 PADDLE = """
 name = "Paddle"

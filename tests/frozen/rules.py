@@ -137,9 +137,24 @@ RULES: tuple[Rule, ...] = (
                 "the edge with every spring is known to 1e-5",
             ),
             ("guarantees", "guarantees.damping_at_*", 1e-5, "the edge with every spring is known to 1e-5"),
-            ("*", "*.d_ln_*", 1e-8, "extrapolated differences, to about 1e-9 (study/sensitivity.py)"),
-            ("*", "*.d_stiffness_*", 1e-8, "extrapolated differences, to about 1e-9 (study/sensitivity.py)"),
-            ("*", "*.one_percent_gives_*", 1e-8, "extrapolated differences, to about 1e-9 (study/sensitivity.py)"),
+            (
+                "*",
+                "*.d_ln_*",
+                1e-8,
+                "extrapolated differences, to about 1e-9 (study/sensitivity)",
+            ),
+            (
+                "*",
+                "*.d_stiffness_*",
+                1e-8,
+                "extrapolated differences, to about 1e-9 (study/sensitivity)",
+            ),
+            (
+                "*",
+                "*.one_percent_gives_*",
+                1e-8,
+                "extrapolated differences, to about 1e-9 (study/sensitivity)",
+            ),
         )
     ),
     Rule("sensitivity", "*.error", Kind.IGNORED, "an estimate of rounding is rounding itself"),

@@ -15,8 +15,8 @@ from zwidth.identify.boundary.identify import identify_boundary
 from zwidth.identify.boundary.model import BoundaryModel
 from zwidth.identify.boundary.parameters import BoundaryParameters
 from zwidth.identify.boundary.points import read_points
-from zwidth.study.experiment import measure_boundary
-from zwidth.study.experiment_plan import Plan
+from zwidth.study.boundary.experiment import measure_boundary
+from zwidth.study.boundary.experiment_plan import Plan
 
 PATHS = (
     ("loop.delay_samples",),

@@ -12,8 +12,8 @@ from zwidth.identify.boundary.checks import check_circumstances
 from zwidth.identify.boundary.identify import identify_boundary
 from zwidth.identify.boundary.points import read_points
 from zwidth.identify.boundary.trials import TrialPlan
-from zwidth.study.experiment import measure_boundary
-from zwidth.study.experiment_plan import Plan
+from zwidth.study.boundary.experiment import measure_boundary
+from zwidth.study.boundary.experiment_plan import Plan
 
 DELAY = "loop.delay_samples"
 

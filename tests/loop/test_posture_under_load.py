@@ -14,7 +14,7 @@ from zwidth.model import loaded_posture
 from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.load import Load, LoadError
 from zwidth.model.posture import NO_EQUILIBRIUM, OK
-from zwidth.study.what_if import find_variant, what_if
+from zwidth.study.sensitivity.what_if import find_variant, what_if
 
 MOTORS = Load(push=-3.0, posture_of="motors")
 

@@ -10,9 +10,9 @@ import pytest
 import zwidth
 from zwidth.measures.definition import NO_EQUILIBRIUM, NO_VALUE, OK, STATUS
 from zwidth.model.load import Load
-from zwidth.study.extreme_direction import extreme_over_directions
-from zwidth.study.map_data import why_no_cell
-from zwidth.study.plane_grid import plane_of
+from zwidth.study.workspace.extreme_direction import extreme_over_directions
+from zwidth.study.workspace.map_data import why_no_cell
+from zwidth.study.workspace.plane_grid import plane_of
 
 PUSH = Load(push=-5.0)
 LIMITS = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}

@@ -13,8 +13,8 @@ from zwidth.device.load import load
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import FAILED, NO_VALUE, OK, Measure
 from zwidth.measures.user_measures import load_measures, measure
-from zwidth.study.map import map_job, workspace_map
-from zwidth.study.plane_grid import plane_of
+from zwidth.study.workspace.map import map_job, workspace_map
+from zwidth.study.workspace.plane_grid import plane_of
 
 GOOD = '''
 from zwidth import measure

@@ -13,7 +13,7 @@ from tests.cli.command_runner import run_command
 from zwidth.measures.felt_chart import felt_chart
 from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts, caption_of_result, write_caption
 from zwidth.show.figures.style import figure, inline_svg, save, text_width, wrapped
-from zwidth.study.study_arguments import study_over
+from zwidth.study.designs.study_arguments import study_over
 
 ROUGH = {"friction.coulomb_N": [0.3, 0.1], "loop.encoder.resolution_m": 1e-5, "loop.saturation.force_N": 5.0}
 

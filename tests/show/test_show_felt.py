@@ -18,7 +18,7 @@ from zwidth.measures.handle_impedance import commanded_impedance, felt_impedance
 from zwidth.show.figures.felt import draw_felt_chart, draw_impedance
 from zwidth.show.figures.sensitivity import draw_sensitivities
 from zwidth.show.figures.style import figure
-from zwidth.study.sensitivity import sensitivities
+from zwidth.study.sensitivity.sensitivities import sensitivities
 
 
 def texts(ax):

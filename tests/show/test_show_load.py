@@ -25,7 +25,7 @@ from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.report import load as section
 from zwidth.show.report.facts import gather
 from zwidth.show.units import typed
-from zwidth.study.load_path import LoadPath, PushedChart
+from zwidth.study.load.load_path import LoadPath, PushedChart
 
 WEAK = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
 

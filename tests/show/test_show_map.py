@@ -23,10 +23,10 @@ from zwidth.measures.definition import (
 from zwidth.show.figures.map import MARKS, draw_map, map_figure
 from zwidth.show.figures.style import figure, save
 from zwidth.show.units import area_text, percent
-from zwidth.study.common_area import common_area
-from zwidth.study.map import workspace_map
-from zwidth.study.plane_grid import plane_of
-from zwidth.study.requirement import parse_requirement
+from zwidth.study.designs.requirement import parse_requirement
+from zwidth.study.workspace.common_area import common_area
+from zwidth.study.workspace.map import workspace_map
+from zwidth.study.workspace.plane_grid import plane_of
 
 
 @pytest.fixture(scope="module")

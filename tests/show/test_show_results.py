@@ -17,8 +17,8 @@ from tests.identify.spring_bench import bench_record
 from zwidth.result import Result
 from zwidth.show.figures.plots import DRAWINGS
 from zwidth.show.output import json_value
-from zwidth.study.plane_grid import plane_of
-from zwidth.study.study_arguments import study_over
+from zwidth.study.designs.study_arguments import study_over
+from zwidth.study.workspace.plane_grid import plane_of
 
 LINES = 8
 PACKAGES = ["chart", "conditions", "contact", "guarantees", "loop", "measures", "model", "study"]

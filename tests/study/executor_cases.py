@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from zwidth.measures.definition import FAILED, NO_VALUE, OK, MeasureError, Note
-from zwidth.study.job import CellValues
+from zwidth.study.jobs.job import CellValues
 
 LEFT_OUT = "is a multiple of seven"
 

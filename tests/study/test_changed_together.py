@@ -11,10 +11,10 @@ from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.tracer import Tracer
 from zwidth.device.load import from_document, load
 from zwidth.loop.loop_table import table_of_loops
-from zwidth.study import changed_devices
-from zwidth.study.changed_devices import ChangedDevices
-from zwidth.study.optimum import OptimumError, optimum
-from zwidth.study.sensitivity import sensitivities
+from zwidth.study.sensitivity import changed_devices
+from zwidth.study.sensitivity.changed_devices import ChangedDevices
+from zwidth.study.sensitivity.optimum import OptimumError, optimum
+from zwidth.study.sensitivity.sensitivities import sensitivities
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 # Bundled device, changes of it, and where it is asked: positions [m] or joint angles [rad].

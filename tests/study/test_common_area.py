@@ -7,11 +7,11 @@ import pytest
 
 from zwidth.device.load import load
 from zwidth.measures.definition import Measure
-from zwidth.study.common_area import common_area, nonnegative_region
-from zwidth.study.map import workspace_map
-from zwidth.study.plane_grid import plane_of
-from zwidth.study.reach_outline import KEY, reach_outline
-from zwidth.study.requirement import parse_requirement
+from zwidth.study.designs.requirement import parse_requirement
+from zwidth.study.workspace.common_area import common_area, nonnegative_region
+from zwidth.study.workspace.map import workspace_map
+from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.study.workspace.reach_outline import KEY, reach_outline
 
 MIDDLE = (0.02, 0.2)
 

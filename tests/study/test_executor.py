@@ -23,10 +23,10 @@ from tests.study.executor_cases import (
 )
 from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, MeasureError, Note
 from zwidth.memory_limit import TooLarge
-from zwidth.study import executor
-from zwidth.study.executor import MORE, merge_notes, run
-from zwidth.study.store import Store
-from zwidth.study.workers import WorkerLost, cores, pack_job
+from zwidth.study.jobs import executor
+from zwidth.study.jobs.executor import MORE, merge_notes, run
+from zwidth.study.jobs.store import Store
+from zwidth.study.jobs.workers import WorkerLost, cores, pack_job
 
 NO_PATIENCE = -1.0  # patience that is over at once
 
@@ -124,7 +124,7 @@ def test_a_script_needs_no_guard(tmp_path):
         "import sys\n"
         f"sys.path[:0] = {sys.path!r}\n"
         "from tests.study.executor_cases import RootsJob\n"
-        "from zwidth.study.executor import run\n"
+        "from zwidth.study.jobs.executor import run\n"
         "print('once', run(RootsJob(20), workers=2, batch=5, patience=-1.0).values.shape)\n"
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True)
@@ -136,8 +136,8 @@ import sys
 from pathlib import Path
 sys.path[:0] = {path!r}
 from tests.study.executor_cases import RootsJob
-from zwidth.study.executor import run
-from zwidth.study.store import Store
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import Store
 job = RootsJob({count}, seconds=0.2)
 def progress(stage, done, of):
     print(done, flush=True)

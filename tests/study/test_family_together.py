@@ -13,9 +13,10 @@ from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import from_document, load
 from zwidth.device.new_device import new_device
 from zwidth.loop.table_states import CHAINED
-from zwidth.study import robust_family, unseen_members
-from zwidth.study.robust import robust_study
-from zwidth.study.robust_family import Family, FamilyMember, Range, build_together
+from zwidth.study.robust import family as robust_family
+from zwidth.study.robust import unseen_members
+from zwidth.study.robust.family import Family, FamilyMember, Range, build_together
+from zwidth.study.robust.robust_study import robust_study
 
 LENGTHS = ("links.upper-left.length_m", "links.distal-right.length_m")
 FIVE_BAR = (

@@ -12,11 +12,11 @@ from zwidth.chart.chart import stability_chart
 from zwidth.contact.boundary_experiment import EdgePoint, StableExtent
 from zwidth.contact.stability_trial import TrialError
 from zwidth.device.load import from_document, load
-from zwidth.study.experiment import measure_boundary, run_experiment
-from zwidth.study.experiment_plan import Plan
-from zwidth.study.journal import JournalError
-from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
-from zwidth.study.user_points import UserPoint
+from zwidth.study.boundary.experiment import measure_boundary, run_experiment
+from zwidth.study.boundary.experiment_plan import Plan
+from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint
+from zwidth.study.boundary.user_points import UserPoint
+from zwidth.study.jobs.journal import JournalError
 
 FEWEST = Plan(stiffnesses=1, tips=0)
 
@@ -50,7 +50,7 @@ def test_what_is_done_is_kept_and_not_computed_again(point, boundary_and_file, m
         raise AssertionError("measured again")
 
     for name in ("find_stable_walls", "measure_edges", "measure_tips"):
-        monkeypatch.setattr(f"zwidth.study.experiment.{name}", measured_again)
+        monkeypatch.setattr(f"zwidth.study.boundary.experiment.{name}", measured_again)
     again = measure_boundary(point, FEWEST, file=str(file))
     assert again.points == first.points
     assert again.journal_entries == 3
@@ -103,7 +103,7 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
         asked.append((loop, operator))
         raise TrialError("push", "is asked about no further")
 
-    monkeypatch.setattr("zwidth.study.experiment.run_experiment", held_by)
+    monkeypatch.setattr("zwidth.study.boundary.experiment.run_experiment", held_by)
     held = load("published-two-mass").at(operator="thesis-arm")
     for one in (held, held.without_operator, held.in_model("motor-mass")):
         with pytest.raises(TrialError):

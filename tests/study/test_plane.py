@@ -12,7 +12,7 @@ from tests.model.model_cases import random_five_bar, spatial_arm
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document, load
 from zwidth.model.posture import Singular, reachable_positions, solve_posture
-from zwidth.study.plane_grid import PlaneError, plane_of, reachable_set, rounded_outwards
+from zwidth.study.workspace.plane_grid import PlaneError, plane_of, reachable_set, rounded_outwards
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from zwidth.chart.verdict import STABLE, UNSTABLE
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.model.plant import Plant
-from zwidth.study.robust import robust_study
-from zwidth.study.robust_family import Family, Range, RangeError
+from zwidth.study.robust.family import Family, Range, RangeError
+from zwidth.study.robust.robust_study import robust_study
 
 T = 0.001
 LOOP = "[loop]\nsampling_period_s = 0.001\n{}"

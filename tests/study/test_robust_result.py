@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import from_document, load
-from zwidth.study.robust import robust_study
-from zwidth.study.robust_family import Family, Range
+from zwidth.study.robust.family import Family, Range
+from zwidth.study.robust.robust_study import robust_study
 
 KEYS = {
     "regions",

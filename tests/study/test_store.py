@@ -11,8 +11,8 @@ import zarr
 
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
 from zwidth.measures.definition import MISSING, STATUS
-from zwidth.study.executor import run
-from zwidth.study.store import Store, StoreError
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import Store, StoreError
 
 
 def partial_store(path, job, batches, size=5):

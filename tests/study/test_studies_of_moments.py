@@ -9,7 +9,7 @@ import zwidth
 from tests.cli.command_runner import document_of, run_command
 from zwidth.measures.catalogue import MEASURES
 from zwidth.model.load import Load
-from zwidth.study.sweep import sweep
+from zwidth.study.designs.sweep import sweep
 
 WRIST, PADDLE = "openwrist", "five-bar"
 

@@ -19,7 +19,7 @@ from tests.study.study_cases import (
 from zwidth.device.faults import DeviceError
 from zwidth.device.new_device import new_device
 from zwidth.memory_limit import TooLarge
-from zwidth.study.study_file import read_study
+from zwidth.study.designs.study_file import read_study
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)
 

@@ -13,8 +13,8 @@ import pytest
 
 from zwidth.chart.verdict import judge
 from zwidth.device.load import from_document, load
-from zwidth.study.robust import RobustError, robust_study, sample_walls
-from zwidth.study.robust_family import Family, FamilyMember, Range, RangeError
+from zwidth.study.robust.family import Family, FamilyMember, Range, RangeError
+from zwidth.study.robust.robust_study import RobustError, robust_study, sample_walls
 
 PAGE = Path(__file__).parents[2] / "docs" / "robust.md"
 
@@ -86,7 +86,7 @@ def test_a_seed_gives_the_same_answer_again_and_another_seed_others():
 
 
 def test_the_search_finds_what_the_sample_missed():
-    from zwidth.study import robust as module
+    from zwidth.study.robust import robust_study as module
 
     study = robust_study(family(device_with_operator(), *ARM), 46, 5)
     # the same members without any that the search found

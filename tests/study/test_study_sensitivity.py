@@ -18,9 +18,9 @@ from zwidth.device import address
 from zwidth.device.load import device_of_point, from_document, load
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
-from zwidth.study.derivative import central_derivative, one_sided_derivative
-from zwidth.study.optimum import optimum, second_peak_stiffness
-from zwidth.study.sensitivity import sensitivities
+from zwidth.study.sensitivity.derivative import central_derivative, one_sided_derivative
+from zwidth.study.sensitivity.optimum import optimum, second_peak_stiffness
+from zwidth.study.sensitivity.sensitivities import sensitivities
 
 LATE = "loop.delay_samples=1"
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"

@@ -14,7 +14,7 @@ from zwidth.device.load import from_document, load
 from zwidth.loop.controller import Butterworth
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import attach
-from zwidth.study.what_if import (
+from zwidth.study.sensitivity.what_if import (
     BASE,
     REMEDIES,
     VARIANT_MODELS,

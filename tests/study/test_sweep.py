@@ -33,13 +33,13 @@ from zwidth.measures.definition import (
 )
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.study.executor import run
-from zwidth.study.map import workspace_map
-from zwidth.study.store import Store
-from zwidth.study.study_file import study_of
-from zwidth.study.sweep import Sweep, run_study
-from zwidth.study.sweep_job import sweep_job
-from zwidth.study.workspace_summary import over_the_workspace
+from zwidth.study.designs.study_file import study_of
+from zwidth.study.designs.sweep import Sweep, run_study
+from zwidth.study.designs.sweep_job import sweep_job
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import Store
+from zwidth.study.workspace.map import workspace_map
+from zwidth.study.workspace.workspace_summary import over_the_workspace
 
 LENGTHS = axis(
     RIGHT_LENGTH, range=[0.11, 0.18], count=4, tie=[LEFT_LENGTH, {"key": "links.upper-left.mass_kg", "power": 1}]

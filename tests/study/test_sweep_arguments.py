@@ -13,10 +13,10 @@ from tests.study.study_cases import FIVE_BAR, RIGHT_LENGTH, TWO_MASS, axis, stud
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import load
 from zwidth.measures.definition import FAILED, OK, Measure, MeasureError
-from zwidth.study.plane_grid import plane_of
-from zwidth.study.study_arguments import study_over
-from zwidth.study.sweep import run_study, sweep
-from zwidth.study.sweep_job import sweep_job
+from zwidth.study.designs.study_arguments import study_over
+from zwidth.study.designs.sweep import run_study, sweep
+from zwidth.study.designs.sweep_job import sweep_job
+from zwidth.study.workspace.plane_grid import plane_of
 
 PERIOD, DELAY = "loop.sampling_period_s", "loop.delay_samples"
 PERIOD_MEASURE = Measure(

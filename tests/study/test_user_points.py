@@ -10,7 +10,7 @@ import pytest
 from tests.systems import published
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_crossings import exact_edge
-from zwidth.study.user_points import UserPoint, compare_points
+from zwidth.study.boundary.user_points import UserPoint, compare_points
 
 POINTS = (
     UserPoint(4000.0, 2.6, "lower", trials=4),

@@ -26,10 +26,10 @@ from zwidth.measures.definition import (
 )
 from zwidth.measures.evaluate import evaluate_safely
 from zwidth.model.posture import PostureError
-from zwidth.study.map import MapJob, as_dataset, map_job, workspace_map
-from zwidth.study.plane_grid import PlaneError, plane_of
-from zwidth.study.store import Store
-from zwidth.study.workspace_summary import over_the_workspace, positions
+from zwidth.study.jobs.store import Store
+from zwidth.study.workspace.map import MapJob, as_dataset, map_job, workspace_map
+from zwidth.study.workspace.plane_grid import PlaneError, plane_of
+from zwidth.study.workspace.workspace_summary import over_the_workspace, positions
 
 SINGLE_POINT_MEASURE = Measure(
     "each", "Asked one by one", "N", "lower", "", lambda place: 10.0 * float(place.effective.rigid_mass), each=True

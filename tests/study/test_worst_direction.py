@@ -11,9 +11,9 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.definition import NO_VALUE, OK, Measure, MeasureError, NoValueError
 from zwidth.model.posture import solve_posture
-from zwidth.study.direction_share import share_measure, share_of_directions
-from zwidth.study.extreme_direction import extreme_over_directions, sphere
-from zwidth.study.requirement import Requirement, parse_requirement
+from zwidth.study.designs.requirement import Requirement, parse_requirement
+from zwidth.study.workspace.direction_share import share_measure, share_of_directions
+from zwidth.study.workspace.extreme_direction import extreme_over_directions, sphere
 
 KINDS = {"planar": random_five_bar, "arm": spatial_arm, "loop": spatial_loop}
 

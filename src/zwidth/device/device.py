@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
     from zwidth.progress import Progress
-    from zwidth.study.bending import Bending
-    from zwidth.study.load_path import LoadPath
-    from zwidth.study.sensitivity_result import Sensitivities
+    from zwidth.study.load.bending import Bending
+    from zwidth.study.load.load_path import LoadPath
+    from zwidth.study.sensitivity.result import Sensitivities
 
 
 @dataclass(frozen=True, repr=False)
@@ -315,7 +315,7 @@ class Device:
     def sensitivities(
         self, point: OperatingPoint | None = None, progress: Progress | None = None
     ) -> Sensitivities:
-        """How the largest stiffness answers to each number of the device; see `study.sensitivity.sensitivities`.
+        """How the largest stiffness answers to each number of the device; see `study.sensitivity`.
 
         point  where: `device.at(...)`; left out: the reference
         """
@@ -330,7 +330,7 @@ class Device:
         point: OperatingPoint | None = None,
         progress: Progress | None = None,
     ) -> LoadPath:
-        """How the chart moves with the hand's push along the rendered direction; see `study.load_path.load_path`.
+        """How the chart moves with the hand's push along the rendered direction; see `study.load.load_path`.
 
             device.load_path(push=5.0).stiffness_max
 
@@ -342,7 +342,7 @@ class Device:
 
     def bending(self, point: OperatingPoint | None = None) -> Bending | None:
         """What it changes that links bend: this device beside the same with rigid links or, where the file gives
-        no beams, with its links as typical tubes; see `study.bending.bending`. None where no link could bend.
+        no beams, with its links as typical tubes; see `study.load.bending.bending`. None where no link could bend.
 
         point  where: `device.at(...)`; left out: the reference
         """

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     from zwidth.measures.description import Description
     from zwidth.measures.felt import FeltWall
     from zwidth.progress import Progress
-    from zwidth.study.experiment_plan import Plan
-    from zwidth.study.measured_boundary import Experiment
+    from zwidth.study.boundary.experiment_plan import Plan
+    from zwidth.study.boundary.measured_boundary import Experiment
     from zwidth.study.validity import Validity
 
 
@@ -441,7 +441,7 @@ class OperatingPoint(PosedDevice):
         file: str | Path | None = None,
         progress: Progress | None = None,
     ) -> Experiment:
-        """Simulate how a stability boundary is measured on a device; see `study.experiment.measure_boundary`."""
+        """Simulate how a stability boundary is measured on a device; see `study.boundary`."""
         return _verbs.measure_boundary(self, plan, user_points, file, progress).about(self)
 
     def validity(self, tolerance: float = 0.1) -> Validity:

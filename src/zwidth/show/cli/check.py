@@ -13,7 +13,7 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite, refuse_empty
 from zwidth.show.output import DATA
 from zwidth.show.units import NONE, amount, radius
-from zwidth.study.points_file import Walls, read_walls
+from zwidth.study.boundary.points_file import Walls, read_walls
 
 if TYPE_CHECKING:
     from zwidth.chart.verdict import WallVerdicts

@@ -15,7 +15,7 @@ from zwidth.device.faults import SETTINGS, DeviceError, Fault
 from zwidth.processors import ProcessorError
 from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, printable
-from zwidth.study.points_file import PointsError
+from zwidth.study.boundary.points_file import PointsError
 
 if TYPE_CHECKING:
     from zwidth.show.cli.options import Question

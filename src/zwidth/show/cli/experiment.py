@@ -15,11 +15,11 @@ from zwidth.show.cli.errors import BadInput, NoAnswer
 from zwidth.show.cli.experiment_page import explanation, point_rows, sentences, warning
 from zwidth.show.cli.options import Numbers, refuse_empty
 from zwidth.show.cli.process import say
-from zwidth.study.points_file import read_points
+from zwidth.study.boundary.points_file import read_points
 
 if TYPE_CHECKING:
-    from zwidth.study.experiment_plan import Plan
-    from zwidth.study.measured_boundary import Experiment
+    from zwidth.study.boundary.experiment_plan import Plan
+    from zwidth.study.boundary.measured_boundary import Experiment
 
 MOST: Final = 1000
 # options that are numbers of the plan, under its own names
@@ -187,8 +187,8 @@ class ExperimentCommand(Command):
     def compute(self, case: CommandLine) -> Experiment:
         from zwidth.contact.boundary_experiment import NoStableWallError
         from zwidth.contact.stability_trial import TrialError
-        from zwidth.study.experiment import measure_boundary
-        from zwidth.study.journal import JournalError
+        from zwidth.study.boundary.experiment import measure_boundary
+        from zwidth.study.jobs.journal import JournalError
 
         file = _journal(case)
         try:
@@ -229,7 +229,7 @@ def _plan(case: CommandLine) -> Plan:
     """What is to be measured. Raises BadInput."""
     from zwidth.contact.boundary_experiment import SearchWindow
     from zwidth.contact.stability_trial import TrialError
-    from zwidth.study.experiment_plan import Plan
+    from zwidth.study.boundary.experiment_plan import Plan
 
     stiffness, damping = case["stiffness"], case["damping"]
     if (stiffness is None) != (damping is None):

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
-    from zwidth.study.measured_boundary import Cause, Experiment, MeasuredPoint
-    from zwidth.study.user_points import ComparedPoint, PointsComparison
+    from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint
+    from zwidth.study.boundary.user_points import ComparedPoint, PointsComparison
 
 MATTERS: Final = 0.01  # of the range of stable dampings: what moves an edge by less is not named
 AGREES: Final = 1e-3
@@ -50,7 +50,7 @@ def point_rows(experiment: Experiment) -> tuple[list[str], list[list[str]]]:
 
 def warning(experiment: Experiment) -> str | None:
     """That edges lie beyond tips, with the pair farthest apart; None where none does."""
-    from zwidth.study.measured_boundary import edges_beyond_tips
+    from zwidth.study.boundary.measured_boundary import edges_beyond_tips
 
     pairs = edges_beyond_tips(experiment)
     if not pairs:

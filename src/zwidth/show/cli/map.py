@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.measures.definition import Measure
-    from zwidth.study.common_area import CommonArea
-    from zwidth.study.plane_grid import PlaneGrid
-    from zwidth.study.requirement import Requirement
+    from zwidth.study.designs.requirement import Requirement
+    from zwidth.study.workspace.common_area import CommonArea
+    from zwidth.study.workspace.plane_grid import PlaneGrid
 
 PLANES: Final = ("xy", "xz", "yz")
 
@@ -183,9 +183,9 @@ class MapCommand(Command):
     def compute(self, case: CommandLine) -> MapResult:
         from zwidth.measures.definition import MeasureError
         from zwidth.memory_limit import TooLarge
-        from zwidth.study.common_area import common_area
-        from zwidth.study.map import workspace_map
-        from zwidth.study.plane_grid import PlaneError
+        from zwidth.study.workspace.common_area import common_area
+        from zwidth.study.workspace.map import workspace_map
+        from zwidth.study.workspace.plane_grid import PlaneError
 
         question, device = case.question, case.device
         if device.mechanism is None:
@@ -213,17 +213,17 @@ class MapCommand(Command):
         return MapResult(dataset, common_area(dataset, required) if required else None)
 
     def document(self, case: CommandLine, result: MapResult) -> dict[str, Any]:
-        from zwidth.study.map_data import map_document
+        from zwidth.study.workspace.map_data import map_document
 
         return map_document(result.dataset, case.device, result.area)
 
     def table(self, case: CommandLine, result: MapResult, document: Mapping[str, Any]) -> dict[str, Any]:
-        from zwidth.study.map_data import map_table
+        from zwidth.study.workspace.map_data import map_table
 
         return map_table(result.dataset)
 
     def reason(self, case: CommandLine, result: MapResult) -> str | None:
-        from zwidth.study.map_data import why_no_cell
+        from zwidth.study.workspace.map_data import why_no_cell
 
         return why_no_cell(result.dataset)
 
@@ -261,8 +261,8 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
     """What to map, the first of them shown; and the requirements."""
     from zwidth.measures.catalogue import find_measure
     from zwidth.measures.user_measures import load_measures
-    from zwidth.study.direction_share import NAME, share_measure
-    from zwidth.study.requirement import parse_requirement
+    from zwidth.study.designs.requirement import parse_requirement
+    from zwidth.study.workspace.direction_share import NAME, share_measure
 
     file, names = case["measures_file"], case["measures"]
     option = "--measures-file"
@@ -297,7 +297,7 @@ def _plane_option(name: str, value: str | None) -> str:
 def _plane(case: CommandLine) -> PlaneGrid:
     from zwidth.model.equilibrium import EquilibriumError, SidewaysForceError
     from zwidth.model.posture import PostureError
-    from zwidth.study.plane_grid import plane_of
+    from zwidth.study.workspace.plane_grid import plane_of
 
     device, assembly, direction = case.device, case.question.assembly, case.question.direction
     if case["extreme"] is not None:

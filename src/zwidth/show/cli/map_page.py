@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from zwidth.device.device import Device
-    from zwidth.study.common_area import CommonArea
+    from zwidth.study.workspace.common_area import CommonArea
 
 
 def map_page(
@@ -26,7 +26,7 @@ def map_page(
 ) -> Iterator[Any]:
     """The map in a few numbers: what and where, each measure over the workspace, requirements, notes.
 
-    document  of the map, as `study.map_data.map_document` makes it
+    document  of the map, as `study.workspace.map_data.map_document` makes it
     """
     measures = document.get("measures") or {document["measure"]: document}
     yield _heading(dataset, device, list(measures))

@@ -17,7 +17,7 @@ from zwidth.show.cli.contact_options import (
 )
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Finite, Numbers
-from zwidth.study.points_file import LARGEST_WALL
+from zwidth.study.boundary.points_file import LARGEST_WALL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

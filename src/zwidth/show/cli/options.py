@@ -12,7 +12,7 @@ import click
 
 from zwidth.processors import PROCESSORS
 from zwidth.show.circumstances import AS_GIVEN
-from zwidth.study.points_file import wall_number
+from zwidth.study.boundary.points_file import wall_number
 
 if TYPE_CHECKING:
     import numpy as np

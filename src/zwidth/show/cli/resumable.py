@@ -15,8 +15,8 @@ from zwidth.show.cli.process import say, stopped_in_a_kernel
 from zwidth.show.output import printable
 
 if TYPE_CHECKING:
-    from zwidth.study.job import Job
-    from zwidth.study.store import Store
+    from zwidth.study.jobs.job import Job
+    from zwidth.study.jobs.store import Store
 
 
 def resume_options(command: Callback) -> Callback:
@@ -45,7 +45,7 @@ def open_store(job: Job, beside: Path | None, resume: str | None) -> Store | Non
 
     Raises  BadInput  where there is no room, or something else is there
     """
-    from zwidth.study.store import Store, StoreError
+    from zwidth.study.jobs.store import Store, StoreError
 
     if resume is None and beside is None:
         return None
@@ -70,7 +70,7 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
     Raises  Stopped   where a process that computed is lost
             BadInput  where the disk refuses
     """
-    from zwidth.study.workers import WorkerLost
+    from zwidth.study.jobs.workers import WorkerLost
 
     goes_on = (
         ""

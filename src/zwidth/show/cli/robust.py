@@ -21,8 +21,8 @@ from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
 if TYPE_CHECKING:
-    from zwidth.study.robust import RobustStudy, Violation
-    from zwidth.study.robust_family import Range
+    from zwidth.study.robust.family import Range
+    from zwidth.study.robust.robust_study import RobustStudy, Violation
 
 MOST: Final = 100_000  # members, or unseen ones
 BINDING_ROWS: Final = 12  # binding members in what people read
@@ -118,8 +118,8 @@ class RobustCommand(Command):
         return {"operators": operators, "ranges": _ranges(case["ranges"])}
 
     def compute(self, case: CommandLine) -> RobustStudy:
-        from zwidth.study.robust import RobustError, robust_study
-        from zwidth.study.robust_family import Family, RangeError
+        from zwidth.study.robust.family import Family, RangeError
+        from zwidth.study.robust.robust_study import RobustError, robust_study
 
         response = case.point.response
         if not case["ranges"] and not case["operators"] and (response is None or response.sweeps is None):
@@ -166,7 +166,7 @@ class RobustCommand(Command):
 
 
 def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
-    from zwidth.study.robust_family import Range
+    from zwidth.study.robust.family import Range
 
     ranges, lines = [], []
     for text in texts:
@@ -249,7 +249,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
 def _member(study: RobustStudy, member: int) -> str:
     """A member by its operator, where members differ in nothing else; otherwise by its number."""
     from zwidth.device.operator_choice import NOBODY
-    from zwidth.study.robust_measured import MEAN
+    from zwidth.study.robust.measured_family import MEAN
 
     values = study.members[member]
     if list(values) == ["sweep"]:

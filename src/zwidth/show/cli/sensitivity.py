@@ -14,9 +14,9 @@ from zwidth.show.units import amount, as_written, signed, typed
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from zwidth.study.sensitivity_result import Sensitivities, Sensitivity
+    from zwidth.study.sensitivity.result import Sensitivities, Sensitivity
 
-# Kind of optimum (see `study.optimum`) -> where on the edge the stiffest wall lies.
+# Kind of optimum (see `study.sensitivity.optimum`) -> where on the edge the stiffest wall lies.
 PLACES: Final = {
     "smooth maximum": ", at a smooth maximum of the edge",
     "corner": ", at a corner of the edge",

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.device.device import Device
-    from zwidth.study.column import Column
-    from zwidth.study.study import Study
-    from zwidth.study.sweep import Sweep
+    from zwidth.study.designs.column import Column
+    from zwidth.study.designs.study import Study
+    from zwidth.study.designs.sweep import Sweep
 
 LISTED: Final = 12  # designs up to which all are listed
 SHOWN_REASONS: Final = 6  # printed for people
@@ -39,7 +39,7 @@ class StudyQuestion(Question):
     def study(self) -> Study:
         """The study, read and checked. Raises DeviceError, BadInput."""
         from zwidth.memory_limit import TooLarge
-        from zwidth.study.study_file import read_study
+        from zwidth.study.designs.study_file import read_study
 
         try:
             return read_study(self.name)
@@ -98,8 +98,8 @@ class SweepCommand(Command):
     def compute(self, case: CommandLine) -> Sweep:
         from zwidth.measures.definition import MeasureError
         from zwidth.memory_limit import TooLarge
-        from zwidth.study.sweep import compute_designs
-        from zwidth.study.sweep_job import sweep_job
+        from zwidth.study.designs.sweep import compute_designs
+        from zwidth.study.designs.sweep_job import sweep_job
 
         question = case.question
         assert isinstance(question, StudyQuestion)
@@ -122,7 +122,7 @@ class SweepCommand(Command):
         return ""  # the pages begin with how many designs there are
 
     def pages(self, case: CommandLine, result: Sweep, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.study.sweep_data import axis_value_text
+        from zwidth.study.designs.sweep_data import axis_value_text
 
         count, sampling, columns = result.job.count, result.job.sampling, result.job.columns
         shape = str(count) if sampling.kind != "grid" else " x ".join(map(str, sampling.shape))
@@ -189,7 +189,7 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
 
     from zwidth.measures.definition import OK, STATUS
     from zwidth.show.units import quantity
-    from zwidth.study.sweep_data import axis_value_text
+    from zwidth.study.designs.sweep_data import axis_value_text
 
     one, sampling = sweep.job.columns[column], sweep.job.sampling
     values, status = sweep.cells.values[:, column], sweep.cells.status[:, column]
@@ -208,7 +208,7 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
 
 def _reasons(sweep: Sweep) -> Iterator[str]:
     """Why designs have no value, once for all columns that say the same."""
-    from zwidth.study.sweep_data import note_sentences
+    from zwidth.study.designs.sweep_data import note_sentences
 
     names_by_sentence: dict[str, list[str]] = {}
     for name, sentence in note_sentences(sweep):

@@ -30,7 +30,7 @@ from zwidth.show.figures.style import (
 )
 from zwidth.show.moment_units import spoken_unit
 from zwidth.show.units import as_written, quantity
-from zwidth.study.load_path import LoadPath, PushedChart
+from zwidth.study.load.load_path import LoadPath, PushedChart
 
 Floats = NDArray[np.float64]
 

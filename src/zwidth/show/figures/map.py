@@ -19,13 +19,13 @@ from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
 from zwidth.show.figures.mechanism import drawn_links, joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
 from zwidth.show.units import area_text, as_written, percent, printed
-from zwidth.study.reach_outline import continued, reach_outline
+from zwidth.study.workspace.reach_outline import continued, reach_outline
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from zwidth.device.device import Device
-    from zwidth.study.common_area import CommonArea
+    from zwidth.study.workspace.common_area import CommonArea
 
 Floats = NDArray[np.float64]
 ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle

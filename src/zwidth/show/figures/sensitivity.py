@@ -21,7 +21,7 @@ from zwidth.show.figures.style import (
     wrapped,
 )
 from zwidth.show.units import MINUS, NONE, signed
-from zwidth.study.sensitivity_result import Sensitivities
+from zwidth.study.sensitivity.result import Sensitivities
 
 NUMBER_ROOM: Final = 0.24  # of what the bars span, for the numbers beside them
 NUMBER_WIDTH: Final = 40.0  # points that such a number takes at least

@@ -61,7 +61,7 @@ def study_figure(dataset: xr.Dataset) -> Figure:
     One axis, or one and a few texts such as assemblies: curves over it, a panel for each column. Two axes of
     numbers: heat maps. All else, and what a Latin hypercube has found: parallel coordinates.
 
-    dataset  as `study.sweep_data` makes it
+    dataset  as `study.designs.sweep_data` makes it
     """
     names = [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
     numeric, texts = _split_axes(dataset, names)

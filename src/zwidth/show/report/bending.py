@@ -8,7 +8,7 @@ from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.report.facts import Facts
 from zwidth.show.report.sentences import hertz, join_words
 from zwidth.show.units import NONE, SPACE, as_written, percent, quantity
-from zwidth.study.bending import DAMPING, Bending, BendingNumbers
+from zwidth.study.load.bending import DAMPING, Bending, BendingNumbers
 
 Row = tuple[str, ...]
 

@@ -19,12 +19,12 @@ from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
-from zwidth.study.bending import Bending, bending
-from zwidth.study.load_path import PUSH, LoadPath, load_path
-from zwidth.study.sensitivity import sensitivities
-from zwidth.study.sensitivity_result import Sensitivities
+from zwidth.study.load.bending import Bending, bending
+from zwidth.study.load.load_path import PUSH, LoadPath, load_path
+from zwidth.study.sensitivity.result import Sensitivities
+from zwidth.study.sensitivity.sensitivities import sensitivities
+from zwidth.study.sensitivity.what_if import BASE, Variant, find_variant, what_if
 from zwidth.study.validity import Validity, validity
-from zwidth.study.what_if import BASE, Variant, find_variant, what_if
 
 PUSHES: Final = 5  # charts along the path of pushes
 
@@ -134,7 +134,7 @@ class Facts:
 
 
 def gather(device: Device, point: OperatingPoint | None = None) -> Facts:
-    """All facts of a report; arguments and errors are those of `study.what_if.what_if`."""
+    """All facts of a report; arguments and errors are those of `study.sensitivity.what_if.what_if`."""
     point = point or device.at()
     return Facts(
         device=device,

@@ -23,8 +23,8 @@ from zwidth.show.circumstances import load_text
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, way
+from zwidth.study.sensitivity.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
 from zwidth.study.validity import Fit, Interval, Validity
-from zwidth.study.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
 
 # Gains of the actuator and the sensor are scales of the description, not parts to be changed.
 SCALES: Final = ("plant.actuator", "plant.sensor", "plant.handle")

@@ -12,7 +12,7 @@ from zwidth.show.output import json_value
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import NONE, SPACE, UNKNOWN, number, quantity
-from zwidth.study.what_if import Variant
+from zwidth.study.sensitivity.what_if import Variant
 
 Row = tuple[str, ...]
 

@@ -1,0 +1,333 @@
+"""A virtual experiment: measure a stability boundary with several subjects and trials, and find its causes.
+
+Subjects are operators: the five numbers of the preset, each times exp(spread n), n normal. Trials of one subject
+differ in the noise and, by such a factor each, in the disturbance, the speed and the push. A single subject is the
+preset operator, and a single trial has the disturbance, speed and push of the plan. All random numbers follow from
+the seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from math import inf, nan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_crossings import EdgeKind, exact_edge
+from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
+from zwidth.contact.boundary_experiment import (
+    TIP_SHARE,
+    EdgePoint,
+    StableExtent,
+    find_stable_walls,
+    measure_edges,
+    measure_tips,
+    tip_dampings,
+)
+from zwidth.contact.hand import Hand, Reflex
+from zwidth.contact.stability_trial import StabilityTrial, TrialError
+from zwidth.loop.estimator import NonlinearError
+from zwidth.loop.estimators.foaw import Foaw
+from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.unsupported_feedback import refuse_load
+from zwidth.model.argument_checks import require
+from zwidth.model.operator import Operator, attach
+from zwidth.progress import Progress
+from zwidth.study.boundary.experiment_plan import Plan
+from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint
+from zwidth.study.boundary.user_points import UserPoint, compare_points
+from zwidth.study.jobs.journal import Journal, fingerprint
+
+Floats = NDArray[np.float64]
+
+EXPLAINED: Final = 3  # number of stiffnesses at which the edges are measured again to find causes
+STEPS: Final = 3.0  # encoder steps: a vibration of this amplitude is just visible
+NOISES: Final = 10.0  # standard deviations of the encoder's noise, likewise
+STIFFENED: Final = 2.0  # a reflex adds this multiple of the stiffness and damping of arm and grasp
+
+
+def question(loop: Loop, operator: Operator | None, plan: Plan) -> str:
+    """Fingerprint by which a journal recognises the experiment."""
+    return fingerprint("experiment 3", loop, operator, plan)
+
+
+def measure_boundary(
+    point: OperatingPoint,
+    plan: Plan | None = None,
+    user_points: Sequence[UserPoint] = (),
+    *,
+    file: str | Path | None = None,
+    progress: Progress | None = None,
+    causes: bool = True,
+) -> Experiment:
+    """Measure a stability boundary on the simulated device at one operating point, held by its operator.
+
+    user_points  points measured on a real device, to be compared with the same exact chart
+    file         journal that keeps the trials done, from which an interrupted run continues; None: no journal
+    causes       measure again without each nonlinear part (friction, encoder steps, force limit) in turn
+    Raises       JournalError  for a file that is not a journal, or of a newer version
+                 OSError       where it cannot be read or written
+                 what `run_experiment` and `OperatingPoint.plant` raise
+    """
+    require("point", point, OperatingPoint)
+    plan = plan or Plan()
+    loop = point.contact_loop
+    if plan.one_sided:
+        refuse_load(loop.plant, "a boundary of one-sided walls is not measured", "measure two-sided ones")
+    operator = None if loop.plant.handle is None else point.operator
+    journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
+    result = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))
+    return replace(result, user_points=compare_points(result.chart, user_points)) if user_points else result
+
+
+def run_experiment(
+    loop: Loop,
+    operator: Operator | None = None,
+    plan: Plan | None = None,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+    causes: bool = False,
+) -> Experiment:
+    """Measure a stability boundary by simulated trials (`contact.boundary_experiment` says how).
+
+    loop      the device without its operator, and its computer
+    operator  the operator who holds it; None: no operator
+    journal   keeps the trials done (see `question`); None: no journal
+    causes    measure again without each nonlinear part in turn
+    Raises    TrialError         for numbers of the plan that cannot be used
+              NoStableWallError  where no stable wall was found
+              HysteresisError, UnmovedError  as `simulate_batch`
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> mass = Plant(np.array([[0.1]]), np.zeros((1, 1)), np.zeros((1, 1)), one, one)
+    >>> loop = Loop(mass, Controller(0.001))
+    >>> experiment = run_experiment(loop, plan=Plan(stiffnesses=2, tips=1))
+    >>> [point.edge for point in experiment.points]
+    ['lower', 'lower', 'upper', 'upper', 'tip']
+    >>> bool(abs(experiment.points[-1].stiffness / 68629.15 - 1) < 1e-4)    # (12 - 8 sqrt 2) m/T^2 (thesis 4.14)
+    True
+    """
+    plan = _with_visible(loop, plan or Plan())
+    journal = journal or Journal(None, "")
+    report = progress or (lambda stage, done, of: None)
+    subjects = _subjects(operator, plan)
+    first = _stability_trial(loop, operator, plan)
+    report_search = partial(report, "looking for stable walls")
+    place = StableExtent(
+        *journal.get_or_compute("place", lambda: _numbers(find_stable_walls(first, plan.box, report_search)))
+    )
+    report_search(1, 1)
+    low = 0.0 if plan.box is None else max(plan.box.stiffness[0], 0.0)
+    top = TIP_SHARE * place.stiffness
+    grid = low + (top - low) * np.arange(1, plan.stiffnesses + 1) / plan.stiffnesses
+    total_trials, done, runs = plan.subjects * plan.trials, 0, []
+    dampings: Floats | None = None
+    for s, subject in enumerate(subjects):
+        for t in range(plan.trials):
+            report("measuring the boundary", done, total_trials)
+            trial, name = _trial(loop, subject, plan, s, t), f"subject {s} trial {t}"
+            edges = _edge_points(journal, f"{name} edges", partial(measure_edges, trial, grid, place, plan.box))
+            if dampings is None:
+                dampings = tip_dampings(edges, place, plan.tips) if plan.tips else np.empty(0)
+            tips = _edge_points(journal, f"{name} tips", partial(measure_tips, trial, dampings, place, plan.box))
+            runs.append([*edges, *tips])
+            done += 1
+            report("measuring the boundary", done, total_trials)
+    chart = _chart(loop, operator)
+    points, lost = _combine_trials(runs, chart, 2 * len(grid) + len(dampings if dampings is not None else ()))
+    cause_list = _causes(loop, operator, plan, place, runs[0], journal, report) if causes else ()
+    return Experiment(plan, place, points, lost, subjects, chart, cause_list, journal.entries_read)
+
+
+def _with_visible(loop: Loop, plan: Plan) -> Plan:
+    """The plan with the default of `visible` for this loop's encoder, where it has none."""
+    if plan.visible is not None:
+        return plan
+    method = loop.controller.velocity
+    # an adaptive window does not resolve motions within its noise band
+    noise_band = 2.0 * method.position_noise if isinstance(method, Foaw) else 0.0
+    steps, noise = reading_step(loop.plant), reading_noise(loop.plant)
+    return replace(plan, visible=STEPS * max(steps, noise_band) + NOISES * noise)
+
+
+def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, ...]:
+    """One operator for each subject of the plan; (None,) without an operator."""
+    if operator is None:
+        if plan.subjects > 1 or plan.reflex:
+            argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
+            reason = f"{verb} in the arm that holds the device; give an operator"
+            raise TrialError(argument, reason)
+        return (None,)
+    if plan.subjects == 1:
+        return (operator,)
+    return tuple(
+        _varied(operator, np.random.default_rng([plan.seed, s]), plan.spread) for s in range(plan.subjects)
+    )
+
+
+def _varied(operator: Operator, random: np.random.Generator, spread: float) -> Operator:
+    """The operator with each number times its own log-normal factor exp(spread n)."""
+    names = [field.name for field in fields(operator) if field.name != "directions"]
+    numbers = {name: getattr(operator, name) for name in names}
+    factors = np.exp(spread * random.standard_normal(len(numbers))).tolist()
+    return replace(
+        operator,
+        **{
+            name: value * factor
+            for (name, value), factor in zip(numbers.items(), factors, strict=True)
+            if value is not None
+        },
+    )
+
+
+def _stability_trial(
+    loop: Loop,
+    operator: Operator | None,
+    plan: Plan,
+    factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    seed: int = 0,
+) -> StabilityTrial:
+    """The trial of a plan with its disturbance, speed and push times these factors, without limits."""
+    disturbance, speed, push = factors[0] * plan.disturbance, factors[1] * plan.speed, factors[2] * plan.push
+    reflex = None
+    if plan.reflex and operator is not None:
+        reflex = Reflex(
+            threshold=0.5 * abs(push),
+            arm_stiffness=STIFFENED * operator.arm_stiffness,
+            arm_damping=STIFFENED * operator.arm_damping,
+            grasp_stiffness=STIFFENED * (operator.grasp_stiffness or 0.0),
+            grasp_damping=STIFFENED * (operator.grasp_damping or 0.0),
+        )
+    hand = Hand(operator, push=push, reflex=reflex)
+    return StabilityTrial(loop, hand, plan.one_sided, disturbance, speed, plan.visible or 0.0, seed)
+
+
+def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, trial: int) -> StabilityTrial:
+    """One trial of one subject, with its own random numbers."""
+    factors = (1.0, 1.0, 1.0)
+    if plan.trials > 1:
+        random = np.random.default_rng([plan.seed, subject, trial])
+        factors = tuple(np.exp(plan.spread * random.standard_normal(3)).tolist())
+    return _stability_trial(loop, operator, plan, factors, seed=(plan.seed * 1000 + subject) * 1000 + trial)
+
+
+def _numbers(record: Any) -> list[Any]:
+    """The fields of a dataclass in their order, as a journal keeps them."""
+    return [getattr(record, field.name) for field in fields(record)]
+
+
+def _edge_points(journal: Journal, name: str, compute: Callable[[], list[EdgePoint]]) -> list[EdgePoint]:
+    """The points that the journal keeps under this name; computed where it has none."""
+    return [
+        EdgePoint(*numbers) for numbers in journal.get_or_compute(name, lambda: [_numbers(p) for p in compute()])
+    ]
+
+
+def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
+    """The exact chart with the operator; None where the loop has none."""
+    held = loop if operator is None else Loop(attach(loop.plant, operator), loop.controller)
+    try:
+        return stability_chart(held, decay=False)
+    except (NonlinearError, ChartError):
+        return None
+
+
+def _combine_trials(
+    runs: list[list[EdgePoint]], chart: StabilityChart | None, requested_points: int
+) -> tuple[tuple[MeasuredPoint, ...], int]:
+    """Points of all trials by edge and chosen stiffness or damping, and how many no trial found."""
+    by_edge: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
+    for points in runs:
+        for point in points:
+            chosen = point.damping if point.edge == "tip" else point.stiffness
+            edge_points = by_edge.setdefault((point.edge, chosen), [])
+            if point.unstable_behaviour is not None:
+                edge_points.append(point)
+    order = {"lower": 0, "upper": 1, "tip": 2}
+    combined = []
+    for (edge, chosen), points in sorted(by_edge.items(), key=lambda item: (order[item[0][0]], item[0][1])):
+        if not points:
+            continue
+        values = tuple(p.stiffness if edge == "tip" else p.damping for p in points)
+        mean = sum(values) / len(values)
+        K, B = (mean, chosen) if edge == "tip" else (chosen, mean)
+        exact = nan if chart is None else exact_edge(chart, K, B, edge)
+        first = points[0]
+        observation = (first.unstable_behaviour, first.amplitude, first.frequency)
+        combined.append(
+            MeasuredPoint(
+                K,
+                B,
+                edge,
+                min(values),
+                max(values),
+                len(values),
+                values,
+                exact,
+                *observation,
+                any(p.unsure for p in points),
+            )
+        )
+    return tuple(combined), requested_points - len(combined)
+
+
+def _causes(
+    loop: Loop,
+    operator: Operator | None,
+    plan: Plan,
+    place: StableExtent,
+    points: list[EdgePoint],
+    journal: Journal,
+    report: Progress,
+) -> tuple[Cause, ...]:
+    """Edges measured again without each nonlinear part, at a few of the stiffnesses of these points."""
+    names = loop.nonlinear.kinds
+    grid = sorted({p.stiffness for p in points if p.edge == "lower"})
+    picked = [grid[i] for i in np.unique(np.linspace(0, len(grid) - 1, min(EXPLAINED + 2, len(grid))).astype(int))]
+    picked = picked[1:-1] or picked
+    compared = [p for p in points if p.edge != "tip" and p.stiffness in picked]
+    causes = []
+    for done, name in enumerate(names):
+        report("measuring without each part", done, len(names))
+        trial = _stability_trial(without(loop, name), operator, plan)
+        again = partial(measure_edges, trial, np.array(picked), place, plan.box)
+        remeasured = _edge_points(journal, f"without {name}", again)
+        damping = {(p.edge, p.stiffness): p.damping for p in remeasured}
+        causes.append(
+            Cause(name, tuple(compared), tuple(damping.get((p.edge, p.stiffness), nan) for p in compared))
+        )
+    report("measuring without each part", len(names), len(names))
+    return tuple(causes)
+
+
+def without(loop: Loop, name: str) -> Loop:
+    """The loop without one nonlinear part, named as in `Nonlinear.kinds`. Raises ValueError for another name."""
+    computer, nonlinear = loop.controller, loop.plant.nonlinear
+    match name:
+        case "dry friction":
+            nonlinear = replace(nonlinear, friction=())
+        case "encoder steps":
+            nonlinear = replace(nonlinear, counters=tuple(replace(c, step=0.0) for c in nonlinear.counters))
+        case "noise":
+            nonlinear = replace(nonlinear, counters=tuple(replace(c, noise=0.0) for c in nonlinear.counters))
+        case "nonlinear springs":
+            nonlinear = replace(nonlinear, springs=())
+        case "programmable brakes":
+            nonlinear = replace(nonlinear, brakes=())
+        case "the force limit":
+            nonlinear, computer = replace(nonlinear, force_limit=inf), replace(computer, force_limit=inf)
+        case _:
+            raise ValueError(f"name must be one of the nonlinear parts in Nonlinear.kinds, got {name!r}")
+    if all(c.step == 0.0 and c.noise == 0.0 for c in nonlinear.counters):
+        nonlinear = replace(nonlinear, counters=())
+    return Loop(replace(loop.plant, nonlinear=nonlinear), computer)

@@ -1,0 +1,358 @@
+"""From the [[axis]] tables of a study file to axes, or to what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import isfinite, isnan
+from typing import Any, Final
+
+from zwidth.device import address
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, plural, quote, suggestion
+from zwidth.device.schema import device_file as schema
+from zwidth.device.toml_access import is_number, tables
+from zwidth.model.reduction import MODELS
+from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, Tie, spread
+
+UNITS: Final = {"stiffness_N_per_m": "N/m", "damping_Ns_per_m": "N s/m", "frequency_Hz": "Hz"}
+NUMBER: Final = ("number", "integer")
+
+Fault = tuple[KeyPath, str]
+Faults = list[Fault]
+SetNumbers = dict[KeyPath, tuple[str, str]]  # what is set: as it is written, and the axis that sets it
+
+
+def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Faults) -> tuple[Axis, ...]:
+    """The axes of a study that have no fault; the faults of the others are added to `faults_of_axes`.
+
+    document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
+    device    None if it could not be loaded; paths are then not looked up
+    """
+    sampling = document.get("sampling", "grid")
+    axes, taken = [], SetNumbers()
+    if sampling == "paired":
+        faults_of_axes += _pairing_faults(document)
+    for n, table in tables(document, "axis"):
+        here = ("axis", n)
+        faults_of_axes += [((*here, *path), message) for path, message in _values_faults(table, sampling)]
+        key = table.get("key")
+        if not isinstance(key, str) or not key:
+            continue
+        faults = list(_overlap_faults(key, ("key",), key, device, taken))
+        axis: Axis | None = None
+        if key in CIRCUMSTANCES:
+            faults += _circumstance_faults(key, table, device)
+            axis = _axis(table, key, UNITS.get(key, "m" if key == "at" else ""), ())
+            if table.get("tie"):
+                faults.append((("tie",), f"goes with a number of the device file, not with {key}; remove it"))
+        elif device is not None:
+            message = list(_key_faults(device.document, key, _values(table)))
+            faults += message
+            if not message:
+                ties = list(_ties(table, key, device, taken, faults))
+                axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
+        faults_of_axes += [((*here, *path), message) for path, message in faults]
+        if axis is not None and not faults:
+            axes.append(axis)
+    return tuple(axes)
+
+
+def unit_of(document: dict[str, Any], key: str) -> str:
+    """The unit that the device file's schema states for a number, or for the list that it stands in."""
+    return schema.key_unit(address.resolve(document, key))
+
+
+def _pairing_faults(document: dict[str, Any]) -> Iterator[Fault]:
+    """Faults of paired axes that have unlike numbers of values."""
+    counts: list[tuple[int, str, int]] = []
+    for n, table in tables(document, "axis"):
+        values, count = table.get("values"), table.get("count")
+        many = len(values) if isinstance(values, list) else count if isinstance(count, int) else None
+        if many is not None:
+            counts.append((n, "values" if isinstance(values, list) else "count", many))
+    for n, key, many in counts[1:]:
+        if many != counts[0][2]:
+            message = (
+                f"gives {plural(many, 'value')}, the first axis {counts[0][2]}; paired axes have equally many"
+            )
+            yield (("axis", n, key), message)
+
+
+def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
+    """Faults of an axis that has no values, gives them twice (range and values), or has a key too many."""
+    span, values = table.get("range"), table.get("values")
+    if span is None and values is None:
+        yield ((), "has no values; give range = [low, high] and count, or values = [...]")
+    if span is not None and values is not None:
+        yield (("values",), "and range exclude each other; remove one of them")
+    elif values is not None:
+        seen = set[str]()
+        for n, value in enumerate(values if isinstance(values, list) and sampling != "paired" else []):
+            if repr(value) in seen:
+                yield (("values", n), f"{quote(value)} is listed already; remove it")
+            seen.add(repr(value))
+        for key in ("count", "scale"):
+            if key in table:
+                yield ((key,), "is read with a range only; remove it")
+    elif span is not None and sampling == "latin-hypercube" and "count" in table:
+        yield (
+            ("count",),
+            "is for a grid; a Latin hypercube has one count for all axes: move it to the top",
+        )
+    elif span is not None and sampling != "latin-hypercube" and "count" not in table:
+        yield ((), "has a range and no count; add the number of its values, such as count = 11")
+    if table.get("scale") == "log" and isinstance(span, list) and span and is_number(span[0]) and not span[0] > 0:
+        yield (("range",), f'must begin above 0 where scale = "log", got {quote(span)}')
+
+
+def _values(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
+    """The entries of the axis's range and values, each with its key path."""
+    return [
+        ((key, n), value)
+        for key in ("range", "values")
+        for n, value in enumerate(table[key] if isinstance(table.get(key), list) else [])
+    ]
+
+
+def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> Axis | None:
+    """The axis; None where its values have a fault, which `study_schema` or `_values_faults` reports."""
+    span, values, count = table.get("range"), table.get("values"), table.get("count")
+    logarithmic = table.get("scale") == "log"
+    if isinstance(values, list) and values and span is None:
+        return Axis(key, tuple(tuple(v) if isinstance(v, list) else v for v in values), None, False, ties, unit)
+    if not isinstance(span, list) or len(span) != 2 or not all(map(is_number, span)) or not span[0] < span[1]:
+        return None
+    low, high = float(span[0]), float(span[1])
+    if not (isfinite(low) and isfinite(high)) or (logarithmic and low <= 0.0):
+        return None
+    # a count too large for memory is refused by `study.check_study`; its values are not made here
+    inner = (
+        spread((low, high), count, logarithmic=logarithmic) if type(count) is int and 0 < count <= 10**6 else ()
+    )
+    return Axis(key, inner, (low, high), logarithmic, ties, unit)
+
+
+def _overlap_faults(
+    key: str, where: KeyPath, axis: str, device: Device | None, taken: SetNumbers
+) -> Iterator[Fault]:
+    """Faults of a key that another axis or tie sets too, as a whole or in part, or that excludes such a key.
+
+    key    of the axis itself, or of a number tied to it
+    axis   key of the axis that sets it
+    taken  what axes before this one set; the key is added
+    """
+    steps: KeyPath = ("", key)  # no path of the file: the axis `operator` chooses whose numbers others change
+    if key not in CIRCUMSTANCES:
+        if device is None:
+            return
+        try:
+            steps = address.resolve(device.document, key)
+        except DeviceError:
+            return  # `_key_faults` and `_tie_faults` report it
+    for other, (shown, setter) in taken.items():
+        by = f"is set by the axis '{setter}'" if shown == setter else f"goes with the axis '{setter}'"
+        if other == steps:
+            yield (where, f"'{key}' {by} already; remove one of the two")
+        elif steps[: len(other)] == other or other[: len(steps)] == steps:
+            yield (where, f"'{key}' overlaps '{shown}', which {by} already; remove one of the two")
+        elif _exclude(steps, other):
+            yield (where, f"'{key}' excludes '{shown}', which {by} already; remove one of them")
+    taken.setdefault(steps, (key, axis))
+
+
+def _exclude(one: KeyPath, other: KeyPath) -> bool:
+    """Whether these keys belong to one table and exclude each other."""
+    if one[:-1] != other[:-1]:
+        return False
+    groups = address.EXCLUSIVE.get(tuple(map(str, one[:-1])), ())
+    of = [[group for group in groups if step in group] for step in (one[-1], other[-1])]
+    return all(of) and of[0] != of[1]
+
+
+def _key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]]) -> Iterator[Fault]:
+    """Faults of a key that no device file has, or of values of a kind that the schema does not allow there."""
+    try:
+        steps = address.resolve(document, key)
+        now = address.get(document, key) if address.exists(document, key) else None
+    except DeviceError as error:
+        near = nearest(key, CIRCUMSTANCES)
+        hint = f" (or is it '{near}', a circumstance?)" if near else ""
+        yield (("key",), f"'{key}' {error.faults[0].message}{hint}")
+        return
+    kinds = {kind.get("type") for kind in schema.subschemas(steps)} - {"null", "array", "object"}
+    if isinstance(now, dict | list) or not kinds:
+        inside = [path for path in address.numeric_addresses(document) if path.startswith(dotted(steps, document))]
+        hint = (
+            f"; the numbers in it are {', '.join(inside[:6])}{', ...' if len(inside) > 6 else ''}"
+            if inside
+            else ""
+        )
+        yield (("key",), f"'{key}' is not a single number{hint}")
+        return
+    if isinstance(now, int | float) and not isinstance(now, bool):
+        kinds &= {*NUMBER}
+    spanned = any(where[0] == "range" for where, _ in values)
+    if spanned and not kinds & {*NUMBER}:
+        yield (("range",), f"cannot be used: '{key}' takes text; write values = [...] with the texts")
+    elif spanned and "number" not in kinds:
+        yield (("range",), f"cannot be used: '{key}' takes whole numbers; write values = [1, 2, 3]")
+    else:
+        texts = _texts(steps)
+        yield from (
+            ((*where,), message) for where, value in values if (message := _value_fault(value, kinds, key, texts))
+        )
+
+
+def _texts(steps: KeyPath) -> list[str]:
+    """The texts that the schema allows at a path; [] where any text is allowed."""
+    kinds = [kind for kind in schema.subschemas(steps) if kind.get("type") == "string"]
+    return (
+        list(dict.fromkeys(str(kind.get("const")) for kind in kinds)) if all("const" in k for k in kinds) else []
+    )
+
+
+def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str:
+    """What is wrong with a value; "" for nothing.
+
+    kinds  JSON types that the schema allows;   texts  texts that it allows, [] for any
+    """
+    if isinstance(value, bool):
+        fits, wanted = "boolean" in kinds, "no true or false"
+    elif isinstance(value, str):
+        fits, wanted = "string" in kinds, "a number"
+        if fits and texts and value not in texts:
+            return f"must be one of {', '.join(texts)} for '{key}', got {quote(value)}"
+    elif isinstance(value, int):
+        fits, wanted = bool(kinds & {*NUMBER}), "text"
+    elif isinstance(value, float):
+        fits, wanted = "number" in kinds, "a whole number" if "integer" in kinds else "text"
+        if fits and isnan(value):
+            fits, wanted = False, "a number"
+    else:
+        fits, wanted = False, "a number"
+    return "" if fits else f"must be {wanted} for '{key}', got {quote(value)}"
+
+
+def _ties(
+    table: dict[str, Any], key: str, device: Device, taken: SetNumbers, faults_of_axes: Faults
+) -> Iterator[Tie]:
+    """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`."""
+    document, given = device.document, table.get("tie")
+    for n, tied in enumerate(given if isinstance(given, list) else []):
+        tie: dict[str, Any] = {"key": tied} if isinstance(tied, str) else tied if isinstance(tied, dict) else {}
+        to, factor, power = tie.get("key"), tie.get("factor"), tie.get("power")
+        if not isinstance(to, str) or not to:
+            continue
+        faults = list(_tie_faults(document, key, to, factor, power, table))
+        faults += [] if faults else list(_overlap_faults(to, (), key, device, taken))
+        faults_of_axes += [(("tie", n, *path), message) for path, message in faults]
+        if faults:
+            continue
+        if power is None:
+            yield Tie(to, 1.0 if factor is None else float(factor))
+        else:
+            yield Tie(to, 1.0, float(power), address.get(document, to), float(address.get(document, key)))
+    # an element of a symmetric matrix has no value of its own
+    mirror = mirrored(document, key)
+    if mirror is not None and address.resolve(document, mirror) not in taken:
+        taken[address.resolve(document, mirror)] = mirror, key
+        yield Tie(mirror)
+
+
+def mirrored(document: dict[str, Any], key: str) -> str | None:
+    """Path of an element's mirror image in a matrix; None for the diagonal, and for what stands in none.
+
+    >>> mirrored({"plant": {"mass_kg": [[1.0, 0.0], [0.0, 1.0]]}}, "plant.mass_kg.0.1")
+    'plant.mass_kg.1.0'
+    """
+    steps = address.resolve(document, key)
+    if (
+        len(steps) < 3
+        or not isinstance(steps[-1], int)
+        or not isinstance(steps[-2], int)
+        or steps[-1] == steps[-2]
+    ):
+        return None
+    return dotted((*steps[:-2], steps[-1], steps[-2]), document)
+
+
+def _tie_faults(
+    document: dict[str, Any], key: str, to: str, factor: Any, power: Any, table: dict[str, Any]
+) -> Iterator[Fault]:
+    try:
+        address.resolve(document, to)
+        own = address.get(document, to) if address.exists(document, to) else None
+    except DeviceError as error:
+        yield ((), f"'{to}' {error.faults[0].message}")
+        return
+    if factor is not None and power is not None:
+        yield (("factor",), "and power exclude each other; remove one of them")
+    elif power is None:
+        values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values(table)[:1]]
+        yield from (
+            ((), message.replace(f"'{key}'", f"'{to}'")) for _, message in _key_faults(document, to, values)
+        )
+        if factor is not None and any(isinstance(value, str) for _, value in _values(table)):
+            yield (("factor",), "cannot multiply texts, and the values of this axis are texts; remove it")
+    else:
+        base = address.get(document, key) if address.exists(document, key) else None
+        if not _numbers(own):
+            yield (
+                (),
+                f"'{to}' has no value in the device file, which power needs; use factor, or set it first",
+            )
+        if not is_number(base) or base == 0:
+            given = f"got {quote(base)}" if base is not None else "and it has none; set it first"
+            yield (("power",), f"needs a value of '{key}' other than 0 in the device file, {given}")
+        elif not all(is_number(value) and value / base > 0 for _, value in _values(table)):
+            yield (("power",), f"needs values of the sign that '{key}' has in the device file, {quote(base)}")
+
+
+def _numbers(value: Any) -> bool:
+    return bool(value) and all(map(_numbers, value)) if isinstance(value, list) else is_number(value)
+
+
+def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None) -> Iterator[Fault]:
+    """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
+    if key in WANTED:
+        least = "above 0" if key == "frequency_Hz" else "at least 0"
+        for where, value in _values(table):
+            if not is_number(value) or not isfinite(value) or value < 0 or (value == 0 and least == "above 0"):
+                yield (where, f"must be a finite number, {least}, got {quote(value)}")
+        return
+    if "range" in table:
+        yield (("range",), f"cannot be used: {key} is not a number; write values = [...]")
+    for where, value in _values(table):
+        if where[0] == "values" and (message := circumstance_fault(key, value, device)):
+            yield (where, message)
+
+
+def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
+    """What is wrong with a value of at, direction, assembly, model or operator for a device; "" for nothing."""
+    if key in ("at", "direction"):
+        if not isinstance(value, list | tuple) or not all(map(is_number, value)):
+            return f"must be 2 or 3 numbers, got {quote(value)}"
+    elif not isinstance(value, str) or not value:
+        return f"must be text, got {quote(value)}"
+    checks: dict[str, Callable[[Device], Any]] = {
+        "at": lambda known: known.position(value),
+        "direction": lambda known: known.direction(value),
+        "assembly": lambda known: _assembly(known, value),
+    }
+    if key == "model" and value not in MODELS:
+        return f"must be one of {', '.join(MODELS)}, got {quote(value)}"
+    if device is None or key not in checks:
+        return ""
+    try:
+        checks[key](device)
+    except DeviceError as error:
+        return error.faults[0].message
+    return ""
+
+
+def _assembly(device: Device, name: str) -> None:
+    if device.mechanism is None:
+        device.at(assembly=name)  # raises the fault that a [plant] has no assemblies
+    elif name not in device.mechanism.assemblies:
+        near = suggestion(name, set(device.mechanism.assemblies), "there are")
+        raise fail(device.label, "assembly", f"'{name}' is not an assembly of this device; {near}")

@@ -1,0 +1,169 @@
+"""Designs of a study that are built and measured together: those that consist of the same parts.
+
+Which designs are computed together never changes a design's result: every step looks at its own numbers alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device import address
+from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
+from zwidth.device.faults import DeviceError, KeyPath
+from zwidth.device.load import check
+from zwidth.device.operator_choice import with_operator
+from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
+
+Rows = NDArray[np.int64]
+
+
+class DesignColumn(NamedTuple):
+    """What one key is in each of P designs.
+
+    key     a path of the device file, "operator" or another circumstance
+    values  the values that it takes
+    places  (P,) which of them each design has
+    """
+
+    key: str
+    values: Sequence[Any]
+    places: Rows
+
+
+@dataclass(frozen=True)
+class DesignGroup:
+    """Designs of the same parts.
+
+    rows         (P,)  their numbers, from the first that was asked for
+    batch        all of them
+    valid        (P,)  marks of those that are certain to be valid; the rest is to be built alone
+    positions    (P, 2) or (P, 3)  of the handle, where they differ; None: the same for all
+    chosen       circumstances that are the same for all, by key
+    """
+
+    rows: Rows
+    batch: DesignBatch
+    valid: NDArray[np.bool_]
+    positions: NDArray[np.float64] | None
+    chosen: dict[str, Any]
+
+
+class DesignGrouping:
+    """How the designs of a study fall into groups.
+
+    document   of the device
+    operators  as in `Study`
+    """
+
+    def __init__(self, document: dict[str, Any], label: str, operators: Mapping[str, Any]) -> None:
+        self.document, self.label, self.operators = document, label, operators
+        self._steps: dict[str, KeyPath | None] = {}
+        self._documents: dict[tuple[Any, ...], dict[str, Any] | None] = {}
+
+    def groups(self, columns: Sequence[DesignColumn]) -> Iterator[DesignGroup]:
+        """The groups of designs; those that cannot be built together with any are in none.
+
+        columns  all keys that may differ from the document's, or from each other
+        """
+        if not columns:
+            return
+        kinds = [self._kinds(one.key, one.values) for one in columns]
+        codes = [code[one.places] for (code, _), one in zip(kinds, columns, strict=True)]
+        found, group_of = np.unique(np.stack(codes, axis=1), axis=0, return_inverse=True)
+        for n, own in enumerate(found):
+            rows = np.flatnonzero(group_of.ravel() == n)
+            kind = tuple((one.key, names[code]) for one, (_, names), code in zip(columns, kinds, own, strict=True))
+            group = self._group(rows, kind, [one._replace(places=one.places[rows]) for one in columns])
+            if group is not None:
+                yield group
+
+    def _kinds(self, key: str, values: Sequence[Any]) -> tuple[NDArray[np.int64], Sequence[Any]]:
+        """A number for each value that stands for its kind, and the kinds by these numbers: what must be alike in
+        designs that are built together."""
+        steps = self._path(key)
+        if key in WANTED:
+            return np.zeros(len(values), dtype=np.int64), [None]
+        if steps is not None and takes_arrays(steps) and all(type(value) in (int, float) for value in values):
+            numbers = np.array(values, dtype=np.float64)
+            none = (numbers == 0.0) & (not _in_list(steps))
+            return np.where(none, 1, np.where(np.isfinite(numbers), 0, 2)), ["number", "0", "not finite"]
+        number_of: dict[str, int] = {}
+        code = [number_of.setdefault(self._kind(key, steps, value), len(number_of)) for value in values]
+        return np.array(code), list(number_of)
+
+    def _kind(self, key: str, steps: KeyPath | None, value: Any) -> str:
+        if isinstance(value, list | tuple) and (key == "at" or (steps is not None and takes_arrays(steps))):
+            return f"[{', '.join(self._kind(key, steps, inner) for inner in value)}]"
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        free = number and (key == "at" or (steps is not None and takes_arrays(steps) and value != 0))
+        return "number" if free else repr(value)
+
+    def _path(self, key: str) -> KeyPath | None:
+        """The resolved path of a key; None for a circumstance, and where the document has no such place."""
+        if key not in self._steps:
+            try:
+                self._steps[key] = None if key in CIRCUMSTANCES else address.resolve(self.document, key)
+            except DeviceError:
+                self._steps[key] = None
+        return self._steps[key]
+
+    def _group(self, rows: Rows, kind: tuple[Any, ...], taken: list[DesignColumn]) -> DesignGroup | None:
+        document = self._document(kind, taken, len(rows))
+        if document is None:
+            return None
+        positions, columns = None, {}
+        example = {key: values[places[0]] for key, values, places in taken}
+        for key, values, places in taken:
+            if key == "at" and isinstance(example["at"], list | tuple):
+                positions = np.array(values, dtype=np.float64)[places]
+            steps = self._path(key)
+            if steps is not None and takes_arrays(steps) and _holds(document, steps):
+                columns[steps] = np.array(values, dtype=np.float64)[places]
+        try:
+            batch, valid = design_batch(document, columns, len(rows), self.label)
+        except DeviceError:
+            return None
+        chosen = {key: value for key, value in example.items() if key in CIRCUMSTANCES and key not in WANTED}
+        return DesignGroup(rows, batch, valid, positions, chosen)
+
+    def _document(self, kind: tuple[Any, ...], taken: list[DesignColumn], count: int) -> dict[str, Any] | None:
+        """The document of a valid design of a kind; None where none is found among these."""
+        if self._documents.get(kind) is None:
+            for row in range(count):
+                try:
+                    document = self.design_document({key: values[places[row]] for key, values, places in taken})
+                    check(document, self.label)
+                except DeviceError:
+                    continue
+                self._documents[kind] = document
+                break
+        return self._documents.get(kind)
+
+    def design_document(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
+        """The document with a design's settings. Raises DeviceError."""
+        document = self.document
+        if "operator" in chosen:
+            document = with_operator(document, self.operators[chosen["operator"]])
+        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        return address.assign_all(document, own)
+
+
+def _in_list(steps: KeyPath) -> bool:
+    """Whether a path leads to an element of a list. A 0 there takes no part of the device away, as that of a lag
+    does."""
+    return isinstance(steps[-1], int)
+
+
+def _holds(document: Any, steps: KeyPath) -> bool:
+    """Whether a document has something at a path: a key may have been dropped for another that excludes it."""
+    for step in steps:
+        places: Any = range(len(document)) if isinstance(document, list) else document
+        if not isinstance(document, list | dict) or step not in places:
+            return False
+        document = document[step]  # type: ignore[index]
+    return True

@@ -1,0 +1,262 @@
+"""`Study`: many designs of one device and the measures of each; `check_study` makes it from a study document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import prod
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, plural
+from zwidth.device.toml_access import is_number, table, tables
+from zwidth.device.validation_messages import validation_messages
+from zwidth.measures.definition import Measure, Spelling, WantedWall
+from zwidth.memory_limit import check_memory
+from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
+from zwidth.study.designs.column import Column, column_named
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
+from zwidth.study.designs.study_schema import StudyFile, description, unknown
+from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of
+
+PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
+PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose values are kept as they are written
+# Argument in Python -> what it is called as a key of a study file, or of its [workspace].
+KEYS: Final[dict[str, str]] = {
+    "position": "at",
+    "stiffness": "stiffness_N_per_m",
+    "damping": "damping_Ns_per_m",
+    "frequency": "frequency_Hz",
+    "axes": "plane",
+    "cells": "count",
+}
+
+
+def as_key(name: str, value: str | None) -> str:
+    """An argument of `sweep` as a key of a study file, with its value.
+
+    >>> as_key("stiffness", None), as_key("model", "rigid")
+    ('stiffness_N_per_m', 'model = "rigid"')
+    """
+    key = KEYS.get(name, name)
+    return key if value is None else f'{key} = "{value}"'
+
+
+@dataclass(frozen=True, repr=False)
+class Study:
+    """Many designs of one device, and the measures to compute for each.
+
+    label      name of the study file, for messages
+    document   the study file as read
+    device     the device that designs are made from, with the changes of `set`
+    operators  name -> [operator] table of the operators that an axis names; None: no operator
+    sampling   the designs
+    columns    the measures, one column of the result each
+    at, direction, assembly, model   circumstances that no axis sets; None: those of the device file
+    wall       stiffness, damping and frequency that some measures need, as far as no axis sets them
+    plane      grid over the workspace; None where no measure is over it
+    spelling   how messages spell arguments: as keys of a file or as arguments in Python
+    """
+
+    label: str
+    document: dict[str, Any]
+    device: Device
+    operators: dict[str, Any]
+    sampling: Sampling
+    columns: tuple[Column, ...]
+    at: Sequence[float] | Mapping[str, float] | None = None
+    direction: Sequence[float] | None = None
+    assembly: str | None = None
+    model: str | None = None
+    wall: WantedWall = field(default_factory=WantedWall)
+    plane: PlaneGrid | None = None
+    spelling: Spelling = as_key
+
+    def __repr__(self) -> str:
+        axes = ", ".join(axis.key for axis in self.sampling.axes)
+        names = ", ".join(column.name for column in self.columns)
+        designs = plural(self.sampling.count, "design")
+        return f"Study: {designs} of {self.device.label!r} over {axes}\n  of each {names}"
+
+    @property
+    def turns(self) -> bool:
+        """Whether every design renders moments about an axis, so that stiffness is in N m/rad."""
+        varied = "direction" in [axis.key for axis in self.sampling.axes]
+        return not varied and self.device.renders_moments(self.direction)
+
+
+def check_study(
+    document: dict[str, Any],
+    label: str,
+    device: Device | None,
+    operators: dict[str, Any],
+    user_measures: Mapping[str, Measure] | None,
+    faults: Faults,
+    *,
+    plane: PlaneGrid | None = None,
+    spelling: Spelling = as_key,
+) -> Study | None:
+    """The study that a document describes; None where anything is wrong with it, which is added to `faults`.
+
+    device         with the changes of `set`; None: it could not be loaded, which the caller reports
+    operators      as in `Study`
+    user_measures  a user's measures by name; None: they could not be loaded, and no measure is looked up
+    plane          grid over the workspace; None: as the document's [workspace] says
+    Raises         TooLarge  where the designs would not fit into memory
+    """
+    checked: StudyFile | None = None
+    try:
+        checked = StudyFile.model_validate(document)
+    except ValidationError as error:
+        faults += validation_messages(error, document, description, unknown)
+    if device is not None and device.response is not None:
+        faults.append(
+            (
+                ("device",),
+                "is a measured [response], which has no numbers to vary; name another device",
+            )
+        )
+        device = None
+    columns = () if user_measures is None else _columns(document, user_measures, faults)
+    axes = axes_of(document, device, faults)
+    _check_sampling(document, faults)
+    _check_circumstances(document, device, faults)
+    plane = _plane(document, device, columns, plane, faults, spelling)
+    if faults or checked is None or device is None:
+        return None
+    hypercube = checked.sampling == "latin-hypercube"
+    _check_size(checked, hypercube)
+    study = Study(
+        label=label,
+        document=document,
+        device=device,
+        operators=operators,
+        sampling=Sampling(
+            axes,
+            checked.count if hypercube else None,
+            1 if checked.seed is None else checked.seed,
+            checked.sampling == "paired",
+        ),
+        columns=columns,
+        at=checked.at,
+        direction=checked.direction,
+        assembly=checked.assembly,
+        model=checked.model,
+        wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
+        plane=plane,
+        spelling=spelling,
+    )
+    if not study.turns:
+        return study
+    return replace(
+        study, columns=tuple(replace(one, measure=one.measure.about_moments()) for one in study.columns)
+    )
+
+
+def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], faults: Faults) -> tuple[Column, ...]:
+    """The columns whose measures exist; unknown and repeated ones are added to `faults`."""
+    names = document.get("measures")
+    columns: list[Column] = []
+    for n, name in enumerate(names if isinstance(names, list) else []):
+        if not isinstance(name, str) or not name:
+            continue
+        try:
+            column = column_named(name, user_measures)
+        except ValueError as error:
+            faults.append((("measures", n), str(error)))
+            continue
+        if column.name in [other.name for other in columns]:
+            faults.append((("measures", n), f"{column.name} is listed twice; remove one"))
+        columns.append(column)
+    return tuple(columns)
+
+
+def _check_sampling(document: dict[str, Any], faults: Faults) -> None:
+    """Add the faults of `count` and `seed`, which belong to a Latin hypercube."""
+    if document.get("sampling", "grid") == "latin-hypercube":
+        if "count" not in document:
+            faults.append((("sampling",), "'latin-hypercube' needs count, how many designs"))
+        return
+    for key in ("count", "seed"):
+        if key in document:
+            faults.append(((key,), "is read with sampling = 'latin-hypercube' only; remove it, or set that"))
+
+
+def _check_circumstances(document: dict[str, Any], device: Device | None, faults: Faults) -> None:
+    """Add the faults of circumstances that do not fit the device, or that an axis sets too."""
+    varied = {axis.get("key") for _, axis in tables(document, "axis")}
+    for key in CIRCUMSTANCES:
+        if key not in document:
+            continue
+        if key in varied:
+            faults.append(((key,), "is an axis as well; remove one of the two"))
+        right = isinstance(document[key], list if key in ("at", "direction") else str)
+        if key in ("at", "direction", "assembly") and right and document[key]:
+            components = document[key] if key != "assembly" else [0.0]
+            if all(map(is_number, components)) and (message := circumstance_fault(key, document[key], device)):
+                fault = ((key,), message)
+                # the schema may have reported this key already
+                faults += [fault] if all(path != (key,) for path, _ in faults) else []
+
+
+def _plane(
+    document: dict[str, Any],
+    device: Device | None,
+    columns: Sequence[Column],
+    plane: PlaneGrid | None,
+    faults: Faults,
+    spelling: Spelling,
+) -> PlaneGrid | None:
+    """The grid over the workspace, the same for all designs; None where no measure is over it."""
+    names = [column.name for column in columns if column.statistic]
+    if not names:
+        if (plane is not None or "workspace" in document) and columns:
+            message = f"is used only by measures over the workspace, such as average({columns[0].measure.name}); "
+            faults.append((("workspace",), message + "remove it"))
+        return None
+    if device is None or any(path[0] in ("workspace", "at", "assembly") for path, _ in faults):
+        return None
+    if device.mechanism is None:
+        faults.append(
+            (
+                ("measures",),
+                f"{names[0]} needs the workspace of a [mechanism]; this device gives its [plant] only",
+            )
+        )
+        return None
+    if plane is not None:
+        return plane
+    given = table(document, "workspace")
+    count: Any = given.get("count", 15)
+    try:
+        return plane_of(
+            device,
+            given.get("plane"),
+            given.get("through_m", document.get("at")),
+            given.get("x_m"),
+            given.get("y_m"),
+            (count, count) if isinstance(count, int) else count,
+            document.get("assembly"),
+        )
+    except PlaneError as error:
+        faults.append((("workspace",), error.spelled(spelling)))
+    except DeviceError as error:
+        faults.append((("workspace",), error.faults[0].message))
+    except ValueError as error:  # an assembly that is singular throughout, or does not close
+        faults.append((("workspace",), f"no plane can be laid through it: {error}"))
+    return None
+
+
+def _check_size(checked: StudyFile, hypercube: bool) -> None:
+    """Raises TooLarge where the designs would not fit into memory, before any of them is made."""
+    each = [len(axis.values) if axis.values is not None else axis.count or 1 for axis in checked.axis]
+    designs = (checked.count or 0) if hypercube else each[0] if checked.sampling == "paired" else prod(each)
+    ties = sum(len(axis.tie) for axis in checked.axis)
+    numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
+    check_memory(
+        float(numbers),
+        f"{plural(designs, 'design')} of {plural(len(checked.measures), 'measure')}",
+        "lower a count",
+    )

@@ -1,0 +1,146 @@
+"""From a study file to a `Study`, or to the list of everything that is wrong with it."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path as File
+from typing import Any, Final
+
+from zwidth.device import address
+from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, Fault, fail
+from zwidth.device.format_version import refuse_newer
+from zwidth.device.load import from_document, in_order
+from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
+from zwidth.device.plausibility import warn_of_implausible
+from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
+from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.toml_access import tables
+from zwidth.measures.definition import Measure
+from zwidth.measures.user_measures import load_measures
+from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.study import Study, check_study
+
+STUDIES: Final = BundledFiles("zoo", "study", "a study file", "a study needs a device, measures and an [[axis]]")
+
+
+def read_study(path: str | os.PathLike[str]) -> Study:
+    """The study that a file describes.
+
+    Raises DeviceError  with all faults of the file, those of the device file it names among them
+           TooLarge     where its designs would not fit into memory
+    """
+    label = os.fspath(path)
+    try:
+        text = read_text(label, LARGEST_FILE)
+    except UnreadableFileError as error:
+        if error.missing and label in bundled_names():
+            raise _device_instead(label, "a bundled device") from None
+        raise fail(label, "", f"{error}; give a study file") from None
+    return study_of(parse_document(text, label, STUDIES), label)
+
+
+def study_of(document: dict[str, Any], label: str = "study") -> Study:
+    """The study that a document describes.
+
+    label   what messages call it; files that it names lie beside it
+    Raises  DeviceError  with all faults found
+            TooLarge     where its designs would not fit into memory
+    """
+    refuse_newer(document, label)
+    if DEVICE_KEYS & document.keys() and not STUDY_KEYS & document.keys():
+        raise _device_instead(label, "a device")
+    faults: Faults = []
+    file_faults: list[Fault] = []  # of the files that the study names
+    folder = File(label).parent
+    device = _device(document, folder, faults, file_faults)
+    operators = axis_operators(document, folder, file_faults)
+    study = check_study(document, label, device, operators, _own_measures(document, folder, faults), faults)
+    if study is None or file_faults:
+        raise DeviceError([*in_order(faults, document, label), *file_faults])
+    return study
+
+
+def _device_instead(label: str, what: str) -> DeviceError:
+    """The fault of a device that was given as a study."""
+    name = json.dumps(File(label).name)
+    return fail(
+        label, "", f"is {what}, not a study; write a study file with device = {name}, measures and an [[axis]]"
+    )
+
+
+def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fault]) -> dict[str, Any]:
+    """The operators that an axis names, by name: their tables, None for nobody.
+
+    folder       that files are looked for in
+    file_faults  gets the faults of their files
+    """
+    operators: dict[str, Any] = {}
+    for _, axis in tables(document, "axis"):
+        values = axis.get("values")
+        for name in values if axis.get("key") == "operator" and isinstance(values, list) else []:
+            if isinstance(name, str) and name:
+                try:
+                    operators[name] = _operator(name, folder)
+                except DeviceError as error:
+                    file_faults += error.faults
+    return operators
+
+
+def _device(document: dict[str, Any], folder: File, faults: Faults, file_faults: list[Fault]) -> Device | None:
+    """The device with the study's operator and changes; None where it cannot be loaded.
+
+    faults, file_faults  get the faults of the study, and of the files that it names
+    """
+    name, operator, changes = (document.get(key) for key in ("device", "operator", "set"))
+    if not isinstance(name, str) or not name:
+        return None
+    try:
+        inner, label = read(_resolve_name(name, folder))
+    except DeviceError as error:
+        file_faults += error.faults
+        return None
+    if isinstance(operator, str) and operator:
+        try:
+            inner = with_operator(inner, _operator(operator, folder))
+        except DeviceError as error:
+            file_faults += error.faults
+    for n, change in enumerate(changes if isinstance(changes, list) else []):
+        if not isinstance(change, str):
+            continue
+        try:
+            inner = address.apply(inner, [change])
+        except DeviceError as error:
+            faults += [(("set", n), ": ".join(filter(None, (f.key, f.message)))) for f in error.faults]
+    try:
+        device = from_document(inner, label)
+    except DeviceError as error:
+        file_faults += error.faults
+        return None
+    if device.response is None:
+        warn_of_implausible(device)
+    return device
+
+
+def _own_measures(document: dict[str, Any], folder: File, faults: Faults) -> dict[str, Measure] | None:
+    """The measures of the file that the study names, by name; None where it has faults."""
+    file = document.get("measures_file")
+    if not isinstance(file, str) or not file:
+        return {}
+    try:
+        return load_measures(str(folder / file))
+    except ValueError as error:
+        faults.append((("measures_file",), str(error)))
+        return None  # a measure that is not known may be one of those
+
+
+def _operator(name: str, folder: File) -> dict[str, Any] | None:
+    """The [operator] table of a name or a file beside the study; None for nobody."""
+    return None if name == NOBODY else operator_table(_resolve_name(name, folder, OPERATORS))
+
+
+def _resolve_name(name: str, folder: File, shelf: BundledFiles = DEVICES) -> str:
+    """A bundled name as it is, any other as a file beside the study."""
+    return name if name in bundled_names(shelf) else str(folder / name)

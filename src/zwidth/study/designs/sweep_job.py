@@ -1,0 +1,406 @@
+"""The designs of a study as a job.
+
+Each design is the device file with a few numbers changed, checked and built like any other: together with others
+where that gives its values (`design_groups`), else alone. One that has faults, or does not reach the handle
+position, has a status instead of values; the other designs are not affected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+import numpy as np
+
+from zwidth.device import address
+from zwidth.device.compiled_mechanism_check import masses_moved
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, plural
+from zwidth.device.load import from_document
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import (
+    BEYOND_LIMIT,
+    FAILED,
+    MISSING,
+    NO_EQUILIBRIUM,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    Measure,
+    MeasureError,
+    MeasureValues,
+    Note,
+    Spelling,
+    WantedWall,
+    WantedWalls,
+)
+from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
+from zwidth.model.equilibrium import EquilibriumError
+from zwidth.model.load import LoadError
+from zwidth.model.posture import BeyondLimit, OutOfReach, PostureError, Singular
+from zwidth.study.designs.column import Column
+from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling, settings
+from zwidth.study.designs.study import KEYS, Study, as_key
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
+from zwidth.study.workspace.workspace_summary import areas
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
+Found: TypeAlias = tuple[float, int, str]  # value, status and reason
+WALL: Final = ("stiffness", "damping", "frequency")  # of the wanted wall, as arguments
+
+
+class _NoPoint(Exception):
+    """A design without an operating point: its status, and why."""
+
+    def __init__(self, status: int, reason: str = "") -> None:
+        self.status, self.reason = status, reason
+
+
+@dataclass(frozen=True, repr=False)
+class SweepJob:
+    """The designs of a study as cells.
+
+    document             of the device, the study's changes made
+    label                of the device, for messages
+    operators            as in `Study`
+    columns              the measures to compute
+    positions            (..., 3) of the workspace [m]; None where no column is over the workspace
+    weights              (...) area that belongs to each position [m^2]
+    fixed_circumstances  circumstances that no axis sets
+    """
+
+    document: dict[str, Any]
+    label: str
+    operators: dict[str, Any]
+    sampling: Sampling
+    columns: tuple[Column, ...]
+    positions: NDArray[np.float64] | None
+    weights: NDArray[np.float64] | None
+    fixed_circumstances: dict[str, Any]
+    _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        return f"SweepJob({plural(self.count, 'design')} of {self.label!r}: {', '.join(self.measures)})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_cache": {}}
+
+    @property
+    def count(self) -> int:
+        """Number of designs."""
+        return self.sampling.count
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Columns, as they are written in the study."""
+        return tuple(one.name for one in self.columns)
+
+    @property
+    def question(self) -> str:
+        """Fingerprint that stored results are recognised by.
+
+        Raises  TypeError  for a measure whose function was not read from a file or a module
+        """
+        return fingerprint(
+            "sweep",
+            self.document,
+            self.operators,
+            self.sampling,
+            self.columns,
+            self.positions,
+            self.fixed_circumstances,
+        )
+
+    def compute(self, first: int, last: int) -> CellValues:
+        """Designs first to last - 1: together; alone where a design has no value together, or has to say why."""
+        shape = last - first, len(self.columns)
+        values, status = np.full(shape, np.nan), np.full(shape, MISSING, dtype=np.uint8)
+        reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
+
+        def fill(row: int, column: int, found: Found) -> None:
+            values[row, column], status[row, column], reason = found
+            if reason:
+                reasons[column].setdefault((found[1], reason), []).append(first + row)
+
+        for group in self._grouping.groups(list(self._design_columns(first, last))):
+            for row, column, found in self._together(group, first):
+                fill(row, column, found)
+        for row, column in np.argwhere(status == MISSING).tolist():
+            fill(row, column, self._alone(first + row, self.columns[column]))
+        notes = [
+            tuple(
+                Note(*key, len(at), (min(at),)) for key, at in sorted(kinds.items(), key=lambda item: min(item[1]))
+            )
+            for kinds in reasons
+        ]
+        return CellValues(values, status, tuple(notes))
+
+    @cached_property
+    def _grouping(self) -> DesignGrouping:
+        return DesignGrouping(self.document, self.label, self.operators)
+
+    def _design_columns(self, first: int, last: int) -> Iterator[DesignColumn]:
+        """Each key that an axis, or a number tied to it, sets in designs first to last - 1."""
+        for axis, values, places in self.sampling.columns(first, last):
+            yield DesignColumn(axis.key, values, places)
+            for tie in axis.ties:
+                yield DesignColumn(tie.key, [tie.value(value) for value in values], places)
+
+    def _together(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
+        """Row, column and value of each design of a group that need not be asked for alone."""
+        chosen = {**self.fixed_circumstances, **group.chosen}
+        circumstances = [chosen.get(key) for key in ("direction", "assembly", "model")]
+        if isinstance(chosen.get("at"), Mapping):  # joint angles are solved for one design at a time
+            return
+        for over_workspace in (False, True):
+            columns = [n for n, one in enumerate(self.columns) if (one.statistic is not None) == over_workspace]
+            cells = self.positions[..., 0].size if over_workspace and self.positions is not None else 1
+            size = max(1, MOST_CELLS // cells)
+            for start in range(0, len(group.rows) if columns else 0, size):
+                piece = slice(start, start + size)
+                at = chosen.get("at") if group.positions is None else group.positions[piece]
+                try:
+                    point, alone = group.batch[piece].at(self.positions if over_workspace else at, *circumstances)
+                except (OutOfReach, Singular, BeyondLimit) as error:  # of the one mechanism that all of them have
+                    status = _status_of(error)
+                    missed = group.rows[piece][group.valid[piece]]
+                    yield from ((int(row), column, (np.nan, status, "")) for row in missed for column in columns)
+                    continue
+                except (PostureError, LoadError, DeviceError):
+                    continue  # each design alone says why
+                same = not group.batch.differs and (over_workspace or group.positions is None)
+                decided = group.valid[piece] & ~alone
+                if not (over_workspace or same):
+                    missed = decided & (point.status != OK)
+                    for row, status in zip(group.rows[piece][missed], point.status[missed], strict=True):
+                        yield from ((int(row), column, (np.nan, int(status), "")) for column in columns)
+                    decided &= ~missed
+                kept = np.flatnonzero(decided)
+                if not len(kept):
+                    continue
+                rows = group.rows[piece][kept]
+                point = point if same else point[kept]
+                for column in columns:
+                    found = self._measured(self.columns[column], point, first + rows, same)
+                    for row, one in zip(rows, found, strict=True):
+                        if one is not None:
+                            yield int(row), column, one
+
+    def _measured(
+        self, one: Column, point: OperatingPoint, designs: NDArray[np.int64], same: bool
+    ) -> Iterator[Found | None]:
+        """Value, status and reason of a column for each of several designs; None for one to be asked for alone.
+
+        point  of all designs along its first axis; `same`: one for all
+        """
+        measure = one.measure
+        if same and not measure.of_wall:
+            yield from [_column_value(one, measure, point, self.weights)] * len(designs)
+            return
+        together = not same and measured_together(measure, point) and (measure.of_designs or not measure.of_wall)
+        if not together:
+            for place, number in enumerate(designs):
+                wanted = measure.at_wall(self.design(int(number)).wall)
+                yield _column_value(one, wanted, point if same else point[place], self.weights)
+            return
+        try:
+            result = evaluate(measure.at_wall(self._walls(designs, point)) if measure.of_wall else measure, point)
+        except MeasureError as error:
+            yield from [(np.nan, NO_VALUE, error.spelled(as_key))] * len(designs)
+            return
+        reasons: dict[int, list[str]] = {}
+        for note in result.notes:
+            reasons.setdefault(note.status, []).append(note.reason)
+        for place in range(len(designs)):
+            values, status = result.values[place], result.status[place]
+            if one.statistic is None:
+                found = float(values), int(status), ""
+            else:
+                found = one.reduce(MeasureValues(values, status), point[place], self.weights)
+            known = reasons.get(found[1], [])
+            yield None if len(known) > 1 else (*found[:2], found[2] or "".join(known))
+
+    def _walls(self, designs: NDArray[np.int64], point: OperatingPoint) -> WantedWall | WantedWalls:
+        """The walls wanted of some designs, along the first of the points' axes."""
+        each = [self.design(int(number)).wall for number in designs]
+        if None in (each[0].stiffness, each[0].damping):  # and so of all of them
+            return each[0]
+        walls = np.array([(one.stiffness, one.damping) for one in each])
+        return WantedWalls(*walls.T.reshape(2, -1, *[1] * (len(point.shape) - 1)))
+
+    def design(self, number: int) -> Design:
+        """One of the designs, by its number from 0."""
+        return Design(self, number)
+
+    def _alone(self, number: int, one: Column) -> Found:
+        """Value, status and reason of a column for a single design."""
+        if self._cache.get("design", (None, None))[0] != number:
+            self._cache["design"] = number, self.design(number)
+        design = self._cache["design"][1]
+        try:
+            point = design.point() if one.statistic is None else design.workspace()
+        except _NoPoint as none:
+            return np.nan, none.status, none.reason
+        return _column_value(one, one.measure.at_wall(design.wall), point, self.weights)
+
+    @cached_property
+    def _in_mechanism(self) -> frozenset[str]:
+        """The axes and tied numbers that stand in [mechanism]."""
+        keys = {key for axis in self.sampling.axes for key in (axis.key, *(tie.key for tie in axis.ties))}
+        own = keys - {*CIRCUMSTANCES}
+        return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
+
+    def of_mechanism(self, chosen: dict[str, Any]) -> list[tuple[str, Any]]:
+        """Path and value of each number of a design that stands in [mechanism]."""
+        return [(key, value) for key, value in chosen.items() if key in self._in_mechanism]
+
+    def device(self, chosen: dict[str, Any]) -> Device:
+        """The device with these values of its axes; the last one is cached. Raises DeviceError."""
+        own = [(key, value) for key, value in chosen.items() if key not in CIRCUMSTANCES]
+        key = (chosen.get("operator"), own)
+        if self._cache.get("key") != key:
+            document = self._grouping.design_document(chosen)
+            # whether it can be put together shows where its posture is solved, which takes a tenth of the time
+            self._cache.update(key=key, device=from_document(document, self.label, skip_assembly_check=True))
+        return self._cache["device"]  # type: ignore[no-any-return]
+
+
+class Design:
+    """One design; its operating points are solved once, when they are first needed."""
+
+    def __init__(self, job: SweepJob, number: int) -> None:
+        self.job = job
+        self.settings = dict(settings(job.sampling.axes, job.sampling.values(number)))
+        self.points: dict[str, OperatingPoint | _NoPoint] = {}
+
+    @property
+    def wall(self) -> WantedWall:
+        """The wanted wall."""
+        return WantedWall(**{name: self._circumstance(KEYS[name]) for name in WALL})
+
+    def point(self) -> OperatingPoint:
+        """The operating point at the design's handle position. Raises _NoPoint."""
+        return self._solve_once("point", self._circumstance("at"))
+
+    def workspace(self) -> OperatingPoint:
+        """The operating points of all positions of the workspace. Raises _NoPoint."""
+        return self._solve_once("workspace", self.job.positions)
+
+    def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
+        if name not in self.points:
+            try:
+                self.points[name] = self._solve(name, positions)
+            except _NoPoint as none:
+                self.points[name] = none
+        point = self.points[name]
+        if isinstance(point, _NoPoint):
+            raise point
+        return point
+
+    def _solve(self, name: str, positions: Any) -> OperatingPoint:
+        try:
+            device = self.job.device(self.settings)
+            assembly = self._circumstance("assembly")
+            # what changes the computer or the operator alone leaves the posture as it is, but for a load
+            same = name, self._circumstance("at"), assembly, self.job.of_mechanism(self.settings)
+            kept, solved = self.job._cache.get(name, (None, None)) if device.load is None else (None, None)
+            if kept == same and isinstance(solved, _NoPoint):
+                raise solved
+            point = device.at(
+                solved if kept == same else positions,
+                self._circumstance("direction"),
+                assembly=assembly,
+                model=self._circumstance("model"),
+            )
+            if kept != same:
+                if point.posture is not None and not masses_moved(point.posture).all():
+                    from_document(device.document, device.label)  # says what is wrong
+                self.job._cache[name] = same, point.posture
+        except EquilibriumError as error:
+            raise _NoPoint(NO_EQUILIBRIUM, str(error)) from error
+        except (OutOfReach, Singular, BeyondLimit) as error:
+            none = _NoPoint(_status_of(error))
+            self.job._cache[name] = same, none
+            raise none from error
+        except (PostureError, DeviceError) as error:
+            raise _NoPoint(FAILED, _error_text(error)) from error
+        except ValueError as error:
+            raise _NoPoint(FAILED, str(error)) from error
+        return point
+
+    def _circumstance(self, key: str) -> Any:
+        return self.settings.get(key, self.job.fixed_circumstances.get(key))
+
+
+def _status_of(error: OutOfReach | Singular | BeyondLimit) -> int:
+    if isinstance(error, BeyondLimit):
+        return BEYOND_LIMIT
+    return OUT_OF_REACH if isinstance(error, OutOfReach) else SINGULAR
+
+
+def _error_text(error: Exception) -> str:
+    if not isinstance(error, DeviceError):
+        return str(error)
+    return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
+
+
+def _column_value(
+    one: Column, measure: Measure, point: OperatingPoint, weights: NDArray[np.float64] | None
+) -> tuple[float, int, str]:
+    """Value, status and reason of one column; its measure is about the design's wanted wall."""
+    try:
+        if one.statistic is not None:
+            return one.reduce(evaluate(measure, point), point, weights)
+        if measure.each:
+            status = int(point.status)
+            return (np.nan, status, "") if status != OK else evaluate_safely(lambda: measure.compute(point))
+        result = evaluate(measure, point)
+    except MeasureError as error:
+        return np.nan, NO_VALUE, error.spelled(as_key)
+    return float(result.values), int(result.status), result.notes[0].reason if result.notes else ""
+
+
+def sweep_job(study: Study) -> SweepJob:
+    """The job of a study, for which a `Store` can be made.
+
+    Raises  MeasureError  for measures that do not exist for this device, with all their names
+    """
+    wanted = {KEYS[name]: getattr(study.wall, name) for name in WALL}
+    circumstances = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
+    fixed = {key: value for key, value in circumstances.items() if value is not None}
+    plane = study.plane
+    positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
+    # the sources of a device's numbers change no result; they need not be read again for each design
+    document = {key: value for key, value in study.device.document.items() if key != "sources"}
+    columns, designs = study.columns, study.sampling
+    job = SweepJob(document, study.device.label, study.operators, designs, columns, positions, weights, fixed)
+    _check_measures(job, study.spelling)
+    return job
+
+
+def _check_measures(job: SweepJob, spelling: Spelling) -> None:
+    """Raises MeasureError where a measure exists for none of three designs: the first, the middle and the last."""
+    pending, refused = job.columns, dict[str, str]()
+    for number in sorted({0, job.count // 2, job.count - 1}):
+        design = job.design(number)
+        try:
+            point = design.point()
+        except _NoPoint:
+            continue
+        refused = {}
+        for one in pending:
+            try:
+                evaluate(one.measure.at_wall(design.wall), point)
+            except MeasureError as error:
+                refused[one.name] = error.spelled(spelling)
+        pending = tuple(one for one in pending if one.name in refused)
+    if refused:
+        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))

@@ -1,0 +1,1 @@
+"""Long computations: many cells in several processes, stored as they come, continued where they stopped."""

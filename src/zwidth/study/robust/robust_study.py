@@ -1,0 +1,300 @@
+"""Robust charts: the walls stable for every operator of a list and for all numbers within their ranges.
+
+A family with ranges has infinitely many members. It is sampled, and members that cut the chart are searched for:
+
+1. corners of the box of ranges, its centre, and Sobol's points (low discrepancy) inside;
+2. at points of the robust edge, above all where the binding member changes, the box is searched for the member
+   with the largest spectral radius (pattern search); members above 1 join, until the edge no longer moves;
+3. then further random members are tried on the robust walls, and the worst violation is stated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
+from zwidth.chart.robust.common_chart import CommonChart
+from zwidth.chart.robust.members import Member, chart_member
+from zwidth.loop.estimator import NonlinearError
+from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
+from zwidth.result import Result
+from zwidth.study.robust.family import Family, FamilyMember, RangeError, build_together
+from zwidth.study.robust.unseen_members import Violation, sample_walls, try_unseen_members
+from zwidth.study.robust.violation_search import MemberRadii, violating_members
+
+__all__ = ["RobustError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
+
+Floats = NDArray[np.float64]
+
+REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
+MEMBERS, UNSEEN = 256, 10_000  # charted, and tried afterwards
+# The same of a measured device, whose charts take seconds
+MEASURED_MEMBERS, MEASURED_UNSEEN = 24, 200
+AT_ENDS: Final = 0.5  # probability of each number of the members searched to lie at an end of its range
+
+
+class RobustError(ValueError):
+    """No member of the family can be built and charted."""
+
+
+@dataclass(frozen=True)
+class RobustStudy(Result):
+    """A robust chart with its members and the evidence that it holds for the whole family.
+
+    chart        of all members
+    members      path -> value of each; those in `chart.failed` could not be built or charted
+    sampled      number of members before the search; it found the others
+    rounds       number of rounds of the search
+    area_change  share of the area by which the last round moved the edge; 0 if it found no member
+    settled      whether the search ended because no member that it found moves the edge by more than the tolerance
+    violation    random members tried; None for a list without ranges, which is charted whole, and where no wall
+                 is stable
+    """
+
+    chart: CommonChart
+    members: tuple[dict[str, Any], ...]
+    sampled: int
+    rounds: int
+    area_change: float
+    settled: bool
+    violation: Violation | None
+
+    @property
+    def edge_shares(self) -> dict[int, float]:
+        """Member -> share of the edge's length at which it binds, on the chart as drawn; the largest first."""
+        if not self.chart.boundary:
+            return {}
+        size = np.ptp(np.vstack(self.chart.regions), axis=0)
+        lengths: dict[int, float] = {}
+        for arc in self.chart.boundary:
+            length = float(np.hypot(np.diff(arc.stiffness) / size[0], np.diff(arc.damping) / size[1]).sum())
+            lengths[arc.member] = lengths.get(arc.member, 0.0) + length
+        total = sum(lengths.values())
+        return {
+            member: lengths[member] / total for member in sorted(lengths, key=lambda one: (-lengths[one], one))
+        }
+
+    def document(self) -> dict[str, Any]:
+        """The chart, its members and the search by key and unit."""
+        search = {
+            "sampled": self.sampled,
+            "rounds": self.rounds,
+            "moved_share": self.area_change,
+            "settled": self.settled,
+        }
+        violation = None if self.violation is None else self.violation.document()
+        return self.chart.document() | {"members": list(self.members), "search": search, "violation": violation}
+
+    def table(self) -> dict[str, list[Any]]:
+        """The robust set's edge as columns, its arcs one after another and counted from 0."""
+        return self.chart.table()
+
+    def __repr__(self) -> str:
+        chart, violation = self.chart, self.violation
+        lines = [f"{len(self.members)} members, {len(chart.binding)} of which bind"]
+        if chart.members_at_stiffness_max:
+            stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m"
+            lines.append(f"largest stiffness stable for all {stiffest}")
+            lines.append(
+                f"{chart.lost_stiffness_share:.2%} less than the best member has, {chart.lost_share:.2%} less area"
+            )
+        else:
+            lines.append("no wall with K > 0 and B >= 0 is stable for all")
+        if violation is not None:
+            lines.append(
+                f"{violation.violating} of {violation.unseen} unseen members find one of the walls unstable"
+            )
+        return "RobustStudy: " + "\n  ".join(lines)
+
+
+def robust_study(
+    family: Family,
+    members: int | None = None,
+    unseen: int | None = None,
+    seed: int = 1,
+    tolerance: float = 1e-4,
+    progress: Progress | None = None,
+) -> RobustStudy:
+    """The robust chart of a family of devices.
+
+    members    largest number of members charted; a list of operators without ranges is charted whole. Left out:
+               256, of a measured device 24
+    unseen     number of random members tried afterwards (see `Violation`). Left out: 10000, of a measured device
+               200
+    seed       seed of all random numbers: equal seeds give equal answers
+    tolerance  the search ends with a round that changes the area by a smaller share
+    Raises     RangeError      for ranges that cannot be used
+               DeviceError     for operators that cannot be read
+               RobustError     if no member can be built and charted
+               NonlinearError  for a velocity estimate that is not linear
+
+    Of a measured device, see `robust_measured`.
+
+    >>> from zwidth.device.load import from_document
+    >>> from zwidth.study.robust.family import Family, Range, build_together
+    >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
+    >>> mass = Range("plant.mass_kg", 0.1, 0.3)
+    >>> study = robust_study(Family(plain, (mass,), (), plain.at()), 8, 100)
+    >>> round(study.chart.stiffness_max, 2), study.violation.violating    # the lightest mass binds
+    (68629.15, 0)
+    """
+    require("family", family, Family)
+    progress = progress or (lambda stage, done, of: None)
+    if family.operating_point.response is not None:
+        return _measured_study(family, members or MEASURED_MEMBERS, unseen or MEASURED_UNSEEN, seed, progress)
+    members, unseen = members or MEMBERS, unseen or UNSEEN
+    if faults := family.faults():
+        raise RangeError(faults)
+    charted = _Members(family, progress)
+    points = list(_sample(family, members, seed))
+    charted.add(points, "members")
+    chart, radii = charted.chart(), MemberRadii(family)
+    rounds, area_change, settled = 0, 0.0, not family.free
+    while not settled and len(charted.points) < members and chart.regions:
+        charted.progress("search", rounds, rounds + 1)
+        new_members = violating_members(radii, charted.points, chart)[: members - len(charted.points)]
+        if not new_members:
+            area_change, settled = 0.0, True
+            break
+        rounds += 1
+        charted.add(new_members, "members")
+        before, chart = chart, charted.chart()
+        area_change = _area_change(before, chart)
+        settled = area_change < tolerance
+    return RobustStudy(
+        chart=chart,
+        members=tuple(family.values(point) for point in charted.points),
+        sampled=len(points),
+        rounds=rounds,
+        area_change=area_change,
+        settled=settled,
+        violation=_violation(charted, chart, unseen, seed),
+    ).about(family.operating_point)
+
+
+class _Members:
+    """The members of a family that were charted so far, each once."""
+
+    def __init__(self, family: Family, progress: Progress) -> None:
+        self.family, self.progress = family, progress
+        self.points: list[FamilyMember] = []
+        self.charted: dict[int, Member] = {}
+        self.failed: dict[int, str] = {}
+
+    def add(self, points: list[FamilyMember], stage: str) -> None:
+        """Build and chart more members; those that fail are kept with the reason."""
+        build_together(self.family, points)
+        for done, point in enumerate(points):
+            self.progress(stage, done, len(points))
+            index = len(self.points)
+            self.points.append(point)
+            try:
+                self.charted[index] = chart_member(index, self.family.loop(point))
+            except NonlinearError:  # the velocity estimate is the same for every member
+                raise
+            except (ValueError, ChartError, np.linalg.LinAlgError) as error:
+                self.failed[index] = str(error)
+        self.progress(stage, len(points), len(points))
+
+    def chart(self) -> RobustChart:
+        """The robust chart of all members so far. Raises RobustError if none could be charted."""
+        if not self.charted:
+            reason = next(iter(self.failed.values()))
+            raise RobustError(f"none of {len(self.points)} members could be charted; the first: {reason}")
+        return robust_chart_of_members(dict(self.charted), dict(self.failed))
+
+
+def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
+    """Corners, centre and Sobol's points of the ranges, for every operator."""
+    from scipy.stats import qmc
+
+    free, operators = family.free, max(len(family.operators), 1)
+    count = max(int(members * (1.0 - REFINING)) // operators, 1) if free else 1
+    shares = [np.full(len(free), 0.5)]
+    if 2 ** len(free) <= count // 2:
+        shares += [np.array(corner, dtype=float) for corner in product((0.0, 1.0), repeat=len(free))]
+    if free and count > len(shares):
+        sobol = qmc.Sobol(len(free), scramble=True, seed=seed)
+        inside = sobol.random_base2(int(np.ceil(np.log2(count))) + 1)
+        if len(shares) == 1:  # too many corners: those nearest the first points
+            corners = np.unique(np.round(inside), axis=0)
+            shares += list(corners[: count // 2])
+        shares += list(inside[: count - len(shares)])
+    for operator in range(operators):
+        for place in shares[:count]:
+            yield family.member(operator, place)
+
+
+def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation | None:
+    """What random members say of the robust walls; None where there are no ranges, or no walls."""
+    if not charted.family.free or not chart.regions:
+        return None
+    return try_unseen_members(charted.family, chart, unseen, seed, charted.progress)
+
+
+def _measured_study(family: Family, members: int, unseen: int, seed: int, progress: Progress) -> RobustStudy:
+    """The robust chart of a family of a measured device.
+
+    Of ranges, random members join one by one, the one first that runs deepest into the robust walls (see
+    `unseen_measured`), until none of them does; then as many others are tried.
+    """
+    from zwidth.study.robust.measured_family import MeasuredFamily, MeasuredMember, MeasuredMembers
+    from zwidth.study.robust.unseen_measured import (
+        DEPTH,
+        intrusions,
+        random_measured_members,
+        violation_of_measured,
+    )
+
+    measured = MeasuredFamily(family)
+    measured.check()
+    charted = MeasuredMembers(measured, progress)
+    places = list(_sample(family, max(members // len(measured.sweeps), 1), seed))
+    points = [MeasuredMember(place, sweep) for place in places for sweep in measured.sweeps]
+    charted.add(points)
+    try:
+        chart = charted.chart()
+    except ChartError as error:
+        raise RobustError(str(error)) from None
+    rounds, area_change, settled = 0, 0.0, not family.free
+    tried = list(random_measured_members(measured, unseen, [seed, 2], AT_ENDS)) if family.free else []
+    while not settled and chart.regions:
+        deep = {place: one.depth for place, one in intrusions(measured, chart, tried, progress).items()}
+        tried = [one for place, one in enumerate(tried) if deep.get(place, 0.0) > DEPTH]
+        if not tried:
+            area_change, settled = 0.0, True
+        elif len(charted.points) >= members:
+            break
+        else:
+            rounds += 1
+            kept = [depth for depth in deep.values() if depth > DEPTH]
+            charted.add([tried.pop(int(np.argmax(kept)))])
+            before, chart = chart, charted.chart()
+            area_change = _area_change(before, chart)
+    violation = None
+    if family.free and chart.regions:
+        violation = violation_of_measured(measured, chart, unseen, seed, progress)
+    return RobustStudy(
+        chart=chart,
+        members=tuple(measured.values(point) for point in charted.points),
+        sampled=len(points),
+        rounds=rounds,
+        area_change=area_change,
+        settled=settled,
+        violation=violation,
+    ).about(family.operating_point)
+
+
+def _area_change(before: CommonChart, after: CommonChart) -> float:
+    """Share by which the area of the whole set became smaller."""
+    areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
+    return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0

@@ -1,0 +1,265 @@
+"""Sensitivities: by how much the largest stiffness changes with each number of a device and its loop.
+
+    e = d ln K_max / d ln p = (p / K_max) dK_max/dp,       + 1 % of p gives + e % of K_max
+
+The stiffest wall is not searched again for each number: to first order it moves as the edge on which it lies
+(`optimum`). The device is built again with the number slightly larger and smaller, together for all numbers
+(`changed_devices`), and the motion of the edge is differenced (`derivative`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Any, Final
+
+import numpy as np
+
+from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.device import address
+from zwidth.device.build_nonlinear import nonlinear_kind
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError, KeyPath, dotted
+from zwidth.device.load import device_of_point
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
+from zwidth.study.sensitivity.changed_devices import Change, ChangedDevices
+from zwidth.study.sensitivity.derivative import Derivative, central_derivative, one_sided_derivative
+from zwidth.study.sensitivity.measured_sensitivities import measured_sensitivities
+from zwidth.study.sensitivity.number_text import number_obstacle, number_unit
+from zwidth.study.sensitivity.optimum import OptimumError, optimum, second_peak_stiffness
+from zwidth.study.sensitivity.result import Group, Sensitivities, Sensitivity
+
+# Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
+NO_PROPERTY: Final = {
+    "assemblies": "an approximate angle from which the posture is found",
+    "reference": "the operating point, not a property of the device",
+    "workspace": "the operating point, not a property of the device",
+}
+ZERO: Final = "0 has no logarithm; the derivative by the number itself is given instead"
+WORTHLESS: Final = 1e-3  # largest estimated error of a derivative, per relative change; above it none is given
+
+
+def sensitivities(
+    device: Device, point: OperatingPoint | None = None, progress: Progress | None = None
+) -> Sensitivities:
+    """Sensitivity of the largest stiffness to every number of the device file, and to the delay if it gives none.
+
+    point     the operating point, one posture and one direction; left out: the device's reference. While a link's
+              length changes, a posture given by the handle's position keeps the position, one given by joint
+              angles keeps the angles
+    progress  called with "numbers", those that are done, and all of them
+
+    Numbers that cannot be varied, such as whole ones, are reported with the reason. Accuracy: derivatives are
+    extrapolated differences at relative steps of 2e-3 and less, good to about 1e-9 of d ln K_max / d ln p where
+    the device's modes are damped; `error` estimates it for each.
+
+    Raises  what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device itself cannot be charted
+
+    >>> from zwidth.device.load import from_document
+    >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
+    >>> [(n.path, round(n.logarithmic, 6)) for n in sensitivities(plain).numbers][:2]
+    [('loop.sampling_period_s', -2.0), ('plant.mass_kg', 1.0)]
+    """
+    require("device", device, Device)
+    operating_point = point or device.at()
+    device = device_of_point(device, operating_point)
+    if operating_point.response is not None:
+        return measured_sensitivities(device, operating_point, progress)
+    loop = operating_point.loop
+    peak = largest_stiffness(loop)
+    left_out = dict(_left_out(device.document))
+    if peak is None:
+        return Sensitivities(None, None, (), (), left_out, nan)
+    try:
+        stiffest, obstacle = optimum(loop, peak), ""
+    except OptimumError as error:
+        stiffest, obstacle = None, str(error)
+    numbers, varied = [], list(_numbers(device.document))
+    changed = None
+    if stiffest is not None:
+        changes = dict(_changes(device.document, varied))
+        changed = ChangedDevices(device, operating_point, stiffest, changes)
+    derivatives = _StiffnessDerivatives(device, changed, obstacle)
+    for number in varied:
+        numbers.append(derivatives.sensitivity(*number))
+        if progress is not None:
+            progress("numbers", len(numbers), len(varied))
+    groups = derivatives.groups({number.path: number for number in numbers})
+    return Sensitivities(
+        peak=peak,
+        kind=None if stiffest is None else stiffest.kind,
+        numbers=tuple(sorted(numbers, key=_rank)),
+        groups=tuple(sorted(groups, key=lambda group: -abs(group.logarithmic))),
+        left_out=left_out,
+        second_peak=second_peak_stiffness(stability_chart(loop, decay=False)),
+    )
+
+
+def _rank(number: Sensitivity) -> tuple[bool, float, bool, float]:
+    """Sorting key: largest first, then numbers of value 0 by their derivative, then those without a result."""
+    known, slope = not isnan(number.logarithmic), not isnan(number.derivative)
+    return (
+        not known,
+        -abs(number.logarithmic) if known else 0.0,
+        not slope,
+        -abs(number.derivative) if slope else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class _StiffnessDerivatives:
+    """Derivatives of the largest stiffness by changes of the device's numbers.
+
+    changed  the device with each change; None where the stiffest wall has no derivative, for the reason `obstacle`
+    """
+
+    device: Device
+    changed: ChangedDevices | None
+    obstacle: str
+
+    def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
+        """The sensitivity to one number; of a number that cannot be varied, with the reason."""
+        unit, reason = number_unit(steps), number_obstacle(steps, value)
+        slope, side = Derivative(nan, nan), ""
+        if not reason:
+            slope, side, reason = self._slope(path)
+        if self.changed is None or reason:
+            return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
+        K, scale = self.changed.optimum.peak.stiffness, self.changed.changes[path].scale
+        if value == 0.0:
+            return Sensitivity(path, value, unit, nan, slope.value * K, slope.error * K, side, ZERO)
+        return Sensitivity(path, value, unit, slope.value * value, slope.value * K, slope.error * scale, side)
+
+    def groups(self, by_path: dict[str, Sensitivity]) -> Iterator[Group]:
+        """The groups of numbers. A plant's matrix is scaled as a whole: a free plant stays free."""
+        for name, paths in _groups(self.device.document).items():
+            parts = [by_path[path] for path in paths if by_path[path].value != 0.0]
+            if len(parts) < 2:
+                continue
+            total = float(sum(part.logarithmic for part in parts))
+            if name.startswith("plant."):
+                total = self._slope(name)[0].value
+            yield Group(name, tuple(paths), total)
+
+    def _slope(self, name: str) -> tuple[Derivative, str, str]:
+        """Derivative of ln K_max by a change, its side, and "" or the reason why there is none. It is taken from
+        both sides where these are alike, else from above, else from below.
+
+        A delay that crosses whole samples changes the form of the loop, and the largest stiffness bends there.
+        """
+        if self.changed is None:
+            return Derivative(nan, nan), "", self.obstacle
+        changed, change, delays = self.changed, self.changed.changes[name], dict[int, tuple[int, bool]]()
+
+        def stiffness(argument: float) -> float:
+            loop = changed.loop(name, argument)
+            delays[int(np.sign(argument - change.at))] = loop.delay
+            return loop.stiffness / changed.optimum.peak.stiffness
+
+        reason = ""
+        for side, sign in (("both", 0), ("above", 1), ("below", -1)):
+            try:
+                slope = (
+                    one_sided_derivative(stiffness, change.at, change.scale, sign)
+                    if sign
+                    else central_derivative(stiffness, change.at, change.scale)
+                )
+            except DeviceError as error:
+                reason = reason or error.faults[0].message
+                continue
+            except (ValueError, np.linalg.LinAlgError) as error:
+                reason = reason or str(error)
+                continue
+            if side == "both" and delays[-1] != delays[1]:
+                continue
+            if slope.error * change.scale <= WORTHLESS * max(1.0, abs(slope.value) * change.scale):
+                return slope, side, ""
+            reason = reason or "it changes too abruptly here to have a derivative"
+        return Derivative(nan, nan), "", reason
+
+
+def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]]) -> Iterator[tuple[str, Change]]:
+    """Each number that can be varied, by its path; and the matrices and vectors of a plant, scaled as wholes."""
+    for path, steps, value in varied:
+        if not number_obstacle(steps, value):
+            yield path, Change(tuple(_places(document, steps, 1.0)), value, abs(value) or _scale(document, steps))
+    known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
+    for name, paths in _groups(document).items():
+        if name.startswith("plant."):
+            parts = [known[path] for path in paths if path in known]
+            yield name, Change(tuple(place for part in parts for place in _places(document, *part)), 1.0, 1.0)
+
+
+def _places(document: dict[str, Any], steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
+    """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
+    yield steps, multiple
+    if _is_matrix(document, steps) and steps[-1] != steps[-2]:
+        yield (*steps[:-2], steps[-1], steps[-2]), multiple
+
+
+def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
+    """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
+    and above the diagonal."""
+    for steps, value in address.numbers(document):
+        if not _no_property(steps) and not _mirrored(document, steps):
+            yield dotted(steps, document), steps, float(value)
+    if not {"delay_samples", "delay_s"} & document.get("loop", {}).keys():
+        yield "loop.delay_samples", ("loop", "delay_samples"), 0.0
+
+
+def _no_property(steps: KeyPath) -> str:
+    """Why a number is not a property of the linear device; "" if it is one."""
+    if what := nonlinear_kind(steps):
+        return f"{what}, which the chart leaves out: it is linear"
+    return NO_PROPERTY.get(str(steps[1]), "") if steps[0] == "mechanism" and len(steps) > 1 else ""
+
+
+def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Dotted path of each number that is not a property of the linear device, and why."""
+    for steps, _ in address.numbers(document):
+        if reason := _no_property(steps):
+            yield dotted(steps, document), reason
+
+
+def _mirrored(document: dict[str, Any], steps: KeyPath) -> bool:
+    """Whether the path is an element below the diagonal of a matrix."""
+    return _is_matrix(document, steps) and int(steps[-2]) > int(steps[-1])
+
+
+def _is_matrix(document: dict[str, Any], steps: KeyPath) -> bool:
+    return len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int)
+
+
+def _scale(document: dict[str, Any], steps: KeyPath) -> float:
+    """Step scale of a number that is 0: the largest number of its list, else of its unit in the file, else 1."""
+    if steps[-1] == "delay_samples":
+        return 1.0
+    beside = [abs(v) for path, v in address.numbers(document) if _key(path) == _key(steps) and path[0] == steps[0]]
+    alike = [
+        abs(v)
+        for path, v in address.numbers(document)
+        if number_unit(path) == number_unit(steps) and np.isfinite(v)
+    ]
+    return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
+
+
+def _key(steps: KeyPath) -> str:
+    return next(str(step) for step in reversed(steps) if isinstance(step, str))
+
+
+def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
+    """Path -> paths of its members: each list and matrix, and each key over all elements of a list of tables."""
+    members: dict[str, list[str]] = {}
+    for path, steps, _ in _numbers(document):
+        whole = steps
+        while whole and isinstance(whole[-1], int):
+            whole = whole[:-1]
+        names = [dotted(whole, document)] if whole != steps else []
+        if any(isinstance(step, int) for step in whole):
+            names.append(".".join("*" if isinstance(step, int) else step for step in whole))
+        for name in names:
+            members.setdefault(name, []).append(path)
+    return members

@@ -1,0 +1,1 @@
+"""Measures over the workspace: maps, areas with required properties, directions."""

@@ -1,0 +1,306 @@
+"""Worst, best, lowest or highest value of a measure over the directions at each point.
+
+A measure m(u) of a direction u is computed at samples of all directions in which the handle can move: a line, a
+plane, or space. Between the samples the extreme is refined, by golden sections in the plane and by a compass
+search on the sphere, for all points at once. Where a second extreme comes near the first in the samples, both are
+refined, since the samples do not tell which is the larger.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import MISSING, OK, Measure, MeasureError, MeasureValues, Note
+from zwidth.measures.evaluate import NO_MECHANISM, evaluate
+from zwidth.study.workspace.direction_search import DirectionSearch, Floats, Ints, direction_searches
+
+Extreme = Literal["worst", "best", "lowest", "highest"]
+EXTREMES: Final = ("worst", "best", "lowest", "highest")
+
+IN_PLANE: Final = 24  # samples of a half circle
+ON_SPHERE: Final = 128  # samples of a half sphere
+GOLDEN: Final = 0.5 * (np.sqrt(5.0) - 1.0)
+SECTIONS: Final = 22  # 2 x 7.5 degrees x 0.618^22 = 7e-6 rad
+COMPASS: Final = 60  # rounds
+FINEST: Final = 3e-6  # rad, where a compass search ends
+NEAR: Final = 0.1  # share of the values' spread within which a second extreme is refined, too
+CHUNK: Final = 4096  # points computed at once
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class DirectionExtreme:
+    """The extreme of a measure over the directions at each point.
+
+    extreme    the extreme values, of the points' shape (...)
+    direction  (..., 3) unit vectors along which they are reached; nan where there is none, or none counts
+    """
+
+    extreme: MeasureValues
+    direction: Floats
+
+
+def extreme_over_directions(measure: Measure, point: OperatingPoint, extreme: Extreme) -> DirectionExtreme:
+    """A measure along that direction of each point in which it is worst, best, lowest or highest.
+
+    Directions are those in which the handle can move. A direction and its opposite count as one unless the measure
+    tells them apart; then both are computed. A point at which one direction has no value has no worst value; for
+    the other extremes such directions are left out. A note says so in both cases. The direction is found to 1e-5
+    rad, and so a smooth measure's extreme to 1e-10 of its curvature; where a measure grows without bound about a
+    direction, as stiffness does along a rigid drive, a very large number stands for it.
+
+    Raises  MeasureError  for a device given by its plant, or "worst" and "best" of a measure of which neither more
+                          nor less is better
+    """
+    if point.posture is None:
+        raise MeasureError(NO_MECHANISM)
+    row = point.flat
+    if not measure.along:
+        return DirectionExtreme(evaluate(measure, point), np.full((*point.shape, 3), np.nan))
+    goal = _Goal(extreme_sign(measure, extreme), extreme == "worst")
+    values, direction = np.full(row.shape, np.nan), np.full((*row.shape, 3), np.nan)
+    status = row.status.copy()
+    for which, search in direction_searches(measure, row):
+        for first in range(0, len(which), CHUNK):
+            indices = np.arange(first, min(first + CHUNK, len(which)))
+            at = which[indices]
+            values[at], direction[at], status[at] = _SEARCH[search.basis.shape[2]](search, indices, goal, which)
+    shape = point.shape
+    notes = goal.notes(shape)
+    return DirectionExtreme(
+        MeasureValues(values.reshape(shape), status.reshape(shape), notes), direction.reshape((*shape, 3))
+    )
+
+
+def extreme_sign(measure: Measure, extreme: Extreme) -> float:
+    """1 where the lowest value is looked for, -1 where the highest. Raises MeasureError where `better` is None."""
+    if extreme in ("lowest", "highest"):
+        return 1.0 if extreme == "lowest" else -1.0
+    if measure.better is None:
+        raise MeasureError("has no better side, higher or lower; ask for its lowest or highest direction")
+    return 1.0 if (measure.better == "higher") == (extreme == "worst") else -1.0
+
+
+class _Goal:
+    """The extreme to look for, and the points at which there is none.
+
+    sign    1: the lowest value, -1: the highest
+    strict  a point with one direction without a value has no value
+    """
+
+    def __init__(self, sign: float, strict: bool) -> None:
+        self.sign, self.strict = sign, strict
+        self.points_by_reason: dict[tuple[int, str], list[int]] = {}
+
+    def cost(self, values: Floats) -> Floats:
+        """The function to minimise; inf where there is no value."""
+        return np.where(np.isnan(values), np.inf, self.sign * values)
+
+    def status(self, values: MeasureValues, status: NDArray[np.uint8], which: Ints) -> NDArray[np.uint8]:
+        """Status (n,) of points, from the status of their samples; reasons are kept for `notes`.
+
+        values  the measure at all samples
+        status  (s, n)  its status at s directions of n points
+        which   (n,)    indices of the points
+        """
+        none = status != OK
+        if not none.any():
+            return np.full(len(which), OK, dtype=np.uint8)
+        reasons = {note.status: note.reason for note in reversed(values.notes)}
+        everywhere = none.all(axis=0)
+        # of several kinds the least: a point has no value rather than an undecided one
+        kind = np.where(none, status, MISSING).min(axis=0)
+        some = "along some directions: " if self.strict else "along some directions, which are left out: "
+        for label, here in (("", everywhere), (some, none.any(axis=0) & ~everywhere)):
+            for k in np.unique(kind[here]):
+                reason = label + reasons.get(int(k), "has no value here")
+                self.points_by_reason.setdefault((int(k), reason), []).extend(which[here & (kind == k)].tolist())
+        return np.where(none.any(axis=0) if self.strict else everywhere, kind, OK).astype(np.uint8)
+
+    def notes(self, shape: tuple[int, ...]) -> tuple[Note, ...]:
+        """A note for each reason, with the points' leading axes."""
+        return tuple(
+            Note(status, reason, len(places), tuple(int(i) for i in np.unravel_index(min(places), shape)))
+            for (status, reason), places in self.points_by_reason.items()
+        )
+
+
+SearchResult = tuple[Floats, Floats, NDArray[np.uint8]]
+
+
+def _in_line(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+    components = np.array([[1.0], [-1.0]]) if search.one_sided else np.array([[1.0]])
+    f, status = _sampled(search, indices, components, goal, which)
+    best = f.argmin(axis=0)
+    return _search_result(search, indices, goal.sign * f.min(axis=0), components[best], status)
+
+
+def _in_plane(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+    count = 2 * IN_PLANE if search.one_sided else IN_PLANE
+    step = float(np.pi / IN_PLANE)
+    angles: Floats = np.asarray(step * np.arange(count), dtype=np.float64)
+    f, status = _sampled(search, indices, _unit_vectors(angles), goal, which)
+    expected, n = _parabola_minimum(f), np.arange(len(indices))
+    k = expected.argmin(axis=0)
+    lowest = f[k, n]
+    # a local minimum elsewhere, expected to be nearly as low
+    second = expected.copy()
+    for turn in (-1, 0, 1):
+        second[(k + turn) % count, n] = np.inf
+    also = np.flatnonzero(second.min(axis=0) <= expected.min(axis=0) + NEAR * _spread(f))
+    start = np.concatenate([angles[k], angles[second.argmin(axis=0)[also]]])
+    place = np.concatenate([n, also])
+    keep = np.isfinite(lowest[place])
+    start, place = start[keep], place[keep]
+
+    def cost(angle: Floats) -> Floats:
+        return goal.cost(search.evaluate_along(indices[place], _unit_vectors(angle)).values)
+
+    angle, value = _golden(cost, start - step, start + step)
+    best_angle: Floats = angles[k]
+    best = lowest.copy()
+    for rows in (slice(0, int(keep[: len(n)].sum())), slice(int(keep[: len(n)].sum()), len(place))):
+        better = value[rows] < best[place[rows]]
+        best[place[rows][better]] = value[rows][better]
+        best_angle[place[rows][better]] = angle[rows][better]
+    return _search_result(search, indices, goal.sign * best, _unit_vectors(best_angle), status)
+
+
+def _parabola_minimum(f: Floats) -> Floats:
+    """How low each local minimum (s, n) lies by the parabola through its neighbours; inf where there is none."""
+    left, right = np.roll(f, 1, axis=0), np.roll(f, -1, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        vertex = f - 0.125 * (left - right) ** 2 / (left - 2.0 * f + right)
+    return np.where((f <= left) & (f <= right), np.where(np.isfinite(vertex), vertex, f), np.inf)
+
+
+def _golden(cost, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
+    """Argument and value of the minimum of each function between its bounds, by golden sections."""
+    a, b = low.copy(), high.copy()
+    c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    at_c, at_d = cost(c), cost(d)
+    for _ in range(SECTIONS):
+        left = at_c < at_d
+        a, b = np.where(left, a, c), np.where(left, d, b)
+        old, at_old = np.where(left, c, d), np.where(left, at_c, at_d)
+        new = np.where(left, b - GOLDEN * (b - a), a + GOLDEN * (b - a))
+        at_new = cost(new)
+        c, d = np.where(left, new, old), np.where(left, old, new)
+        at_c, at_d = np.where(left, at_new, at_old), np.where(left, at_old, at_new)
+    left = at_c < at_d
+    return np.where(left, c, d), np.where(left, at_c, at_d)
+
+
+def _on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+    points = sphere(2 * ON_SPHERE)
+    points = points if search.one_sided else points[:ON_SPHERE]
+    reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))
+    f, status = _sampled(search, indices, points, goal, which)
+    k, n = f.argmin(axis=0), np.arange(len(indices))
+    lowest = f[k, n]
+    cosine = points @ points[k].T
+    near = cosine > np.cos(2.0 * reach) if search.one_sided else np.abs(cosine) > np.cos(2.0 * reach)
+    second = np.where(near, np.inf, f)
+    also = np.flatnonzero(second.min(axis=0) <= lowest + NEAR * _spread(f))
+    start = np.concatenate([points[k], points[second.argmin(axis=0)[also]]])
+    place = np.concatenate([n, also])
+    value = np.concatenate([lowest, second.min(axis=0)[also]])
+    keep = np.isfinite(value)
+    start, place, value = start[keep], place[keep], value[keep]
+    end, value = _compass(search, indices[place], start, value, goal, 0.6 * reach)
+    best, best_point = lowest.copy(), points[k].copy()
+    split = int(keep[: len(n)].sum())
+    for rows in (slice(0, split), slice(split, len(place))):
+        better = value[rows] < best[place[rows]]
+        best[place[rows][better]] = value[rows][better]
+        best_point[place[rows][better]] = end[rows][better]
+    return _search_result(search, indices, goal.sign * best, best_point, status)
+
+
+def _compass(
+    search: DirectionSearch, place: Ints, u: Floats, value: Floats, goal: _Goal, reach: float
+) -> tuple[Floats, Floats]:
+    """Compass search from directions u (n, 3): step to the lowest of eight directions around each, at an angle
+    that begins at `reach` [rad] and is halved where none of them is lower. Returns directions and values.
+
+    place  (n,)  index of the point of each direction
+    """
+    u, value, step = u.copy(), value.copy(), np.full(len(u), reach)
+    for turn in range(COMPASS):
+        busy = np.flatnonzero(step > FINEST)
+        if not len(busy):
+            break
+        p, q = _tangents(u[busy])
+        angle = 0.25 * np.pi * np.arange(8) + turn  # no axis is preferred
+        out = np.cos(angle)[:, None, None] * p + np.sin(angle)[:, None, None] * q
+        trial = np.cos(step[busy])[:, None] * u[busy] + np.sin(step[busy])[:, None] * out
+        values = search.evaluate_along(np.tile(place[busy], 8), trial.reshape(-1, 3)).values.reshape(8, -1)
+        f = goal.cost(values)
+        k, n = f.argmin(axis=0), np.arange(len(busy))
+        better = f[k, n] < value[busy]
+        improved = busy[better]
+        u[improved] = trial[k, n][better]
+        value[improved] = f[k, n][better]
+        step[busy[~better]] *= 0.5
+    return u, value
+
+
+def _tangents(u: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (n, 3) each, at right angles to each of these (n, 3) and to each other."""
+    axis = np.eye(3)[np.abs(u).argmin(axis=1)]
+    p = np.cross(u, axis)
+    p /= np.linalg.norm(p, axis=1, keepdims=True)
+    return p, np.cross(u, p)
+
+
+def sphere(count: int) -> Floats:
+    """Points (count, 3) spread evenly over the unit sphere, the first half of them over its upper half.
+
+    Fibonacci's spiral: equal steps along the axis, the golden angle round it.
+    """
+    k = np.arange(count)
+    z = 1.0 - (2.0 * k + 1.0) / count
+    angle = 2.0 * np.pi * GOLDEN * k
+    r = np.sqrt(1.0 - z * z)
+    return np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=-1)
+
+
+def _unit_vectors(angle: Floats) -> Floats:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _sampled(
+    search: DirectionSearch, indices: Ints, components: Floats, goal: _Goal, which: Ints
+) -> tuple[Floats, NDArray[np.uint8]]:
+    """Cost (s, n) of s directions at n points, inf where there is no value; status (n,)."""
+    s, n = len(components), len(indices)
+    samples = search.evaluate_along(np.tile(indices, s), np.repeat(components, n, axis=0))
+    status = goal.status(samples, samples.status.reshape(s, n), which[indices])
+    return goal.cost(samples.values.reshape(s, n)), status
+
+
+def _spread(f: Floats) -> Floats:
+    """Highest minus lowest finite value of each column of f (s, n), (n,); 0 where there is none."""
+    finite = np.isfinite(f)
+    high, low = np.where(finite, f, -np.inf).max(axis=0), np.where(finite, f, np.inf).min(axis=0)
+    return np.where(finite.any(axis=0), high - low, 0.0)
+
+
+def _search_result(
+    search: DirectionSearch, indices: Ints, values: Floats, components: Floats, status: NDArray[np.uint8]
+) -> SearchResult:
+    u = search.directions(indices, components)
+    if not search.one_sided:  # of a direction and its opposite, the one that points along the first axis it can
+        lead = np.take_along_axis(u, (np.abs(u) > 1e-9).argmax(axis=1)[:, None], axis=1)
+        u = u * np.where(lead < 0.0, -1.0, 1.0)
+    none = status != OK
+    return np.where(none, np.nan, values), np.where(none[:, None], np.nan, u), status
+
+
+_SEARCH: Final = {1: _in_line, 2: _in_plane, 3: _on_sphere}

@@ -1,0 +1,332 @@
+"""Maps: measures all over a plane of the workspace."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.catalogue import find_measure
+from zwidth.measures.definition import NO_POSTURE, STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
+from zwidth.measures.evaluate import evaluate
+from zwidth.model.argument_checks import require
+from zwidth.processors import Processor
+from zwidth.progress import Progress
+from zwidth.study.designs.column import measure_list, unit_attributes
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
+from zwidth.study.jobs.store import Store, store_for
+from zwidth.study.workspace.extreme_direction import EXTREMES, extreme_over_directions, extreme_sign
+from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of, reachable_set
+from zwidth.study.workspace.reach_outline import KEY, shells_attribute
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Direction = Sequence[float] | str | None
+COMPONENTS: Final = ("x", "y", "z")
+# A measure evaluated for many cells at once costs about the same for one cell as for hundreds.
+FEWEST: Final = 512  # cells in a batch of such measures
+BATCHES: Final = 16  # number of batches of a large map
+
+
+@dataclass(frozen=True, repr=False)
+class MapJob:
+    """The cells of a map: rows of the plane's grid one after the other; columns are measures.
+
+    requested_measures  the measures; those that are about a wanted wall hold `wall`
+    direction           a vector of any length but zero; one of EXTREMES; None: the file's
+    wall                the wanted wall
+    """
+
+    device: Device
+    requested_measures: tuple[Measure, ...]
+    plane: PlaneGrid
+    direction: Direction = None
+    assembly: str | None = None
+    model: str | None = None
+    wall: WantedWall = WantedWall()  # noqa: RUF009  frozen
+
+    def __repr__(self) -> str:
+        ny, nx = self.plane.shape
+        return f"MapJob: {', '.join(self.measures)} of {self.device.label!r} in {nx} x {ny} cells"
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return len(self.plane.x) * len(self.plane.y)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Columns: each measure, followed by the components of its extreme direction where it has one."""
+        return tuple(column for measure in self.requested_measures for column in self._columns(measure))
+
+    @property
+    def question(self) -> str:
+        """Fingerprint that stored results are recognised by.
+
+        Raises  TypeError  for a measure whose function was not read from a file or a module
+        """
+        direction = self.direction
+        return fingerprint(
+            "map",
+            self.device.document,
+            self.device.operator,
+            self.requested_measures,
+            self.plane,
+            direction if isinstance(direction, str) or direction is None else tuple(map(float, direction)),
+            self.assembly,
+            self.model,
+            self.wall,
+        )
+
+    @property
+    def batch(self) -> int | None:
+        """Cells per batch; None: `executor.run` chooses, where a measure is evaluated cell by cell."""
+        if any(measure.each for measure in self.requested_measures):
+            return None
+        return max(FEWEST, -(-self.count // BATCHES))
+
+    @cached_property
+    def _positions(self) -> NDArray[np.float64]:
+        return self.plane.positions.reshape(-1, 3)
+
+    def compute(self, first: int, last: int) -> CellValues:
+        """Cells first to last - 1, their postures solved together.
+
+        Raises  MeasureError  where a measure does not exist for this device, with its name
+        """
+        vector = None if isinstance(self.direction, str) else self.direction
+        positions = self._positions[first:last]
+        points = self.device.at(positions, vector, assembly=self.assembly, model=self.model)
+        values, status, notes = [], [], []
+        for measure in self.requested_measures:
+            try:
+                v, s, n = self._column(measure, points)
+            except MeasureError as error:
+                raise error.with_name(measure.name) from None
+            values.append(v)
+            status += [s] * v.shape[1]
+            here = tuple(Note(a.status, a.reason, a.count, (a.first[0] + first,)) for a in n)
+            notes += [here, *[()] * (v.shape[1] - 1)]
+        return CellValues(np.concatenate(values, axis=1), np.stack(status, axis=1), tuple(notes))
+
+    def _columns(self, measure: Measure) -> tuple[str, ...]:
+        directed = isinstance(self.direction, str) and measure.along
+        return (measure.name, *(f"{measure.name}_direction_{c}" for c in COMPONENTS if directed))
+
+    def _column(
+        self, measure: Measure, points: OperatingPoint
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8], tuple[Note, ...]]:
+        """Values (n, columns) of one measure at n points, status (n,) and notes."""
+        if not isinstance(self.direction, str) or not measure.along:
+            result = evaluate(measure, points)
+            return result.values[:, None], result.status, result.notes
+        extreme: Any = self.direction
+        directed = extreme_over_directions(measure, points, extreme)
+        result = directed.extreme
+        return np.column_stack([result.values, directed.direction]), result.status, result.notes
+
+
+def workspace_map(
+    device: Device,
+    measures: str | Measure | Sequence[str | Measure],
+    plane: PlaneGrid | None = None,
+    direction: Direction = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    wall: WantedWall | None = None,
+    *,
+    user_measures: Mapping[str, Measure] | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+    processor: Processor = "cpu",
+) -> xr.Dataset:
+    """Measures over a plane of a device's workspace.
+
+    measures       one or several: names, or measures themselves
+    plane          left out: `plane_of(device)`
+    direction      rendered in every cell: a vector, or "worst", "best", "lowest" or "highest": the direction in
+                   which the measure is so in that cell; left out: the file's
+    wall           the wanted wall, for measures that are about one
+    user_measures  measures of a user's own, by name (`measures.user_measures.load_measures`)
+    store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
+    progress       is called with "mapping", cells done, and cells of all
+    workers        processes at most; left out: one for each core
+    processor      "cuda": charts are computed on an NVIDIA GPU, by one process (`processors`); else "cpu"
+    Returns        a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none,
+                   NAME_status, and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have
+                   no value stands in the attribute `notes`, a line for each reason
+    Raises         PlaneError    where the handle reaches no cell, and as `plane_of` does
+                   ValueError    for an unknown measure, or two of one name
+                   MeasureError  for a measure that does not exist for this device
+                   DeviceError   as `Device.at` does
+                   what `executor.run` and `Store` raise
+    """
+    job = map_job(device, measures, plane, direction, assembly, model, wall, user_measures=user_measures)
+    kept = store_for(job, store)
+    cells = run(job, kept, progress, workers, processor=processor, batch=job.batch, stage="mapping")
+    return as_dataset(job, cells)
+
+
+def map_job(
+    device: Device,
+    measures: str | Measure | Sequence[str | Measure],
+    plane: PlaneGrid | None = None,
+    direction: Direction = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    wall: WantedWall | None = None,
+    *,
+    user_measures: Mapping[str, Measure] | None = None,
+) -> MapJob:
+    """Check the arguments of `workspace_map` and return the job, for which a `Store` can be made."""
+    require("device", device, Device)
+    requested_measures = tuple(
+        one if isinstance(one, Measure) else find_measure(one, user_measures) for one in measure_list(measures)
+    )
+    names = [one.name for one in requested_measures]
+    if not names:
+        raise ValueError("measures must name at least one measure, got none")
+    if len(set(names)) < len(names):
+        raise ValueError(f"a map's measures must have different names, got {', '.join(names)}; list each once")
+    if isinstance(direction, str):
+        if direction not in EXTREMES:
+            raise ValueError(f"the direction must be a vector or one of {', '.join(EXTREMES)}, got {direction!r}")
+        extreme: Any = direction
+        for one in requested_measures:
+            if one.along:
+                try:
+                    extreme_sign(one, extreme)
+                except MeasureError as error:
+                    raise error.with_name(one.name) from None
+    else:
+        device.direction(direction)  # raises what is wrong with it
+    if isinstance(direction, str):
+        device = device.pushed_along_every_direction
+    if not isinstance(direction, str) and device.renders_moments(direction):
+        requested_measures = tuple(one.about_moments() for one in requested_measures)
+    plane = plane or plane_of(device, assembly=assembly)
+    wanted = wall or WantedWall()
+    requested_measures = tuple(one.at_wall(wanted) for one in requested_measures)
+    return MapJob(device, requested_measures, plane, direction, assembly, model, wanted)
+
+
+def as_dataset(job: MapJob, cells: CellValues) -> xr.Dataset:
+    """A map's cells with axes, units and circumstances. Raises PlaneError where the handle reaches none."""
+    import xarray as xr
+
+    plane, mechanism = job.plane, job.device.mechanism
+    assert mechanism is not None
+    _check_reached(job, cells)
+    data: dict[str, Any] = {}
+    axes = ("y_m", "x_m")
+    column = 0
+    for measure in job.requested_measures:
+        width = len(job._columns(measure))
+        unit = measure.unit.replace("^r", f"^{len(mechanism.drives.names)}")
+        attributes = {
+            **unit_attributes(unit),
+            "title": measure.title,
+            "long_name": measure.title,
+            "source": measure.source,
+            "better": measure.better or "",
+            "along": int(measure.along),
+            "linear": int(measure.linear),
+            "key": measure.key,
+            "notes": "\n".join(_sentence(note, plane) for note in cells.notes[column]),
+        }
+        data[measure.name] = (axes, cells.values[:, column].reshape(plane.shape), attributes)
+        status = cells.status[:, column].reshape(plane.shape)
+        data[f"{measure.name}_status"] = (axes, status, _flags())
+        if width > 1:
+            directions = cells.values[:, column + 1 : column + width].reshape(*plane.shape, 3)
+            title = {"title": f"{str(job.direction).capitalize()} direction of {measure.title.lower()}"}
+            data[f"{measure.name}_direction"] = ((*axes, "component"), directions, title)
+        column += width
+    x, y = (
+        (axis, values, {"units": "m", "long_name": name})
+        for axis, values, name in zip(("x_m", "y_m"), (plane.x, plane.y), plane.names, strict=True)
+    )
+    coordinates: dict[str, Any] = {"x_m": x, "y_m": y}
+    if any("component" in variable[0] for variable in data.values()):
+        coordinates["component"] = list(COMPONENTS)
+    return xr.Dataset(data, coordinates, _attributes(job))
+
+
+def measures_of(dataset: xr.Dataset) -> list[str]:
+    """Names of the measures that a map holds, in its order."""
+    return [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
+
+
+def reachable(dataset: xr.Dataset, name: str) -> NDArray[np.bool_]:
+    """Whether each cell (ny, nx) has a posture; the measure `name` may still have no value in it."""
+    status = dataset[f"{name}_status"].values
+    return np.asarray(~np.isin(status, UNREACHED))
+
+
+def _flags() -> dict[str, Any]:
+    meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
+    return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
+
+
+def _sentence(note: Note, plane: PlaneGrid) -> str:
+    """A note in words: how many cells, why they have no value, and where the first of them lies."""
+    row, column = divmod(note.first[0], len(plane.x))
+    x, y = (round(float(value), 12) + 0.0 for value in (plane.x[column], plane.y[row]))
+    where = f"{plane.names[0]} = {x:.6g} m, {plane.names[1]} = {y:.6g} m"
+    cells = "1 cell" if note.count == 1 else f"{note.count} cells"
+    return f"{cells} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
+
+
+def _check_reached(job: MapJob, cells: CellValues) -> None:
+    if not np.isin(cells.status, NO_POSTURE).all():
+        return
+    mechanism = job.device.mechanism
+    assert mechanism is not None
+    assembly = job.assembly or job.device.reference_assembly
+    reach = reachable_set(mechanism, assembly)
+    raise PlaneError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {reach}")
+
+
+def _attributes(job: MapJob) -> dict[str, Any]:
+    """The map's device, plane, direction and wanted wall, as attributes that any file can hold."""
+    from zwidth._version import __version__
+
+    device, plane, direction = job.device, job.plane, job.direction
+    assert device.mechanism is not None
+    rendered = direction if isinstance(direction, str) else device.direction(direction).tolist()
+    wanted = {
+        "wanted_stiffness_N_per_m": job.wall.stiffness,
+        "wanted_damping_Ns_per_m": job.wall.damping,
+        "wanted_frequency_Hz": job.wall.frequency,
+    }
+    return {
+        "name": device.name,
+        "device": device.label,
+        "assembly": job.assembly or device.reference_assembly or "",
+        "model": job.model or "full",
+        "operator": device.operator_name or "none",
+        **({} if device.load is None else {"load": device.load.text()}),
+        "direction": rendered,
+        "plane": "".join(plane.names),
+        "plane_axes": [*plane.first.tolist(), *plane.second.tolist()],
+        "plane_through_m": plane.through.tolist(),
+        KEY: shells_attribute(device.mechanism),
+        "sampling_period_s": device.controller.sampling_period,
+        "delay_samples": float(device.controller.delay),
+        "left_out": ", ".join(
+            device.linear_omissions if any(one.linear for one in job.requested_measures) else ()
+        ),
+        **{key: value for key, value in wanted.items() if value is not None},
+        "zwidth": __version__,
+    }
