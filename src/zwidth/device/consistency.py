@@ -29,7 +29,7 @@ KeyMessages = Iterator[tuple[KeyPath, str]]
 KINDS: Final = ("mechanism", "plant", "response")
 # Tables that only device files have, and keys that only studies have: they tell which of the two a file is.
 DEVICE_KEYS: Final = frozenset({*KINDS, "loop"})
-STUDY_KEYS: Final = frozenset({"measures", "axis"})
+STUDY_KEYS: Final = frozenset({"measures", "axis", "tolerance"})
 # Joints with several coordinates; how many angles and ways each joint has; the joints that have a key.
 SEVERAL: Final = frozenset({"universal", "spherical", "free"})
 ANGLES: Final = {"revolute": 1, "universal": 2, "spherical": 3, "free": 3}

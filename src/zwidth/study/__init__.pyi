@@ -25,6 +25,13 @@ from .sensitivity.sensitivities import sensitivities as sensitivities
 from .sensitivity.what_if import Variant as Variant
 from .sensitivity.what_if import limiting_change as limiting_change
 from .sensitivity.what_if import what_if as what_if
+from .tolerances.draws import MemberChanges as MemberChanges
+from .tolerances.draws import member_changes as member_changes
+from .tolerances.question import ToleranceQuestion as ToleranceQuestion
+from .tolerances.question import read_question as read_question
+from .tolerances.result import ToleranceStudy as ToleranceStudy
+from .tolerances.tolerance_study import run_tolerances as run_tolerances
+from .tolerances.tolerance_study import tolerance as tolerance
 from .validity import Validity as Validity
 from .validity import validity as validity
 from .workspace.common_area import common_area as common_area

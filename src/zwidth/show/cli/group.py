@@ -26,6 +26,7 @@ COMMANDS: Final = {
     "load": ("load", "LoadCommand"),
     "map": ("map", "MapCommand"),
     "sweep": ("sweep", "SweepCommand"),
+    "tolerance": ("tolerance", "ToleranceCommand"),
     "report": ("report", "ReportCommand"),
     "sensitivity": ("sensitivity", "SensitivityCommand"),
     "felt": ("felt", "FeltCommand"),

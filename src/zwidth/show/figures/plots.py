@@ -269,6 +269,13 @@ def _identification(ax: Axes, result: Any) -> None:
     draw_identification(ax, result)
 
 
+def _tolerance(ax: Axes, result: Any) -> None:
+    """The bands; `zwidth tolerance --output` draws what each tolerance is worth below them."""
+    from zwidth.show.figures.tolerance import draw_bands
+
+    draw_bands(ax, result)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "CommonChart": _robust,
@@ -296,4 +303,5 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Sweep": _sweep,
     "CommonArea": _common_area,
     "Identification": _identification,
+    "ToleranceStudy": _tolerance,
 }

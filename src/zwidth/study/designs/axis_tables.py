@@ -38,7 +38,7 @@ def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Fau
         key = table.get("key")
         if not isinstance(key, str) or not key:
             continue
-        faults = list(_overlap_faults(key, ("key",), key, device, taken))
+        faults = list(overlap_faults(key, ("key",), key, device, taken))
         axis: Axis | None = None
         if key in CIRCUMSTANCES:
             faults += _circumstance_faults(key, table, device)
@@ -46,10 +46,10 @@ def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Fau
             if table.get("tie"):
                 faults.append((("tie",), f"goes with a number of the device file, not with {key}; remove it"))
         elif device is not None:
-            message = list(_key_faults(device.document, key, _values(table)))
+            message = list(key_faults(device.document, key, _values(table)))
             faults += message
             if not message:
-                ties = list(_ties(table, key, device, taken, faults))
+                ties = list(ties_of(table, key, device, taken, faults))
                 axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
         faults_of_axes += [((*here, *path), message) for path, message in faults]
         if axis is not None and not faults:
@@ -132,14 +132,15 @@ def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> 
     return Axis(key, inner, (low, high), logarithmic, ties, unit)
 
 
-def _overlap_faults(
-    key: str, where: KeyPath, axis: str, device: Device | None, taken: SetNumbers
+def overlap_faults(
+    key: str, where: KeyPath, axis: str, device: Device | None, taken: SetNumbers, kind: str = "axis"
 ) -> Iterator[Fault]:
     """Faults of a key that another axis or tie sets too, as a whole or in part, or that excludes such a key.
 
     key    of the axis itself, or of a number tied to it
     axis   key of the axis that sets it
     taken  what axes before this one set; the key is added
+    kind   what messages call an axis
     """
     steps: KeyPath = ("", key)  # no path of the file: the axis `operator` chooses whose numbers others change
     if key not in CIRCUMSTANCES:
@@ -148,9 +149,9 @@ def _overlap_faults(
         try:
             steps = address.resolve(device.document, key)
         except DeviceError:
-            return  # `_key_faults` and `_tie_faults` report it
+            return  # `key_faults` and `_tie_faults` report it
     for other, (shown, setter) in taken.items():
-        by = f"is set by the axis '{setter}'" if shown == setter else f"goes with the axis '{setter}'"
+        by = f"is set by the {kind} '{setter}'" if shown == setter else f"goes with the {kind} '{setter}'"
         if other == steps:
             yield (where, f"'{key}' {by} already; remove one of the two")
         elif steps[: len(other)] == other or other[: len(steps)] == steps:
@@ -169,7 +170,7 @@ def _exclude(one: KeyPath, other: KeyPath) -> bool:
     return all(of) and of[0] != of[1]
 
 
-def _key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]]) -> Iterator[Fault]:
+def key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]]) -> Iterator[Fault]:
     """Faults of a key that no device file has, or of values of a kind that the schema does not allow there."""
     try:
         steps = address.resolve(document, key)
@@ -233,10 +234,13 @@ def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str
     return "" if fits else f"must be {wanted} for '{key}', got {quote(value)}"
 
 
-def _ties(
-    table: dict[str, Any], key: str, device: Device, taken: SetNumbers, faults_of_axes: Faults
+def ties_of(
+    table: dict[str, Any], key: str, device: Device, taken: SetNumbers, faults_of_axes: Faults, kind: str = "axis"
 ) -> Iterator[Tie]:
-    """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`."""
+    """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`.
+
+    kind  what messages call an axis
+    """
     document, given = device.document, table.get("tie")
     for n, tied in enumerate(given if isinstance(given, list) else []):
         tie: dict[str, Any] = {"key": tied} if isinstance(tied, str) else tied if isinstance(tied, dict) else {}
@@ -244,7 +248,7 @@ def _ties(
         if not isinstance(to, str) or not to:
             continue
         faults = list(_tie_faults(document, key, to, factor, power, table))
-        faults += [] if faults else list(_overlap_faults(to, (), key, device, taken))
+        faults += [] if faults else list(overlap_faults(to, (), key, device, taken, kind))
         faults_of_axes += [(("tie", n, *path), message) for path, message in faults]
         if faults:
             continue
@@ -290,7 +294,7 @@ def _tie_faults(
     elif power is None:
         values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values(table)[:1]]
         yield from (
-            ((), message.replace(f"'{key}'", f"'{to}'")) for _, message in _key_faults(document, to, values)
+            ((), message.replace(f"'{key}'", f"'{to}'")) for _, message in key_faults(document, to, values)
         )
         if factor is not None and any(isinstance(value, str) for _, value in _values(table)):
             yield (("factor",), "cannot multiply texts, and the values of this axis are texts; remove it")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import prod
 from typing import Any, Final
@@ -10,7 +10,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, plural
+from zwidth.device.faults import DeviceError, KeyPath, nearest, plural
 from zwidth.device.toml_access import is_number, table, tables
 from zwidth.device.validation_messages import validation_messages
 from zwidth.measures.definition import Measure, Spelling, WantedWall
@@ -97,6 +97,7 @@ def check_study(
     *,
     plane: PlaneGrid | None = None,
     spelling: Spelling = as_key,
+    needs: Sequence[str] = ("measures", "axis"),
 ) -> Study | None:
     """The study that a document describes; None where anything is wrong with it, which is added to `faults`.
 
@@ -104,6 +105,7 @@ def check_study(
     operators      as in `Study`
     user_measures  a user's measures by name; None: they could not be loaded, and no measure is looked up
     plane          grid over the workspace; None: as the document's [workspace] says
+    needs          keys that the document must have, besides those that every study has
     Raises         TooLarge  where the designs would not fit into memory
     """
     checked: StudyFile | None = None
@@ -111,6 +113,7 @@ def check_study(
         checked = StudyFile.model_validate(document)
     except ValidationError as error:
         faults += validation_messages(error, document, description, unknown)
+    faults += _missing(document, needs)
     if device is not None and device.response is not None:
         faults.append(
             (
@@ -153,6 +156,14 @@ def check_study(
     return replace(
         study, columns=tuple(replace(one, measure=one.measure.about_moments()) for one in study.columns)
     )
+
+
+def _missing(document: dict[str, Any], needs: Sequence[str]) -> Iterator[tuple[KeyPath, str]]:
+    """Keys that a document needs and has not; one that is only misspelt is reported as a key that there is not."""
+    for key in needs:
+        others = [other for other in document if other not in StudyFile.model_fields]
+        if key not in document and all(nearest(other, list(StudyFile.model_fields)) != key for other in others):
+            yield (key,), f"is missing; add it ({description((key,))})"
 
 
 def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], faults: Faults) -> tuple[Column, ...]:

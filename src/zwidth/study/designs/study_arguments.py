@@ -54,7 +54,7 @@ def study_over(
     require("device", device, Device)
     if plane is not None:
         require("plane", plane, PlaneGrid, f"write plane_of(device, {plane!r})" if isinstance(plane, str) else "")
-    names, measures_by_name = _measures(measures, user_measures)
+    names, measures_by_name = measures_of(measures, user_measures)
     given = {
         "position": None if isinstance(position, Mapping) else position,
         "direction": direction,
@@ -69,7 +69,7 @@ def study_over(
         "measures": names,
         "axis": [{"key": key, "values": values} for key, values in _axes(axes)],
         **({"sampling": "paired"} if paired else {}),
-        **{KEYS.get(name, name): _plain(value) for name, value in given.items() if value is not None},
+        **{KEYS.get(name, name): plain_value(value) for name, value in given.items() if value is not None},
     }
     faults: Faults = []
     operator_faults: list[Fault] = []
@@ -84,7 +84,7 @@ def study_over(
     return replace(study, at=position) if isinstance(position, Mapping) else study
 
 
-def _measures(
+def measures_of(
     measures: str | Measure | Sequence[str | Measure], user_measures: Mapping[str, Measure] | None
 ) -> tuple[list[str], dict[str, Measure]]:
     """The names of the measures, and the user's own `Measure`s by name, from both arguments."""
@@ -102,7 +102,7 @@ def _axes(axes: Any) -> Iterator[tuple[str, list[Any]]]:
     for key, values in axes.items():
         if not isinstance(key, str):
             raise wrong_type("axes", "a dictionary whose keys are paths", key)
-        plain = _plain(values)
+        plain = plain_value(values)
         if isinstance(plain, list) and not plain:
             raise ValueError(f"axes[{key!r}] has no values; give at least one")
         if not isinstance(plain, list) or (key in VECTORS and all(map(is_number, plain))):
@@ -110,11 +110,11 @@ def _axes(axes: Any) -> Iterator[tuple[str, list[Any]]]:
         yield key, plain
 
 
-def _plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Arrays, NumPy numbers, tuples and ranges as Python numbers and lists."""
     if hasattr(value, "tolist"):
         value = value.tolist()
-    return [_plain(inner) for inner in value] if isinstance(value, list | tuple | range) else value
+    return [plain_value(inner) for inner in value] if isinstance(value, list | tuple | range) else value
 
 
 def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> Faults:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path as File
 from typing import Any, Final
 
@@ -33,19 +34,31 @@ def read_study(path: str | os.PathLike[str]) -> Study:
            TooLarge     where its designs would not fit into memory
     """
     label = os.fspath(path)
+    return study_of(read_document(label), label)
+
+
+def read_document(label: str) -> dict[str, Any]:
+    """The tables of a study file. Raises DeviceError."""
     try:
         text = read_text(label, LARGEST_FILE)
     except UnreadableFileError as error:
         if error.missing and label in bundled_names():
             raise _device_instead(label, "a bundled device") from None
         raise fail(label, "", f"{error}; give a study file") from None
-    return study_of(parse_document(text, label, STUDIES), label)
+    return parse_document(text, label, STUDIES)
 
 
-def study_of(document: dict[str, Any], label: str = "study") -> Study:
+def study_of(
+    document: dict[str, Any],
+    label: str = "study",
+    needs: Sequence[str] = ("measures", "axis"),
+    further: Callable[[Device | None, Faults], None] | None = None,
+) -> Study:
     """The study that a document describes.
 
-    label   what messages call it; files that it names lie beside it
+    label    what messages call it; files that it names lie beside it
+    needs    keys that it must have
+    further  adds the faults of tables that a sweep leaves aside, such as [[tolerance]]
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
     """
@@ -57,8 +70,11 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
     folder = File(label).parent
     device = _device(document, folder, faults, file_faults)
     operators = axis_operators(document, folder, file_faults)
-    study = check_study(document, label, device, operators, _own_measures(document, folder, faults), faults)
-    if study is None or file_faults:
+    own = _own_measures(document, folder, faults)
+    study = check_study(document, label, device, operators, own, faults, needs=needs)
+    if further is not None:
+        further(device, faults)
+    if study is None or faults or file_faults:
         raise DeviceError([*in_order(faults, document, label), *file_faults])
     return study
 

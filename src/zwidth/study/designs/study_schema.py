@@ -23,6 +23,7 @@ from zwidth.model.reduction import Model
 
 MOST: Final = 10**9  # designs along one axis, and in all; a larger number is a typing error
 LEAST_SEED: Final = 0
+MOST_INDEX_SAMPLES: Final = 65536  # base samples of sensitivity indices; resampling them takes 8 kB each
 
 
 def _by_name(value: Any) -> Any:
@@ -71,6 +72,55 @@ class AxisSection(Section):
     tie: tuple[TieEntry, ...] = documented_key("a list of numbers that change with this one", default=())
 
 
+class ToleranceSection(Section):
+    """How a number of the device file differs from one produced device to the next."""
+
+    key: Text = documented_key("the number that differs: a dotted path of the device file")
+    distribution: Literal["normal", "uniform", "triangular", "lognormal"] = documented_key(
+        "how its values are distributed"
+    )
+    standard_deviation: Number | None = documented_key("of a normal one, in the number's unit", gt=0, default=None)
+    standard_deviation_percent: Number | None = documented_key(
+        "of a normal or lognormal one, in percent of the number", gt=0, default=None
+    )
+    plus_minus: Number | None = documented_key(
+        "largest difference, of a uniform or triangular one, in the number's unit", gt=0, default=None
+    )
+    plus_minus_percent: Number | None = documented_key(
+        "largest difference, of a uniform or triangular one, in percent of the number", gt=0, default=None
+    )
+    low: Number | None = documented_key(
+        "least value of a uniform or triangular one; of a normal or lognormal one the lower end of the interval "
+        "that holds 95 % of its values",
+        default=None,
+    )
+    high: Number | None = documented_key("the upper one, see low", default=None)
+    cut_at_deviations: Number | None = documented_key(
+        "standard deviations from the middle at which a normal or lognormal one is cut off; left out: 4",
+        gt=0,
+        default=None,
+    )
+    tie: tuple[TieEntry, ...] = documented_key("a list of numbers that change with this one", default=())
+
+
+class DrawSection(Section):
+    """How `zwidth tolerance` draws devices, and what it says of them."""
+
+    samples: WholeNumber | None = documented_key("devices drawn; left out: 1000", ge=1, le=MOST, default=None)
+    index_samples: WholeNumber | None = documented_key(
+        "base samples of the sensitivity indices, a power of 2, 0 for none; left out: 512",
+        ge=0,
+        le=MOST_INDEX_SAMPLES,
+        default=None,
+    )
+    quantiles_percent: tuple[Number, ...] | None = documented_key(
+        "of measures and of charts; left out: 5, 50 and 95", "%", min_length=1, default=None
+    )
+    seed: WholeNumber | None = documented_key(
+        "seed of the random numbers; left out: 1", ge=LEAST_SEED, default=None
+    )
+
+
 class StudyWorkspaceSection(Section):
     """The grid in a plane on which measures over a workspace are computed."""
 
@@ -99,7 +149,9 @@ class StudyFile(Section):
 
     file_version: WholeNumber = VERSION
     device: Text = documented_key("a bundled name, or a file beside this one")
-    measures: tuple[Text, ...] = documented_key("the measures to compute for each design", min_length=1)
+    measures: tuple[Text, ...] = documented_key(
+        "the measures to compute for each design", min_length=1, default=()
+    )
     measures_file: Text | None = documented_key("a file of your own measures, beside this one", default=None)
     sampling: Literal["grid", "latin-hypercube", "paired"] = documented_key(
         "how designs are spread over the axes", default="grid"
@@ -108,7 +160,10 @@ class StudyFile(Section):
     seed: WholeNumber | None = documented_key(
         "seed of the random numbers of a Latin hypercube", ge=LEAST_SEED, default=None
     )
-    axis: tuple[AxisSection, ...] = documented_key("what is varied, one [[axis]] each", min_length=1)
+    axis: tuple[AxisSection, ...] = documented_key("what is varied, one [[axis]] each", min_length=1, default=())
+    tolerance: tuple[ToleranceSection, ...] = documented_key(
+        "how numbers differ from one produced device to the next, one [[tolerance]] each", min_length=1, default=()
+    )
     at: Position | None = documented_key("the handle's position", "m", default=None)
     direction: Direction | None = documented_key("the rendered direction", default=None)
     assembly: Text | None = documented_key("way of assembling the mechanism", default=None)
@@ -120,11 +175,14 @@ class StudyFile(Section):
     frequency_Hz: Number | None = documented_key("at which the hand moves", "Hz", gt=0, default=None)
     workspace: StudyWorkspaceSection | None = documented_key("for measures over a workspace", default=None)
     optimise: OptimiseSection | None = documented_key("for an optimiser", default=None)
+    draw: DrawSection | None = documented_key("for a study of tolerances", default=None)
 
 
 _TABLES: Final[dict[str, Any]] = {
     "axis": AxisSection,
+    "tolerance": ToleranceSection,
     "tie": TieSection,
+    "draw": DrawSection,
     "workspace": StudyWorkspaceSection,
     "optimise": OptimiseSection,
 }
@@ -157,6 +215,12 @@ def unknown(path: KeyPath) -> str:
     "is not a key of an [[axis]]; did you mean 'range'?"
     """
     section, key = _table(path), str(path[-1])
-    here = {AxisSection: "an [[axis]]", TieSection: "a tie", StudyWorkspaceSection: "[workspace]"}
+    here = {
+        AxisSection: "an [[axis]]",
+        ToleranceSection: "a [[tolerance]]",
+        DrawSection: "[draw]",
+        TieSection: "a tie",
+        StudyWorkspaceSection: "[workspace]",
+    }
     place = here.get(section, "[optimise]" if section is OptimiseSection else "a study file")
     return f"is not a key of {place}; {suggestion(key, list(section.model_fields))}"

@@ -194,6 +194,29 @@ class SweepJob:
                         if one is not None:
                             yield int(row), column, one
 
+    def points_together(self, first: int, last: int) -> Iterator[tuple[NDArray[np.int64], OperatingPoint]]:
+        """Designs first to last - 1 that are built together at the handle's position: their numbers from `first`
+        (P,), and their points (P,). The others are to be built alone (`point_alone`)."""
+        for group in self._grouping.groups(list(self._design_columns(first, last))):
+            chosen = {**self.fixed_circumstances, **group.chosen}
+            if isinstance(chosen.get("at"), Mapping) or not group.batch.differs:
+                continue
+            at = chosen.get("at") if group.positions is None else group.positions
+            try:
+                point, alone = group.batch.at(at, *(chosen.get(key) for key in ("direction", "assembly", "model")))
+            except (PostureError, LoadError, DeviceError):
+                continue  # each design alone says why
+            kept = np.flatnonzero(group.valid & ~alone & (point.status == OK))
+            if len(kept):
+                yield group.rows[kept], point[kept]
+
+    def point_alone(self, number: int) -> OperatingPoint | tuple[int, str]:
+        """The point of a design at its handle's position; or status and reason, where it has none."""
+        try:
+            return self.design(number).point()
+        except _NoPoint as none:
+            return none.status, none.reason
+
     def _measured(
         self, one: Column, point: OperatingPoint, designs: NDArray[np.int64], same: bool
     ) -> Iterator[Found | None]:

@@ -1,0 +1,242 @@
+"""`zwidth tolerance`: a device as it is produced, every number somewhere within its tolerance."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.answer import table
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import Callback as Callback
+from zwidth.show.cli.options import Question, refuse_empty
+from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
+from zwidth.show.tolerance_text import (
+    advice_sentence,
+    band_sentence,
+    index_sentence,
+    outcome_sentences,
+    tolerance_text,
+    wall_sentence,
+)
+from zwidth.show.units import amount, printed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from zwidth.device.device import Device
+    from zwidth.study.jobs.job import CellValues, Job
+    from zwidth.study.jobs.store import Store
+    from zwidth.study.tolerances.outcomes import MeasureQuantiles
+    from zwidth.study.tolerances.question import ToleranceQuestion
+    from zwidth.study.tolerances.result import ToleranceStudy
+
+PROGRESS: Final = ".progress"  # ending of the folder that keeps finished work beside a file that is written
+
+
+@dataclass(frozen=True)
+class ToleranceFile(Question):
+    """What a study file asks of produced devices; `name` is the file.
+
+    samples, seed  in place of the file's
+    """
+
+    samples: int | None = None
+    seed: int | None = None
+
+    @cached_property
+    def asked(self) -> ToleranceQuestion:
+        """The question, read and checked. Raises DeviceError, BadInput."""
+        from zwidth.memory_limit import TooLarge
+        from zwidth.study.tolerances.question import read_question
+
+        try:
+            return read_question(self.name, self.samples, self.seed)
+        except TooLarge as error:
+            raise BadInput(f"{self.name}: {error}") from None
+
+    def device(self) -> Device:
+        """The device in the middle of its tolerances. Raises what reading the study does."""
+        return self.asked.study.device
+
+
+class ToleranceCommand(Command):
+    """Say what is certain of a device as it is produced: each number with a [[tolerance]] in STUDY.toml differs
+    from one device to the next.
+
+    Devices are drawn at random: how many render the wanted wall, quantiles of their measures, bands of their
+    charts, and which tolerance to tighten first, each with an interval that holds the truth with 95 %. Long runs
+    are spread over processes; with --resume or --output a run can be stopped, and the same command continues it.
+    """
+
+    name = "tolerance"
+    summary = "Say what holds for devices as they are produced, and which tolerance to tighten."
+    examples = (
+        "zwidth tolerance my-tolerances.toml",
+        "zwidth tolerance my-tolerances.toml --samples 5000 --seed 2",
+        "zwidth tolerance my-tolerances.toml --resume my-tolerances.cells --output yield.svg",
+    )
+    options = (
+        click.option(
+            "--samples", type=click.IntRange(min=1), metavar="N", help="Devices drawn, in place of the file's."
+        ),
+        click.option(
+            "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the draws, in place of the file's."
+        ),
+        resume_options,
+    )
+    outputs = (*FIGURES, *DATA, *ARRAYS)
+    output_help = "Write a figure (.png .svg .pdf) or the data (.csv .nc .mat: drawn devices, .json: all)."
+
+    def about(self, command: Callback) -> Callback:
+        @wraps(command)
+        def with_study(study: str, samples: int | None, seed: int | None, **more: Any) -> int:
+            return command(ToleranceFile(study, samples=samples, seed=seed), **more)
+
+        return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
+
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        device = case.device
+        return {
+            "name": device.name,
+            "device": device.label,
+            "study": case.question.name,
+            "operator": device.operator_name,
+            **({} if device.load is None else {"load": device.document["load"]}),
+            "sampling_period_s": device.controller.sampling_period,
+            "left_out": list(device.linear_omissions),
+        }
+
+    def compute(self, case: CommandLine) -> ToleranceStudy:
+        from zwidth.measures.definition import MeasureError
+        from zwidth.memory_limit import TooLarge
+        from zwidth.study.tolerances.tolerance_study import answer
+
+        question = case.question
+        assert isinstance(question, ToleranceFile)
+        try:
+            return answer(question.asked, _computing(case))
+        except TooLarge as error:
+            raise BadInput(f"{question.name}: {error}") from None
+        except MeasureError as error:
+            raise BadInput(*(f"{question.name}: measures: {line}" for line in str(error).splitlines())) from None
+
+    def reason(self, case: CommandLine, result: ToleranceStudy) -> str | None:
+        return result.reason
+
+    def heading(self, case: CommandLine) -> str:
+        return ""  # the pages begin with how many devices there are
+
+    def pages(self, case: CommandLine, result: ToleranceStudy, document: Mapping[str, Any]) -> Iterator[Any]:
+        question = result.question
+        devices = f"{question.samples} device{'s' * (question.samples != 1)} drawn"
+        yield f"{printable(document['name'])}: {devices}, seed {question.seed}"
+        if document["left_out"]:
+            yield f"linear: leaves out {', '.join(document['left_out'])}"
+        rows = [
+            [one.key, tolerance_text(one), ", ".join(tie.key for tie in one.ties)] for one in question.tolerances
+        ]
+        yield table(["tolerance", "distribution", "goes with it"], rows)
+        yield from outcome_sentences(result)
+        if result.reason is not None:
+            return
+        yield wall_sentence(result)
+        yield from _quantile_tables(result)
+        yield from map(band_sentence, result.bands)
+        yield from map(index_sentence, result.indices)
+        yield advice_sentence(result)
+
+    def write(
+        self, case: CommandLine, result: ToleranceStudy, document: dict[str, Any], reason: str | None
+    ) -> str | None:
+        from zwidth.show.dataset import write_dataset
+
+        assert case.path is not None
+        if case.writes(ARRAYS):
+            write_dataset(case.path, result.dataset())
+        else:
+            super().write(case, result, document, reason)
+        if case["resume"] is None:
+            _remove_kept_work(_folder(case))
+        return reason
+
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        from zwidth.show.figures.caption import facts_of_study
+
+        assert isinstance(case.question, ToleranceFile)
+        asked = case.question.asked
+        return facts_of_study(asked.study) | {"varied": [one.key for one in asked.tolerances]}
+
+    def draw(self, case: CommandLine, result: ToleranceStudy) -> Figure:
+        from zwidth.show.figures.tolerance import tolerance_figure
+
+        return tolerance_figure(result)
+
+
+def _computing(case: CommandLine) -> Callable[[str, Job, str], CellValues]:
+    """Computes jobs, each with a store of its own in the folder of this run."""
+    from zwidth.study.jobs.executor import run
+
+    folder = _folder(case)
+    if folder is not None and (folder / "zarr.json").exists():
+        raise BadInput(f"{printable(str(folder))}: holds the store of another study; name another folder")
+
+    def compute(name: str, job: Job, stage: str) -> CellValues:
+        store: Store | None = None
+        if folder is not None:
+            store = open_store(job, None, str(folder / name))
+        with report_kept_work(store):
+            return run(job, store, case.progress, case["workers"], stage=stage)
+
+    return compute
+
+
+def _folder(case: CommandLine) -> Path | None:
+    """The folder that keeps finished work: the user's, or one beside the file that is written; None: none."""
+    if case["resume"] is not None:
+        return Path(case["resume"])
+    return None if case.path is None else case.path.with_name(case.path.name + PROGRESS)
+
+
+def _remove_kept_work(folder: Path | None) -> None:
+    """Remove the stores of this run, now that what they kept is written; what else is in the folder stays."""
+    if folder is None or not folder.is_dir():
+        return
+    from zwidth.study.tolerances.tolerance_study import is_store_name
+
+    for inside in folder.iterdir():
+        if is_store_name(inside.name):
+            shutil.rmtree(inside, ignore_errors=True)
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _quantile_tables(result: ToleranceStudy) -> Iterator[Any]:
+    """The quantiles of all measures, each with its interval."""
+    shares = [f"{100.0 * share:.6g} %" for share in result.question.quantiles]
+    rows = [_quantile_row(one, result.question.samples) for one in result.quantiles if one.quantiles]
+    if rows:
+        yield table(["less than this have", *shares], rows)
+
+
+def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:
+    texts = []
+    for each in one.quantiles:
+        interval = each.interval
+        unit = printed(one.unit)
+        if interval.low == interval.high:
+            texts.append(amount(interval.value, unit))
+            continue
+        texts.append(
+            f"{amount(interval.value, unit)} ({amount(interval.low, unit)} to {amount(interval.high, unit)})"
+        )
+    partly = "" if one.devices == drawn else f" (of {one.devices} devices with a value)"
+    return [f"{one.name}{partly}", *texts]

@@ -1,0 +1,162 @@
+"""Devices as they are produced: bands of the chart, and which tolerance to tighten first."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from zwidth.show.figures.stability import edges_of, frame
+from zwidth.show.figures.style import BLACK, BLUE, TICK_SIZE, VERMILION, context, draw_empty, label, legend_above
+from zwidth.show.units import as_written, quantity
+
+if TYPE_CHECKING:
+    from zwidth.study.tolerances.band import Band
+    from zwidth.study.tolerances.intervals import Interval
+    from zwidth.study.tolerances.result import ToleranceStudy
+
+Floats = NDArray[np.float64]
+
+# From the rarest walls to the likeliest: light to dark, which a grey print and any colour vision tell apart.
+LIGHTEST: Final = np.array([0.86, 0.92, 0.96])
+DARKEST: Final = np.array([0.33, 0.58, 0.77])
+MARGIN: Final = 1.05  # of the view beyond the widest band
+SIZE: Final = (5.6, 4.2)  # inches, of the bands alone
+PER_BAR: Final = 0.42  # inches of height for each tolerance and its path
+
+
+def tolerance_figure(result: ToleranceStudy) -> Figure:
+    """The bands of the chart, and below them what each tolerance is worth."""
+    bars = _bars(result)
+    with context():
+        below = PER_BAR * len(bars) + 0.75 if bars else 0.0
+        made = Figure(figsize=(SIZE[0], SIZE[1] + below), layout="constrained")
+        FigureCanvasAgg(made)
+        if not bars:
+            draw_bands(made.add_subplot(), result)
+            return made
+        parts: Any = made.subfigures(2, 1, height_ratios=[SIZE[1], below])
+        above, under = parts
+        draw_bands(above.subplots(), result)
+        draw_worth(under.subplots(), result)
+        return made
+
+
+def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
+    """The walls that at least these shares of the drawn devices render, the likeliest darkest; over them the edge
+    of the device in the middle of its tolerances, and the wanted wall."""
+    bands = result.bands[::-1]
+    for n, band in enumerate(bands):
+        share = n / max(len(bands) - 1, 1)
+        colour = tuple((LIGHTEST + share * (DARKEST - LIGHTEST)).tolist())
+        ax.add_collection(
+            PolyCollection(
+                band_polygons(band),
+                facecolors=[colour],
+                edgecolors=[colour],
+                linewidths=0.4,
+                zorder=1.1 + 0.1 * n,
+                label=f"stable in at least {_percent(band.probability)} of the devices",
+            )
+        )
+    if result.nominal is not None:
+        for n, edge in enumerate(edges_of(result.nominal.regions)):
+            text = "" if n else "edge in the middle of the tolerances"
+            ax.plot(*edge.T, color=BLACK, linewidth=1.1, zorder=3.0, label=text)
+    for band in result.bands[:1]:
+        if band.stiffest is not None:
+            _mark(ax, band.stiffest.stiffness, band.stiffest.damping, "o", "white", _stiffest_text(band))
+    wall = result.question.study.wall
+    if wall.stiffness is not None and wall.damping is not None and result.probability is not None:
+        text = f"wanted wall: stable in {_share(result.probability)}"
+        _mark(ax, wall.stiffness, wall.damping, "D", VERMILION, text)
+    frame(ax, _view(result), empty=not any(any(band.pieces) for band in bands))
+    legend_above(ax)
+
+
+def band_polygons(band: Band) -> list[Floats]:
+    """A band as polygons (k, 2) of walls [K, B]: a trapezium for each two pieces that meet between two lines."""
+    out = []
+    for (low, one), (high, other) in pairwise(zip(band.dampings.tolist(), band.pieces, strict=True)):
+        for a, b in one:
+            for c, d in other:
+                if max(a, c) < min(b, d):
+                    out.append(np.array([[a, low], [b, low], [d, high], [c, high]]))
+    return out
+
+
+def draw_worth(ax: Axes, result: ToleranceStudy) -> None:
+    """A bar for each tolerance: by how much half of it raises the share, or its part in the spread of the
+    stiffness, with the interval that holds the truth with 95 %; hollow where it cannot be told from 0."""
+    bars = _bars(result)
+    if not bars:
+        draw_empty(ax, "no tolerance to be tightened")
+        return
+    for n, (key, interval, certain) in enumerate(reversed(bars)):
+        value, low, high = (100.0 * one for one in (interval.value, interval.low, interval.high))
+        face = BLUE if certain else "white"
+        ax.barh(n, value, height=0.34, color=face, edgecolor=BLUE, linewidth=1.0, zorder=2.0)
+        ax.plot([low, high], [n, n], color=BLACK, linewidth=1.1, zorder=3.0, marker="|", markersize=6.0)
+        place = ax.get_yaxis_transform()
+        ax.text(0.0, n + 0.26, key, transform=place, ha="left", va="bottom", fontsize=TICK_SIZE, zorder=4.0)
+    ax.set_yticks([])
+    ax.set_ylim(-0.5, len(bars) - 0.1)
+    ax.spines["left"].set_visible(False)
+    ax.axvline(0.0, color=BLACK, linewidth=0.6, zorder=2.5)
+    if result.tightened:
+        label(ax.xaxis, "More devices with the wall, by half this tolerance", "%", plain=True)
+    else:
+        label(ax.xaxis, "Part in the spread of the largest stiffness", "%", plain=True)
+
+
+def _bars(result: ToleranceStudy) -> list[tuple[str, Interval, bool]]:
+    """Key, interval and whether it differs from 0 of each tolerance, the largest first."""
+    if result.tightened:
+        return [(one.key, one.gain, one.is_certain) for one in result.tightened]
+    outcome = next((one for one in result.indices if one.name == "stiffness_max"), None)
+    each = [] if outcome is None else [(one.key, one.total, one.total_is_certain) for one in outcome.indices]
+    return sorted(each, key=lambda one: -one[1].value)
+
+
+def _mark(ax: Axes, stiffness: float, damping: float, marker: str, face: str, text: str) -> None:
+    style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": VERMILION, "markeredgewidth": 1.6}
+    ax.plot(
+        [stiffness], [damping], marker=marker, markersize=6.0, linestyle="none", zorder=5.0, label=text, **style
+    )
+
+
+def _stiffest_text(band: Band) -> str:
+    assert band.stiffest is not None
+    place = f"{quantity(band.stiffest.stiffness, 'N/m')} at {quantity(band.stiffest.damping, 'Ns/m')}"
+    return f"stiffest wall of {_percent(band.probability)}: {place}"
+
+
+def _percent(share: float) -> str:
+    """A share that somebody chose, as it was written."""
+    return f"{as_written(100.0 * share)}\u00a0%"
+
+
+def _share(share: Interval) -> str:
+    return f"{100.0 * share.value:.3g} % ({100.0 * share.low:.3g} to {100.0 * share.high:.3g} %)"
+
+
+def _view(result: ToleranceStudy) -> tuple[float, float, float, float]:
+    """The part with K >= 0 and B >= 0 that the widest band and the edge in the middle reach."""
+    corners = [one for band in result.bands for one in band_polygons(band)]
+    walls = np.concatenate([*corners, np.ones((1, 2)) * 1e-9])
+    reach = [walls]
+    if result.nominal is not None and result.nominal.regions:
+        reach.append(np.vstack(result.nominal.regions))
+    wall = result.question.study.wall
+    if wall.stiffness is not None and wall.damping is not None:
+        reach.append(np.array([[wall.stiffness, wall.damping]]))
+    K, B = np.maximum(np.concatenate(reach).max(axis=0), 0.0)
+    if not corners and result.nominal is None:
+        return (0.0, 1.0, 0.0, 1.0)
+    return -0.03 * float(K), MARGIN * float(K), -0.04 * float(B), MARGIN * float(B)

@@ -1,0 +1,158 @@
+"""What a study of tolerances found, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from zwidth.show.output import printable
+from zwidth.show.units import amount, number, percent, typed
+
+if TYPE_CHECKING:
+    from zwidth.study.tolerances.band import Band, BandWall
+    from zwidth.study.tolerances.indices import Indices
+    from zwidth.study.tolerances.intervals import Interval
+    from zwidth.study.tolerances.result import ToleranceStudy
+    from zwidth.study.tolerances.tolerance import Tolerance
+
+WORDS = {
+    "failed": "could not be built",
+    "out of reach": "do not get to the handle's position",
+    "singular": "are singular there",
+    "undecided": "lie on the stability limit as far as rounding tells",
+    "no value": "have no value",
+}
+
+
+def share_text(share: Interval) -> str:
+    """A share with its interval: 93.20 % (91.46 to 94.68 %)."""
+    low, high = number(100.0 * share.low), number(100.0 * share.high)
+    return typed(f"{percent(share.value)} ({low} to {high} %)")
+
+
+def tolerance_text(one: Tolerance) -> str:
+    """How a number differs, in words: normal about 0.1 kg, standard deviation 0.005 kg."""
+    law = one.distribution
+    if law.kind in ("uniform", "triangular"):
+        ends = f"{_written(law.low)} to {_written(law.high)}"
+        return f"{law.kind}, {ends}{f' {one.unit}' if one.unit else ''}"
+    unit = f" {one.unit}" if one.unit else ""
+    width = f"standard deviation {_written(law.spread)}{unit}"
+    if law.kind == "lognormal":
+        width = f"standard deviation {_written(100.0 * law.spread)} % of it"
+    ends = f"cut off below {_written(law.low)} and above {_written(law.high)}"
+    return f"{law.kind} about {_written(law.middle)}{unit}, {width}, {ends} ({_written(100.0 * law.cut_off)} %)"
+
+
+def _written(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def wall_sentence(result: ToleranceStudy) -> str:
+    """The probability of the wanted wall; or what to give for it."""
+    share, wall = result.probability, result.question.study.wall
+    if share is None:
+        return (
+            "no wall is wanted: give stiffness_N_per_m and damping_Ns_per_m for the probability that it is stable"
+        )
+    shown = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    if share.value == 1.0:
+        least = typed(percent(share.low))
+        return f"the wall {shown} is stable in all of them, so in at least {least} of all that are produced"
+    if share.value == 0.0:
+        most = typed(percent(share.high))
+        return f"the wall {shown} is stable in none of them, so in at most {most} of all that are produced"
+    return f"the wall {shown} is stable in {share_text(share)} of those that are produced"
+
+
+def outcome_sentences(result: ToleranceStudy) -> Iterator[str]:
+    """Devices that are neither stable nor unstable, and those without any stable wall."""
+    count = result.question.samples
+    for name, many in result.outcomes.items():
+        if name in WORDS or name in result.without_answer:
+            what = WORDS.get(name, f"have the status {name}")
+            yield f"{many} of {count} devices {what}; they count as not stable"
+    if result.without_stable_wall:
+        none = f"{result.without_stable_wall} of {count} devices have no stable wall with K > 0 and B >= 0"
+        yield f"{none}: their largest stiffness counts as 0"
+    if result.uncharted:
+        yield f"{result.uncharted} of {count} devices have no chart; in its bands they count as not stable"
+    yield from (f"  {printable(reason)}" for reason in result.reasons[:3])
+
+
+def band_sentence(band: Band) -> str:
+    """The stiffest wall of a band, a more cautious one, and how they did on further devices."""
+    of = typed(percent(band.probability))
+    if band.stiffest is None:
+        return f"no wall with K > 0 is stable in {of} of the drawn devices"
+    first = f"the stiffest wall of {of} of the drawn devices is {_tried(band.stiffest)}"
+    if band.certain is None:
+        return f"{first}; they are too few for a more cautious one"
+    if band.probability < 0.5:  # nobody promises what most devices do not render
+        return first
+    return f"{first}; more cautious is {_tried(band.certain)}"
+
+
+def _tried(wall: BandWall) -> str:
+    place = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    if wall.share is None:
+        return place
+    return f"{place}, which {share_text(wall.share)} of {wall.unseen} further ones render"
+
+
+def index_sentence(outcome: Indices) -> str:
+    """Which tolerances an outcome's spread comes from; those that cannot be told from 0 are said to be so."""
+    if not outcome.indices:
+        return f"{outcome.name}: no index, {outcome.reason}"
+    certain = sorted((one for one in outcome.indices if one.total_is_certain), key=lambda one: -one.total.value)
+    rest = [one.key for one in outcome.indices if not one.total_is_certain]
+    parts = [f"{one.key} has a part in {typed(percent(one.total.value))} of the spread" for one in certain]
+    if rest:
+        parts.append(f"{', '.join(rest)}: cannot be told from no part at all")
+    return f"{outcome.name}: {'; '.join(parts)}"
+
+
+def advice_sentence(result: ToleranceStudy) -> str:
+    """Which tolerance to tighten first, and what for."""
+    share = result.probability
+    if share is None:
+        return _advice_without_wall(result)
+    if not result.tightened:
+        return (
+            f"every one of {result.question.samples} devices renders the wall: nothing is to be tightened for it"
+        )
+    best = result.best_to_tighten
+    if not best:
+        if result.tightened[0].gain.high < 0.0 or all(one.gain.value <= 0.0 for one in result.tightened):
+            return (
+                "no narrower tolerance helps this wall, for it is unstable in the middle of the tolerances or "
+                "nearly so: change the design, or want less of the wall"
+            )
+        return f"{result.question.samples} devices do not tell that half of any tolerance would help; draw more"
+    first = best[0]
+    change = f"{typed(percent(share.value))} to {share_text(first.share)}, by {_gain(first.gain)}"
+    words = f"half its tolerance raises {change}"
+    if len(best) == 1:
+        return f"tighten {first.key} first: {words}"
+    others = " or ".join(one.key for one in best[1:])
+    return (
+        f"tighten {first.key} first, or {others}, which so many devices do not tell apart: of {first.key} {words}"
+    )
+
+
+def _gain(gain: Interval) -> str:
+    """A gain in percentage points, with its interval."""
+    value, low, high = (number(100.0 * one) for one in (gain.value, gain.low, gain.high))
+    return typed(f"{value} percentage points ({low} to {high})")
+
+
+def _advice_without_wall(result: ToleranceStudy) -> str:
+    outcome = next((one for one in result.indices if one.name == "stiffness_max" and one.indices), None)
+    certain = [one for one in outcome.indices if one.total_is_certain] if outcome is not None else []
+    if not certain:
+        return "which tolerance to tighten first is not known"
+    first = max(certain, key=lambda one: one.total.value)
+    rivals = [one.key for one in certain if one is not first and one.total.high >= first.total.low]
+    part = f"it has a part in {typed(percent(first.total.value))} of the spread of stiffness_max"
+    words = f"tighten {first.key} first: {part}"
+    return f"{words}; {' and '.join(rivals)} cannot be told from it" if rivals else words

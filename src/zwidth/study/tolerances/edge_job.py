@@ -1,0 +1,143 @@
+"""Where the stable walls of each drawn device begin and end, on lines of equal damping, as a job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.loop_edge import trace_edge
+from zwidth.chart.point_chart import chart_at
+from zwidth.chart.tracer import Tracer
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import FAILED, OK, UNDECIDED, Note
+from zwidth.study.designs.sweep_job import SweepJob
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
+
+Floats = NDArray[np.float64]
+
+MOST_INTERVALS: Final = 4  # of stable stiffness on one line of one device; of more, the longest are kept
+
+
+def stable_intervals(outlines: Sequence[Floats], dampings: Floats) -> Floats:
+    """Intervals of stable stiffness K >= 0 on lines of equal damping, from the outline of a stable set.
+
+    A line crosses the outline an even number of times; between the first and second crossing, the third and
+    fourth, ... its walls are stable. Chords of an outline lie within 1e-6 of its extent (`arc_kernels.CHORD`).
+
+    outlines  closed walks (k, 2) of walls [K, B]
+    dampings  (d,) ascending [N s/m]
+    Returns   (d, MOST_INTERVALS, 2) ends of each interval [N/m], nan where there are fewer; of more than
+              MOST_INTERVALS the longest, which leaves out walls that are stable and adds none
+
+    >>> square = np.array([[0.0, -1.0], [2.0, -1.0], [2.0, 1.0], [0.0, 1.0], [0.0, -1.0]])
+    >>> stable_intervals([square], np.array([0.0, 3.0]))[:, 0].tolist()
+    [[0.0, 2.0], [nan, nan]]
+    """
+    out = np.full((len(dampings), MOST_INTERVALS, 2), np.nan)
+    if not outlines:
+        return out
+    first = np.concatenate([walk[:-1] for walk in outlines])
+    last = np.concatenate([walk[1:] for walk in outlines])
+    low, high = np.minimum(first[:, 1], last[:, 1]), np.maximum(first[:, 1], last[:, 1])
+    # a chord crosses the lines low <= B < high: a corner on a line counts once
+    begin, end = np.searchsorted(dampings, low, "left"), np.searchsorted(dampings, high, "left")
+    counts = end - begin
+    chord = np.repeat(np.arange(len(counts)), counts)
+    line = np.repeat(begin - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts) + np.arange(len(chord))
+    along = (dampings[line] - first[chord, 1]) / (last[chord, 1] - first[chord, 1])
+    K = first[chord, 0] + along * (last[chord, 0] - first[chord, 0])
+    order = np.lexsort((K, line))
+    K, line = K[order], line[order]
+    starts = np.searchsorted(line, np.arange(len(dampings) + 1))
+    for d in range(len(dampings)):
+        ends = K[starts[d] : starts[d + 1]].reshape(-1, 2)
+        ends = np.maximum(ends[ends[:, 1] > 0.0], 0.0)
+        if len(ends) > MOST_INTERVALS:
+            longest = np.sort(np.argsort(ends[:, 0] - ends[:, 1], kind="stable")[:MOST_INTERVALS])
+            ends = ends[longest]
+        out[d, : len(ends)] = ends
+    return out
+
+
+@dataclass(frozen=True)
+class EdgeJob:
+    """The devices of a sweep as cells, each with its intervals of stable stiffness on lines of equal damping.
+
+    sweep     the devices; its measures are not computed
+    dampings  (d,) ascending [N s/m]
+    """
+
+    sweep: SweepJob
+    dampings: Floats
+
+    @property
+    def count(self) -> int:
+        """Number of devices."""
+        return self.sweep.count
+
+    @cached_property
+    def measures(self) -> tuple[str, ...]:
+        """Ends of the intervals, line after line."""
+        return tuple(
+            f"{end}_{n}_at_{d}"
+            for d in range(len(self.dampings))
+            for n in range(MOST_INTERVALS)
+            for end in ("low", "high")
+        )
+
+    @property
+    def question(self) -> str:
+        """Fingerprint that stored results are recognised by."""
+        return fingerprint("edges", self.sweep.question, self.dampings)
+
+    def compute(self, first: int, last: int) -> CellValues:
+        """Devices first to last - 1. Ends that there are not are 0, 0; a device without an edge has a status."""
+        values = np.zeros((last - first, len(self.measures)))
+        status = np.full(values.shape, OK, dtype=np.uint8)
+        notes: list[Note] = []
+        for row, point in self.points(first, last):
+            found, why = _outlines(point) if isinstance(point, OperatingPoint) else (None, point)
+            if found is None:
+                kind, reason = why
+                values[row], status[row] = np.nan, kind
+                notes.append(Note(kind, reason, 1, (first + row,)))
+            else:
+                values[row] = np.nan_to_num(stable_intervals(found, self.dampings), nan=0.0).ravel()
+        return CellValues(values, status, (tuple(notes), *[()] * (len(self.measures) - 1)))
+
+    def points(self, first: int, last: int) -> Iterator[tuple[int, OperatingPoint | tuple[int, str]]]:
+        """Each device's number from `first` and its point; or status and reason, where it has none."""
+        known = np.zeros(last - first, dtype=bool)
+        for rows, points in self.sweep.points_together(first, last):
+            known[rows] = True
+            yield from ((row, points[place]) for place, row in enumerate(rows.tolist()))
+        for row in np.flatnonzero(~known).tolist():
+            yield row, self.sweep.point_alone(first + row)
+
+
+def _outlines(point: OperatingPoint) -> tuple[Sequence[Floats] | None, tuple[int, str]]:
+    """The outlines of a device's stable set; or None with status and reason."""
+    try:
+        if point.charted_by_response:
+            return chart_at(point, decay=False).regions, (OK, "")
+        return trace_edge(Tracer(point.loop)).outlines, (OK, "")
+    except ChartError as error:
+        return None, (UNDECIDED, str(error))
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return None, (FAILED, str(error))
+
+
+def highest_damping(sweep: SweepJob, count: int) -> float:
+    """Largest damping of a stable wall with K >= 0 of the first `count` devices [N s/m]; 0 if there is none."""
+    largest = 0.0
+    for _, point in EdgeJob(sweep, np.empty(0)).points(0, min(count, sweep.count)):
+        for walk in (_outlines(point)[0] or ()) if isinstance(point, OperatingPoint) else ():
+            largest = max(largest, float(walk[walk[:, 0] >= 0.0, 1].max(initial=0.0)))
+    return largest

@@ -1,0 +1,167 @@
+"""What became of drawn devices: counts, quantiles of their measures, and outcomes that indices are found for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
+from zwidth.study.designs.column import Column
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.tolerances.indices import Indices, indices_of
+from zwidth.study.tolerances.intervals import Interval, quantile_interval
+from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
+
+Floats = NDArray[np.float64]
+Marks = NDArray[np.bool_]
+
+STABLE, UNSTABLE = "stable", "unstable"  # outcomes of the wanted wall; the others are a status in words
+WITH_WALL, WITHOUT_WALL = "with a stable wall", "without a stable wall"  # outcomes where no wall is wanted
+STIFFNESS: Final = "stiffness_max"
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """A quantile of a measure over the produced devices.
+
+    share     0..1 of the devices that have less
+    interval  the estimate and its bounds, in the measure's unit; infinite where there are too few devices
+    """
+
+    share: float
+    interval: Interval
+
+
+@dataclass(frozen=True)
+class MeasureQuantiles:
+    """Quantiles of one measure over the drawn devices that have a value.
+
+    name, unit  of the measure
+    devices     number of those that have a value
+    quantiles   () where none has one
+    """
+
+    name: str
+    unit: str
+    devices: int
+    quantiles: tuple[Quantile, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The quantiles by key."""
+        return {
+            "measure": self.name,
+            "unit": self.unit or None,
+            "devices": self.devices,
+            "quantiles": [
+                {
+                    "share": one.share,
+                    "value": one.interval.value,
+                    "low": one.interval.low,
+                    "high": one.interval.high,
+                }
+                for one in self.quantiles
+            ],
+        }
+
+
+def outcome_counts(columns: Sequence[Column], cells: CellValues) -> dict[str, int]:
+    """Outcome -> number of devices, those that do not occur left out.
+
+    The wanted wall is stable or unstable; where none is wanted, a device has a stable wall or none. The others are
+    devices whose verdict is undecided, that cannot be built, that do not get to the handle's position, ...
+    """
+    names = [one.name for one in columns]
+    if WALL_IS_STABLE.name in names:
+        column, yes, no = names.index(WALL_IS_STABLE.name), STABLE, UNSTABLE
+        good = cells.values[:, column] == 1.0
+        bad = (cells.status[:, column] == OK) & ~good
+    else:
+        column, yes, no = names.index(STIFFNESS), WITH_WALL, WITHOUT_WALL
+        good = cells.status[:, column] == OK
+        bad = cells.status[:, column] == NO_VALUE
+    counts = {yes: int(good.sum()), no: int(bad.sum())}
+    for kind in np.unique(cells.status[~good & ~bad, column]).tolist():
+        counts[STATUS[kind]] = int((cells.status[~good & ~bad, column] == kind).sum())
+    return {name: count for name, count in counts.items() if count}
+
+
+def stable_marks(columns: Sequence[Column], cells: CellValues) -> Marks:
+    """Which devices render the wanted wall stably, beyond doubt."""
+    column = [one.name for one in columns].index(WALL_IS_STABLE.name)
+    return np.asarray(cells.values[:, column] == 1.0)
+
+
+def counted_values(column: Column, values: Floats, status: NDArray[np.uint8]) -> tuple[Floats, Marks]:
+    """A measure of all devices, and which of them have a value.
+
+    A device without a stable wall has a largest stiffness of 0: what it can render. One that cannot be built or
+    does not get to the handle's position has none.
+    """
+    known = status == OK
+    if column.name == STIFFNESS:
+        known = known | (status == NO_VALUE)
+    return np.where(status == OK, values, 0.0), known
+
+
+def measure_quantiles(
+    columns: Sequence[Column], cells: CellValues, shares: Sequence[float]
+) -> list[MeasureQuantiles]:
+    """Quantiles of each measure; the wanted wall's verdict, which has none, is left out."""
+    found = []
+    for n, column in enumerate(columns):
+        if column.name == WALL_IS_STABLE.name:
+            continue
+        values, known = counted_values(column, cells.values[:, n], cells.status[:, n])
+        ordered = np.sort(values[known])
+        each = (
+            tuple(Quantile(share, quantile_interval(ordered, share)) for share in shares) if len(ordered) else ()
+        )
+        found.append(MeasureQuantiles(column.name, column.unit, len(ordered), each))
+    return found
+
+
+def all_indices(columns: Sequence[Column], cells: CellValues, keys: Sequence[str], seed: int) -> list[Indices]:
+    """Indices of the wanted wall, of having any stable wall, and of each measure.
+
+    Devices without an answer are never a nan among the outcomes, which would make every index nan: of the wall and
+    the largest stiffness they are outcomes of their own, 0; of other measures there is then no index but one of
+    having a value, for leaving such devices out would bias it.
+    """
+    return [
+        indices_of(name, words, outcome, keys, seed) if not reason else Indices(name, words, (), reason)
+        for name, words, outcome, reason in _outcomes(columns, cells)
+    ]
+
+
+def _outcomes(columns: Sequence[Column], cells: CellValues) -> Iterator[tuple[str, str, Floats, str]]:
+    """Name, meaning and value (devices,) of each outcome; or why it has no indices."""
+    names = [one.name for one in columns]
+    order = sorted(range(len(columns)), key=lambda n: names[n] != WALL_IS_STABLE.name)
+    for n in order:
+        column, values, status = columns[n], cells.values[:, n], cells.status[:, n]
+        undecided = int((status == UNDECIDED).sum())
+        if column.name == WALL_IS_STABLE.name:
+            words = "1 where the wanted wall is stable, else 0, also for devices that cannot be built or asked"
+            yield column.name, words, np.where(status == OK, values, 0.0), ""
+        elif column.name == STIFFNESS:
+            has_wall = np.where(status == OK, 1.0, 0.0)
+            none = f"{undecided} charts are undecided" if undecided else ""
+            words = "1 where any wall with K > 0, B >= 0 is stable, else 0"
+            yield "has_stable_wall", words, has_wall, none
+            yield (
+                column.name,
+                "largest stiffness, 0 where no wall is stable",
+                np.where(status == OK, values, 0.0),
+                none,
+            )
+        else:
+            without = int((status != OK).sum())
+            if without:
+                words = f"1 where {column.name} has a value, else 0"
+                yield f"has_value({column.name})", words, np.where(status == OK, 1.0, 0.0), ""
+            none = f"{without} of {len(status)} devices have no value, and leaving them out would bias it"
+            yield column.name, column.title, np.where(status == OK, values, 0.0), none if without else ""

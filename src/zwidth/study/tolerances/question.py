@@ -1,0 +1,170 @@
+"""`ToleranceQuestion`: a device, its tolerances, and what is asked of the devices that are produced."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from zwidth.device.device import Device
+from zwidth.device.toml_access import is_number, table
+from zwidth.memory_limit import check_memory
+from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.column import Column, column_named
+from zwidth.study.designs.sampling import Axis, Sampling
+from zwidth.study.designs.study import PER_AXIS, PER_VALUE, Study
+from zwidth.study.designs.study_file import read_document, study_of
+from zwidth.study.tolerances.intervals import draws_needed
+from zwidth.study.tolerances.tolerance import Tolerance
+from zwidth.study.tolerances.tolerance_tables import tolerances_of
+from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
+
+SAMPLES: Final = 1000
+INDEX_SAMPLES: Final = 512
+QUANTILES: Final = (5.0, 50.0, 95.0)
+SEED: Final = 1
+PER_CHART: Final = 6000  # numbers of memory for the edge of each drawn device on the lines of the bands
+STIFFEST: Final = "stiffness_max"  # is asked of every device, whether the study names it or not
+OF_A_SWEEP: Final = ("axis", "sampling", "count", "optimise")  # what a study of tolerances leaves aside
+WALL: Final = ("stiffness_N_per_m", "damping_Ns_per_m")
+
+
+@dataclass(frozen=True, repr=False)
+class ToleranceQuestion:
+    """What is asked of devices as they are produced.
+
+    study          the device, and where and what is measured of each
+    tolerances     how its numbers differ from one produced device to the next
+    samples        devices drawn
+    index_samples  base samples of the sensitivity indices, a power of 2; 0: no indices
+    quantiles      shares 0..1, ascending, of the quantiles of measures and the bands of the chart
+    seed           of the random numbers
+    """
+
+    study: Study
+    tolerances: tuple[Tolerance, ...]
+    samples: int = SAMPLES
+    index_samples: int = INDEX_SAMPLES
+    quantiles: tuple[float, ...] = tuple(one / 100.0 for one in QUANTILES)
+    seed: int = SEED
+
+    def __repr__(self) -> str:
+        keys = ", ".join(one.key for one in self.tolerances)
+        return (
+            f"ToleranceQuestion: {self.samples} devices like {self.study.device.label!r}, which differ in {keys}"
+        )
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether a wall is wanted, whose probability is asked for."""
+        return self.study.wall.stiffness is not None
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """What is computed of each device: the study's measures, the largest stiffness, and the wanted wall."""
+        own = self.study.columns
+        stiffest = column_named(STIFFEST)
+        if self.study.turns:
+            stiffest = replace(stiffest, measure=stiffest.measure.about_moments())
+        missing = () if STIFFEST in [one.name for one in own] else (stiffest,)
+        return (*missing, *own, *((WALL_IS_STABLE,) if self.has_wall else ()))
+
+    def study_of(self, axes: Sequence[Axis], columns: Sequence[Column]) -> Study:
+        """The study of devices of which the n-th has the n-th value of every axis."""
+        return replace(self.study, sampling=Sampling(tuple(axes), paired=True), columns=tuple(columns))
+
+
+def read_question(
+    path: str | os.PathLike[str], samples: int | None = None, seed: int | None = None
+) -> ToleranceQuestion:
+    """What a study file asks of produced devices.
+
+    samples, seed  in place of those in the file
+    Raises DeviceError  with all faults of the file, those of the device file it names among them
+           TooLarge     where the devices would not fit into memory
+    """
+    label = os.fspath(path)
+    return question_of(read_document(label), label, samples, seed)
+
+
+def question_of(
+    document: dict[str, Any], label: str = "study", samples: int | None = None, seed: int | None = None
+) -> ToleranceQuestion:
+    """What a document asks of produced devices; see `read_question`."""
+    found: list[Tolerance] = []
+    given = table(document, "draw")
+    draw = given | {key: value for key, value in (("samples", samples), ("seed", seed)) if value is not None}
+    own = {key: value for key, value in document.items() if key not in OF_A_SWEEP} | (
+        {"draw": draw} if draw else {}
+    )
+    if document.get("sampling") == "latin-hypercube":
+        own.pop("seed", None)  # it is the hypercube's
+    if "draw" in document and not isinstance(document["draw"], dict):
+        own["draw"] = document["draw"]  # the schema reports it
+
+    def further(device: Device | None, faults: Faults) -> None:
+        found.extend(tolerances_of(document, device, faults))
+        faults += wall_faults(document)
+        faults += draw_faults(draw)
+
+    study = study_of(own, label, needs=("tolerance",), further=further)
+    return question_with(study, tuple(found), draw)
+
+
+def question_with(study: Study, tolerances: tuple[Tolerance, ...], draw: Mapping[str, Any]) -> ToleranceQuestion:
+    """The question of a study without faults; `draw` is its table of this name. Raises TooLarge."""
+    question = ToleranceQuestion(
+        study=study,
+        tolerances=tolerances,
+        samples=draw.get("samples", SAMPLES),
+        index_samples=draw.get("index_samples", INDEX_SAMPLES),
+        quantiles=tuple(sorted({float(one) / 100.0 for one in draw.get("quantiles_percent", QUANTILES)})),
+        seed=draw.get("seed", SEED),
+    )
+    check_size(question)
+    return question
+
+
+def wall_faults(document: Mapping[str, Any]) -> Faults:
+    """The fault of a wall of which one number is missing."""
+    there = [key for key in WALL if key in document]
+    if len(there) != 1:
+        return []
+    missing = next(key for key in WALL if key not in document)
+    return [((there[0],), f"needs {missing} beside it: the probability that this wall is stable")]
+
+
+def draw_faults(draw: Mapping[str, Any]) -> Faults:
+    """Faults of numbers of [draw] that the schema does not see."""
+    faults: Faults = []
+    size = draw.get("index_samples")
+    if isinstance(size, int) and size > 0 and size & (size - 1):
+        near = 1 << (size.bit_length() - 1)
+        faults.append((("draw", "index_samples"), f"must be a power of 2, got {size}; give {near} or {2 * near}"))
+    quantiles = draw.get("quantiles_percent")
+    given = quantiles if isinstance(quantiles, list) else []
+    for n, one in enumerate(given):
+        if is_number(one) and not 0.0 < one < 100.0:
+            faults.append((("draw", "quantiles_percent", n), f"must be between 0 and 100, got {one:g}"))
+    samples = draw.get("samples", SAMPLES)
+    inside = [one for one in given or QUANTILES if is_number(one) and 0.0 < one < 100.0]
+    if isinstance(samples, int) and samples > 0 and inside:
+        extreme = max(inside, key=lambda one: draws_needed(one / 100.0))
+        needed = draws_needed(extreme / 100.0)
+        if samples < needed:
+            message = f"{samples} devices bound no quantile of {extreme:g} %; give {needed} or more"
+            faults.append((("draw", "samples"), message))
+    return faults
+
+
+def check_size(question: ToleranceQuestion) -> None:
+    """Raises TooLarge where the devices would not fit into memory, before any of them is drawn."""
+    count = len(question.tolerances)
+    numbers = sum(1 + len(one.ties) for one in question.tolerances)
+    devices = question.samples * (1.0 + count) + question.index_samples * (count + 2.0)
+    check_memory(
+        devices * (PER_VALUE * len(question.columns) + PER_AXIS * numbers) + PER_CHART * question.samples,
+        f"{devices:.0f} devices, {question.samples} drawn and the others for indices and narrower tolerances,",
+        "lower samples or index_samples",
+    )

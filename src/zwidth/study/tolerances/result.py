@@ -1,0 +1,195 @@
+"""`ToleranceStudy`: what is certain of devices as they are produced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.point_chart import chart_at
+from zwidth.device.faults import plural
+from zwidth.measures.definition import NO_VALUE, OK, STATUS
+from zwidth.result import Result
+from zwidth.study.designs.sweep import Sweep
+from zwidth.study.designs.sweep_job import SweepJob
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.tolerances.band import Band
+from zwidth.study.tolerances.indices import Indices
+from zwidth.study.tolerances.intervals import Interval, share_interval
+from zwidth.study.tolerances.outcomes import (
+    STABLE,
+    STIFFNESS,
+    UNSTABLE,
+    WITH_WALL,
+    WITHOUT_WALL,
+    MeasureQuantiles,
+    measure_quantiles,
+    outcome_counts,
+)
+from zwidth.study.tolerances.question import ToleranceQuestion
+from zwidth.study.tolerances.tighten import Tightened
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from zwidth.chart.chart_base import Chart
+
+ASKED: Final = (STABLE, UNSTABLE, WITH_WALL, WITHOUT_WALL, "undecided")  # outcomes of devices that could be asked
+
+
+@dataclass(frozen=True, repr=False)
+class ToleranceStudy(Result):
+    """A device as it is produced, with everything that is certain of it.
+
+    question   what was asked
+    job        the drawn devices
+    cells      measures and status (devices, columns) of each
+    indices    of each outcome; () where none were asked for
+    bands      of the chart, the likeliest walls first
+    uncharted  number of drawn devices without a chart; in the bands they count as not stable
+    tightened  what half of each tolerance does for the wanted wall, the largest gain first; () where there is no
+               wall, or every device renders it
+    """
+
+    question: ToleranceQuestion
+    job: SweepJob
+    cells: CellValues
+    indices: tuple[Indices, ...] = ()
+    bands: tuple[Band, ...] = ()
+    uncharted: int = 0
+    tightened: tuple[Tightened, ...] = ()
+
+    def __repr__(self) -> str:
+        question = self.question
+        devices = plural(question.samples, "device")
+        lines = [f"ToleranceStudy: {devices} like {question.study.device.label!r}"]
+        if (share := self.probability) is not None:
+            wall = question.study.wall
+            lines.append(
+                f"the wall {wall.stiffness:.6g} N/m, {wall.damping:.6g} N s/m is stable in {share.value:.1%} "
+                f"({share.low:.1%} to {share.high:.1%})"
+            )
+        for band in self.bands[:1]:
+            if band.stiffest is not None:
+                wall_text = f"{band.stiffest.stiffness:.6g} N/m, {band.stiffest.damping:.6g} N s/m"
+                lines.append(f"the stiffest wall of {band.probability:.4g} of them is {wall_text}")
+        return "\n  ".join(lines)
+
+    @cached_property
+    def outcomes(self) -> dict[str, int]:
+        """Outcome -> number of drawn devices."""
+        return outcome_counts(self.question.columns, self.cells)
+
+    @property
+    def probability(self) -> Interval | None:
+        """Probability that a produced device renders the wanted wall stably; None where no wall is wanted.
+
+        Devices that cannot be built, or do not get to the handle's position, do not. Undecided verdicts widen the
+        interval on its high side.
+        """
+        if not self.question.has_wall:
+            return None
+        return share_interval(
+            self.outcomes.get(STABLE, 0), self.question.samples, self.outcomes.get("undecided", 0)
+        )
+
+    @property
+    def without_answer(self) -> dict[str, int]:
+        """Outcome -> number of the devices that could not be asked: not built, out of reach, ..."""
+        return {name: count for name, count in self.outcomes.items() if name not in ASKED}
+
+    @property
+    def without_stable_wall(self) -> int:
+        """Number of drawn devices of which no wall with K > 0 and B >= 0 is stable."""
+        column = [one.name for one in self.question.columns].index(STIFFNESS)
+        return int((self.cells.status[:, column] == NO_VALUE).sum())
+
+    @cached_property
+    def quantiles(self) -> tuple[MeasureQuantiles, ...]:
+        """Quantiles of every measure."""
+        return tuple(measure_quantiles(self.question.columns, self.cells, self.question.quantiles))
+
+    @cached_property
+    def nominal(self) -> Chart | None:
+        """The chart of the device as its file describes it; None where it has none."""
+        study = self.question.study
+        try:
+            point = study.device.at(study.at, study.direction, assembly=study.assembly, model=study.model)
+            return chart_at(point, decay=False)
+        except (ChartError, ValueError):
+            return None
+
+    @property
+    def reason(self) -> str | None:
+        """Why nothing is certain: no drawn device could be asked, with the first reason; None where one could."""
+        if any(name in ASKED for name in self.outcomes):
+            return None
+        status = ", ".join(f"{count} {name}" for name, count in self.outcomes.items())
+        why = next(iter(self.reasons), "")
+        return f"no drawn device has an answer: {status}{f'; the first: {why}' if why else ''}"
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why devices have no value, each reason once: "failed: ..."."""
+        texts = [
+            f"{STATUS[note.status]}: {note.reason}"
+            for notes in self.cells.notes
+            for note in notes
+            if note.status != OK and note.reason
+        ]
+        return list(dict.fromkeys(texts))
+
+    @property
+    def best_to_tighten(self) -> tuple[Tightened, ...]:
+        """The tolerances of which half the width would gain most: several that cannot be told apart, or ().
+
+        A narrower tolerance that does not raise the share for certain is not among them.
+        """
+        certain = [one for one in self.tightened if one.is_certain]
+        return tuple(one for one in certain if one.may_be_best)
+
+    def dataset(self) -> xr.Dataset:
+        """The drawn devices: their numbers, measures and status along the dimension `design`."""
+        return self._sweep.dataset()
+
+    def document(self) -> dict[str, Any]:
+        """Everything by key and unit."""
+        question, share = self.question, self.probability
+        wall = question.study.wall
+        return {
+            "stiffness_N_per_m": wall.stiffness,
+            "damping_Ns_per_m": wall.damping,
+            "samples": question.samples,
+            "index_samples": question.index_samples,
+            "seed": question.seed,
+            "tolerances": [one.document() for one in question.tolerances],
+            "outcomes": self.outcomes,
+            "probability": None if share is None else share.value,
+            "probability_low": None if share is None else share.low,
+            "probability_high": None if share is None else share.high,
+            "without_stable_wall": self.without_stable_wall,
+            "quantiles": [one.document() for one in self.quantiles],
+            "uncharted": self.uncharted,
+            "bands": [one.document() for one in self.bands],
+            "indices": [one.document() for one in self.indices],
+            "narrower": [one.document() for one in self.tightened],
+            "tighten_first": [one.key for one in self.best_to_tighten],
+            "notes": self.reasons,
+        }
+
+    def table(self) -> Mapping[str, list[Any]]:
+        """The drawn devices as columns, one device a row."""
+        return self._sweep.table()
+
+    @property
+    def _sweep(self) -> Sweep:
+        return Sweep(self.job_study, self.job, self.cells)
+
+    @property
+    def job_study(self) -> Any:
+        """The study of the drawn devices."""
+        from dataclasses import replace
+
+        return replace(self.question.study, sampling=self.job.sampling, columns=self.job.columns)

@@ -1,0 +1,271 @@
+"""`tolerance`: what is certain of a device as it is produced, with every number somewhere within its tolerance.
+
+1. Devices are drawn at random and measured: the share that renders the wanted wall, quantiles of the measures.
+2. Devices laid for Sobol's indices: which tolerance makes how much of the spread.
+3. The drawn devices once more, with one tolerance after the other half as wide: what that is worth.
+4. The edges of the drawn devices on lines of equal damping: bands of the chart.
+5. The stiffest wall of each band, on devices drawn anew, since it was chosen to suit the first ones.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+import numpy as np
+
+from zwidth.device.device import Device
+from zwidth.measures.definition import OK, Measure
+from zwidth.progress import Progress
+from zwidth.study.designs.sampling import Axis
+from zwidth.study.designs.sweep_job import SweepJob, sweep_job
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.job import CellValues, Job
+from zwidth.study.jobs.store import Store
+from zwidth.study.tolerances.band import Band, Coverage, refined_dampings
+from zwidth.study.tolerances.draws import UNSEEN, drawn_values
+from zwidth.study.tolerances.edge_job import MOST_INTERVALS, EdgeJob, highest_damping
+from zwidth.study.tolerances.indices import Indices, sampled_shares
+from zwidth.study.tolerances.intervals import count_bounds, share_interval
+from zwidth.study.tolerances.outcomes import all_indices, stable_marks
+from zwidth.study.tolerances.question import ToleranceQuestion, read_question
+from zwidth.study.tolerances.question_arguments import question_over
+from zwidth.study.tolerances.result import ToleranceStudy
+from zwidth.study.tolerances.tighten import Tightened, tightened, tightened_axes
+from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
+
+if TYPE_CHECKING:
+    from zwidth.loop.posed_device import Position
+
+LINES: Final = 128  # steps of damping in which bands are laid over the chart
+PIECES: Final = 24  # into which a step is divided where a band ends or is stiffest
+TRIED: Final = 64  # devices whose edges say how far the lines reach
+ABOVE: Final = 1.1  # how much further they reach than those devices
+ROUNDS: Final = 1  # of finer lines
+MOST_ROUNDS: Final = 10  # in all
+
+# Computes a job: its name (of its store), the job, and the stage that progress is reported under.
+Compute: TypeAlias = Callable[[str, Job, str], CellValues]
+
+
+def tolerance(
+    device: Device,
+    tolerances: Mapping[str, Mapping[str, Any]],
+    measures: str | Measure | Sequence[str | Measure] = (),
+    *,
+    stiffness: float | None = None,
+    damping: float | None = None,
+    frequency: float | None = None,
+    position: Position | None = None,
+    direction: Sequence[float] | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    samples: int | None = None,
+    index_samples: int | None = None,
+    quantiles_percent: Sequence[float] | None = None,
+    seed: int | None = None,
+    user_measures: Mapping[str, Measure] | None = None,
+    store: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> ToleranceStudy:
+    """What is certain of a device whose numbers differ from one produced device to the next.
+
+        found = tolerance(device, {"loop.delay_samples": {"distribution": "uniform", "low": 0.3, "high": 0.6}},
+                          stiffness=4000.0, damping=10.0)
+        found.probability.value, found.probability.low, found.probability.high
+
+    tolerances     path -> how the number differs: the keys of a [[tolerance]] without `key`
+    measures       one or several, by name or as measures, besides the largest stiffness
+    stiffness, damping   of the wanted wall [N/m], [N s/m], whose probability is asked for; both or none
+    frequency      of the hand's motion [Hz], for measures about it
+    position, direction, assembly, model   of all devices, as for `Device.at`
+    samples, index_samples, quantiles_percent, seed   as in [draw] of a study file
+    store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
+    progress       is called with the stage, the number of devices done, and of all of them
+    workers        processes at most; left out: one for each core
+    Raises         DeviceError   with all faults of the arguments
+                   MeasureError  for measures that do not exist for this device
+                   TooLarge      where the devices would not fit into memory
+                   what `executor.run` and `Store` raise
+    """
+    question = question_over(
+        device,
+        tolerances,
+        measures,
+        user_measures,
+        {"at": position, "direction": direction, "assembly": assembly, "model": model}
+        | {"stiffness_N_per_m": stiffness, "damping_Ns_per_m": damping, "frequency_Hz": frequency},
+        {"samples": samples, "index_samples": index_samples, "quantiles_percent": quantiles_percent, "seed": seed},
+    )
+    return answer(question, computing(store, progress, workers))
+
+
+def run_tolerances(
+    question: ToleranceQuestion | str | os.PathLike[str],
+    store: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> ToleranceStudy:
+    """Answer what a study file asks of produced devices; see `tolerance` for the rest.
+
+    question  read by `read_question`, or the path of its file
+    """
+    asked = question if isinstance(question, ToleranceQuestion) else read_question(question)
+    return answer(asked, computing(store, progress, workers))
+
+
+def computing(
+    store: str | os.PathLike[str] | None, progress: Progress | None = None, workers: int | None = None
+) -> Compute:
+    """A function that computes jobs, each with a store of its own inside a folder; None: none is kept."""
+
+    def compute(name: str, job: Job, stage: str) -> CellValues:
+        kept = None if store is None else Store(Path(store) / name, job)
+        return run(job, kept, progress, workers, stage=stage)
+
+    return compute
+
+
+def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
+    """Answer a question with a function that computes jobs. Raises what `sweep_job` and that function raise."""
+    values = drawn_values(question.tolerances, question.seed, question.samples)
+    job, cells, indices = _measured(question, values, compute)
+    found = ToleranceStudy(question=question, job=job, cells=cells, indices=tuple(indices))
+    if found.reason is not None:
+        return found
+    bands, uncharted = _bands(question, values, compute)
+    narrower = _tightened(question, values, cells, compute)
+    return replace(found, bands=bands, uncharted=uncharted, tightened=narrower)
+
+
+def is_store_name(name: str) -> bool:
+    """Whether a folder of this name, inside the folder of a run, is the store of one of its jobs."""
+    return name in ("devices", "narrower", "unseen") or name.removeprefix("edges-").isdigit()
+
+
+def _axes(question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]]) -> list[Axis]:
+    """The axes of devices with these values of their tolerances."""
+    return [one.axis(own) for one, own in zip(question.tolerances, values, strict=True)]
+
+
+def _measured(
+    question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], compute: Compute
+) -> tuple[SweepJob, CellValues, list[Indices]]:
+    """The drawn devices and their measures; and the indices, from devices of their own in the same job."""
+    count, keys = question.samples, [one.key for one in question.tolerances]
+    laid = np.empty((0, len(keys)))
+    if question.index_samples:
+        laid = sampled_shares(len(keys), question.index_samples, question.seed)
+    both = [
+        np.concatenate([own, one.distribution.values(laid[:, n])])
+        for n, (one, own) in enumerate(zip(question.tolerances, values, strict=True))
+    ]
+    whole = sweep_job(question.study_of(_axes(question, both), question.columns))
+    cells = compute("devices", whole, "computing devices")
+    notes = tuple(tuple(note for note in each if note.first[0] < count) for each in cells.notes)
+    drawn = CellValues(cells.values[:count], cells.status[:count], notes)
+    rest = CellValues(cells.values[count:], cells.status[count:], cells.notes)
+    indices = all_indices(question.columns, rest, keys, question.seed) if len(laid) else []
+    return replace(whole, sampling=question.study_of(_axes(question, values), ()).sampling), drawn, indices
+
+
+def _tightened(
+    question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], cells: CellValues, compute: Compute
+) -> tuple[Tightened, ...]:
+    """What each narrower tolerance does for the wanted wall; () where none is wanted, or all devices render it."""
+    before = stable_marks(question.columns, cells) if question.has_wall else np.ones(1, dtype=bool)
+    if before.all():
+        return ()
+    axes = tightened_axes(question.tolerances, values)
+    job = sweep_job(question.study_of(axes, [WALL_IS_STABLE]))
+    found = compute("narrower", job, "computing devices of narrower tolerances")
+    after = stable_marks([WALL_IS_STABLE], found).reshape(len(values), question.samples)
+    return tightened([one.key for one in question.tolerances], before, after)
+
+
+def _bands(
+    question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], compute: Compute
+) -> tuple[tuple[Band, ...], int]:
+    """Bands of the chart, one for each quantile, the likeliest walls first; and how many devices lack one."""
+    shares = question.quantiles[::-1]
+    counts = [count_bounds(share, question.samples) for share in shares]
+    wanted = [count for each in counts for count in each if count]
+    coverage, uncharted = _coverage(question, values, wanted, compute)
+    bands = []
+    for share, (certain, members, possible) in zip(shares, counts, strict=True):
+        bands.append(
+            Band(
+                probability=share,
+                members=members,
+                dampings=coverage.dampings,
+                pieces=tuple(coverage.pieces(d, members) for d in range(len(coverage.dampings))),
+                stiffest=coverage.stiffest(members),
+                certain=coverage.stiffest(certain) if certain else None,
+                high=coverage.largest(possible)[0],
+            )
+        )
+    return _tried(question, bands, compute), uncharted
+
+
+def _coverage(
+    question: ToleranceQuestion,
+    values: Sequence[np.ndarray[Any, Any]],
+    counts: Sequence[int],
+    compute: Compute,
+) -> tuple[Coverage, int]:
+    """How many drawn devices are stable along lines of damping: even ones, then finer ones where it matters.
+
+    Returns  the count of stable devices, and how many have no chart and count as not stable
+    """
+    job = sweep_job(question.study_of(_axes(question, values), [WALL_IS_STABLE] if question.has_wall else []))
+    top = ABOVE * highest_damping(job, TRIED) or 1.0
+    dampings, intervals = np.empty(0), np.empty((question.samples, 0, MOST_INTERVALS, 2))
+    wanted, rounds, n = np.linspace(0.0, top, LINES + 1), 0, 0
+    while True:
+        edges = compute(f"edges-{n}", EdgeJob(job, wanted), "computing charts of devices")
+        found = np.where(edges.status == OK, edges.values, 0.0)
+        intervals = np.concatenate([intervals, found.reshape(len(found), len(wanted), MOST_INTERVALS, 2)], axis=1)
+        dampings = np.concatenate([dampings, wanted])
+        order = np.argsort(dampings, kind="stable")
+        dampings, intervals = dampings[order], intervals[:, order]
+        coverage, n = Coverage(dampings, intervals), n + 1
+        if n < MOST_ROUNDS and coverage.topmost(min(counts)) == len(dampings) - 1:  # bands go on above all lines
+            wanted, top = top + top * np.arange(1, LINES + 1) / LINES, 2.0 * top
+            continue
+        wanted, rounds = refined_dampings(coverage, counts, PIECES), rounds + 1
+        if rounds > ROUNDS or not len(wanted):
+            return coverage, int((edges.status[:, 0] != OK).sum())
+
+
+def _tried(question: ToleranceQuestion, bands: Sequence[Band], compute: Compute) -> tuple[Band, ...]:
+    """The bands with the stiffest wall of each tried on devices drawn anew."""
+    walls = [wall for band in bands for wall in (band.stiffest, band.certain) if wall is not None]
+    if not walls:
+        return tuple(bands)
+    count, values = question.samples, drawn_values(question.tolerances, question.seed, question.samples, UNSEEN)
+    axes = _axes(question, [np.tile(own, len(walls)) for own in values])
+    axes += [
+        Axis("stiffness_N_per_m", tuple(wall.stiffness for wall in walls for _ in range(count))),
+        Axis("damping_Ns_per_m", tuple(wall.damping for wall in walls for _ in range(count))),
+    ]
+    job = sweep_job(question.study_of(axes, [WALL_IS_STABLE]))
+    found = compute("unseen", job, "trying walls on further devices")
+    good = (found.values[:, 0] == 1.0).reshape(len(walls), count).sum(axis=1)
+    tried = iter(
+        [
+            replace(wall, share=share_interval(int(one), count), unseen=count)
+            for wall, one in zip(walls, good, strict=True)
+        ]
+    )
+    return tuple(
+        replace(
+            band,
+            stiffest=next(tried) if band.stiffest is not None else None,
+            certain=next(tried) if band.certain is not None else None,
+        )
+        for band in bands
+    )

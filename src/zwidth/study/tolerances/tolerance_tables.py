@@ -1,0 +1,261 @@
+"""From the [[tolerance]] tables of a study file to tolerances, or to what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import inf, isfinite, log
+from typing import Any, Final
+
+from zwidth.device import address
+from zwidth.device.device import Device
+from zwidth.device.faults import KeyPath, dotted, nearest, quote
+from zwidth.device.schema import device_file as schema
+from zwidth.device.toml_access import is_number, tables
+from zwidth.study.designs.axis_tables import (
+    Fault,
+    Faults,
+    SetNumbers,
+    key_faults,
+    overlap_faults,
+    ties_of,
+    unit_of,
+)
+from zwidth.study.designs.sampling import CIRCUMSTANCES
+from zwidth.study.tolerances.distribution import (
+    CUT,
+    SPAN_OF_95,
+    Distribution,
+    Limits,
+    lognormal,
+    normal,
+    spread_of_variation,
+)
+from zwidth.study.tolerances.tolerance import Tolerance
+
+# Ways of giving the width, by the kind of distribution.
+WIDTHS: Final[dict[str, tuple[tuple[str, ...], ...]]] = {
+    "normal": (("standard_deviation",), ("standard_deviation_percent",), ("low", "high")),
+    "lognormal": (("standard_deviation_percent",), ("low", "high")),
+    "uniform": (("plus_minus",), ("plus_minus_percent",), ("low", "high")),
+    "triangular": (("plus_minus",), ("plus_minus_percent",), ("low", "high")),
+}
+WITH_TAILS: Final = ("normal", "lognormal")
+WIDTH_KEYS: Final = tuple(dict.fromkeys(key for ways in WIDTHS.values() for way in ways for key in way))
+PERCENT: Final = ("standard_deviation_percent", "plus_minus_percent")
+KIND: Final = "tolerance"
+
+
+def tolerances_of(document: dict[str, Any], device: Device | None, faults: Faults) -> tuple[Tolerance, ...]:
+    """The tolerances of a study that have no fault; the faults of the others are added to `faults`.
+
+    document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
+    device    None if it could not be loaded; paths are then not looked up
+    """
+    found, taken = [], SetNumbers()
+    for n, table in tables(document, KIND):
+        own: Faults = list(_width_faults(table))
+        tolerance = _tolerance(table, device, taken, own)
+        faults += [((KIND, n, *path), message) for path, message in own]
+        if tolerance is not None and not own:
+            found.append(tolerance)
+    return tuple(found)
+
+
+def _width_faults(table: dict[str, Any]) -> Iterator[Fault]:
+    """Faults of a table whose width is missing, given twice, upside down, or of another kind of distribution."""
+    kind = table.get("distribution")
+    if kind not in WIDTHS:
+        return  # `study_schema` reports it
+    ways = WIDTHS[kind]
+    allowed = {key for way in ways for key in way}
+    for key in WIDTH_KEYS:
+        if key in table and key not in allowed:
+            yield (key,), f"is not the width of a {kind} distribution; give {_listed(ways)}"
+    used = [way for way in ways if any(key in table for key in way)]
+    if not used and not any(key in table for key in WIDTH_KEYS):
+        yield (), f"has no width; give {_listed(ways)}"
+    if len(used) > 1:
+        yield (used[1][0],), f"and {used[0][0]} exclude each other; remove one of them"
+    if ("low" in table) != ("high" in table):
+        there, missing = ("low", "high") if "low" in table else ("high", "low")
+        yield (there,), f"needs {missing} beside it"
+    low, high = table.get("low"), table.get("high")
+    if is_number(low) and is_number(high) and not low < high:
+        yield ("low",), f"must be below high, got {quote(low)} and {quote(high)}; exchange them"
+    if "cut_at_deviations" in table and kind not in WITH_TAILS:
+        yield (
+            ("cut_at_deviations",),
+            f"goes with a normal or lognormal distribution; a {kind} one has ends: remove it",
+        )
+
+
+def _listed(ways: Sequence[Sequence[str]]) -> str:
+    """Ways of giving a width, in words."""
+    *first, last = [" and ".join(way) for way in ways]
+    return f"{', '.join(first)} or {last}"
+
+
+def _tolerance(
+    table: dict[str, Any], device: Device | None, taken: SetNumbers, faults: Faults
+) -> Tolerance | None:
+    """The tolerance of a table; None where it has faults, which are added, or some that the schema reports."""
+    key = table.get("key")
+    if not isinstance(key, str) or not key or device is None:
+        return None
+    if message := _key_fault(device.document, key):
+        faults.append((("key",), message))
+        return None
+    faults += overlap_faults(key, ("key",), key, device, taken, KIND)
+    if faults:
+        return None
+    value = address.get(device.document, key) if address.exists(device.document, key) else None
+    made = _distribution(table, key, float(value) if is_number(value) else None, device.document, faults)
+    if made is None or faults:
+        return None
+    distribution, relative = made
+    drawn = {"key": key, "values": [distribution.low, distribution.high], "tie": table.get("tie")}
+    ties = tuple(ties_of(drawn, key, device, taken, faults, KIND))
+    steps = address.resolve(device.document, key)
+    return Tolerance(
+        key, dotted(steps, device.document), distribution, relative, unit_of(device.document, key), ties
+    )
+
+
+def _key_fault(document: dict[str, Any], key: str) -> str:
+    """What is wrong with a key that no real number of the device file has; "" for nothing."""
+    if key in CIRCUMSTANCES:
+        return f"'{key}' is a circumstance of the study; a tolerance is of a number of the device file"
+    for _, message in key_faults(document, key, []):
+        near = nearest(key, address.numeric_addresses(document))
+        return f"{message}; did you mean '{near}'?" if near and "did you mean" not in message else message
+    kinds = {str(kind.get("type")) for kind in schema.subschemas(address.resolve(document, key))}
+    if "number" in kinds:
+        return ""
+    if "integer" in kinds:
+        return f"'{key}' takes whole numbers, of which there is no tolerance; compare them with zwidth sweep"
+    return f"'{key}' takes no number"
+
+
+def _distribution(
+    table: dict[str, Any], key: str, value: float | None, document: dict[str, Any], faults: Faults
+) -> tuple[Distribution, bool] | None:
+    """The distribution of a table without faults of its width, and whether it is relative; faults are added.
+
+    value  the number in the device file; None: it has none
+    """
+    kind = table.get("distribution")
+    width_key = next((one for one in WIDTH_KEYS if one in table), "")
+    numbers = [table[one] for one in (*WIDTH_KEYS, "cut_at_deviations") if one in table]
+    if kind not in WIDTHS or not width_key or not all(is_number(one) and isfinite(one) for one in numbers):
+        return None
+    if any(
+        table[one] <= 0
+        for one in (*WIDTH_KEYS, "cut_at_deviations")
+        if one in table and one not in ("low", "high")
+    ):
+        return None  # the schema reports both
+    by_ends = width_key == "low"
+    if value is None and (not by_ends or kind == "triangular"):
+        faults.append((("key",), f"'{key}' has no value in the device file; set it first, or give low and high"))
+        return None
+    if width_key in PERCENT and value == 0.0:
+        absolute = width_key.removesuffix("_percent")
+        instead = absolute if (absolute,) in WIDTHS[kind] else "another distribution"
+        faults.append(((width_key,), f"needs a value of '{key}' other than 0 in the device file; give {instead}"))
+        return None
+    limits = _limits(address.resolve(document, key))
+    middle = value if value is not None else 0.0
+    if kind in WITH_TAILS:
+        made = _with_tails(table, kind, key, middle, limits, faults)
+    else:
+        made = _bounded(table, kind, key, middle, limits, faults)
+    return None if made is None else (made, width_key in PERCENT or kind == "lognormal")
+
+
+def _with_tails(
+    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: Faults
+) -> Distribution | None:
+    """A normal or lognormal distribution, cut off where the number would not be valid."""
+    cut = float(table.get("cut_at_deviations", CUT))
+    low, high = table.get("low"), table.get("high")
+    if kind == "lognormal":
+        least = low if low is not None else value
+        if not least > 0.0:
+            faults.append((("distribution",), f"lognormal needs numbers above 0, got {quote(least)} for '{key}'"))
+            return None
+    if low is not None and high is not None:
+        if kind == "lognormal":
+            middle, deviation = (low * high) ** 0.5, 0.5 * log(high / low) / SPAN_OF_95
+        else:
+            middle, deviation = 0.5 * (low + high), 0.5 * (high - low) / SPAN_OF_95
+    elif kind == "lognormal":
+        middle, deviation = value, spread_of_variation(table["standard_deviation_percent"] / 100.0)
+    else:
+        percent = table.get("standard_deviation_percent")
+        middle = value
+        deviation = table["standard_deviation"] if percent is None else abs(value) * percent / 100.0
+    made = (lognormal if kind == "lognormal" else normal)(middle, deviation, limits, cut)
+    if not made.low <= middle <= made.high or not made.low < made.high:
+        faults.append((("low",), f"and high have their middle at {middle:.6g}, which '{key}' may not be"))
+        return None
+    return made
+
+
+def _bounded(
+    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: Faults
+) -> Distribution | None:
+    """A uniform or triangular distribution, whose ends are values that the number may have."""
+    low, high = table.get("low"), table.get("high")
+    percent = table.get("plus_minus_percent")
+    middle = value
+    if low is None or high is None:
+        width = table["plus_minus"] if percent is None else abs(value) * percent / 100.0
+        low, high = value - width, value + width
+        shown = "plus_minus" if percent is None else "plus_minus_percent"
+    else:
+        shown = "low" if low < limits.lowest else "high"
+        middle = value if kind == "triangular" else 0.5 * (low + high)
+        if not low <= middle <= high:
+            message = (
+                f"and high must enclose the value of '{key}' in the device file, {quote(value)}, the likeliest"
+            )
+            faults.append((("low",), message))
+            return None
+    low, high = float(low), float(high)
+    if low < limits.lowest or high > limits.highest:
+        faults.append(((shown,), f"leads to values of '{key}' from {low:.6g} to {high:.6g}; {_allowed(limits)}"))
+        return None
+    return Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
+
+
+def _allowed(limits: Limits) -> str:
+    """What values are allowed, in words."""
+    words = []
+    if limits.least > -inf:
+        words.append(f"{'above' if limits.without_least else 'at least'} {limits.least:.6g}")
+    if limits.most < inf:
+        words.append(f"{'below' if limits.without_most else 'at most'} {limits.most:.6g}")
+    return f"it must be {' and '.join(words)}"
+
+
+def _limits(steps: KeyPath) -> Limits:
+    """The widest limits that the schema sets for the number at a path."""
+    numbers = [kind for kind in schema.subschemas(steps) if kind.get("type") == "number"]
+    if not numbers:
+        return Limits()
+    least = min(_limit(kind, -inf, ("gt", "exclusiveMinimum"), ("ge", "minimum")) for kind in numbers)
+    most = max(_limit(kind, inf, ("lt", "exclusiveMaximum"), ("le", "maximum"), -1) for kind in numbers)
+    return Limits(least[0], most[0], least[1] > 0, most[1] < 0)
+
+
+def _limit(
+    kind: dict[str, Any], none: float, without: Sequence[str], within: Sequence[str], sign: int = 1
+) -> tuple[float, int]:
+    """A limit that a subschema sets, and `sign` where the limit itself is not allowed, else 0."""
+    for key in without:
+        if key in kind:
+            return float(kind[key]), sign
+    for key in within:
+        if key in kind:
+            return float(kind[key]), 0
+    return none, 0
