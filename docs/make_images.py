@@ -3,7 +3,9 @@ that bend."""
 
 from __future__ import annotations
 
+import re
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,8 +25,12 @@ from zwidth.show.figures.caption import caption_of_result, write_caption
 from zwidth.show.figures.load_path import load_path_figure
 from zwidth.show.figures.stability import draw_chart
 from zwidth.show.figures.style import context, figure, save
+from zwidth.show.figures.tolerance import tolerance_figure
+from zwidth.study.tolerances.question import question_of
+from zwidth.study.tolerances.tolerance_study import run_tolerances
 
 IMAGES = Path(__file__).parent / "images"
+PAGE = Path(__file__).parent / "tolerance.md"  # whose example is drawn
 
 
 def main() -> None:
@@ -40,6 +46,12 @@ def main() -> None:
         made = load_path_figure(path)
         write_caption(made, caption_of_result(path))
     print(save(made, IMAGES / "load-five-bar.svg"))
+    (example,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    series = run_tolerances(question_of(tomllib.loads(example)))
+    with context():
+        made = tolerance_figure(series)
+        write_caption(made, caption_of_result(series))
+    print(save(made, IMAGES / "tolerance.svg"))
     page(fig_5_4_common_area.draw, "fig-5-4-common-area", 6.4, 4.8)
     page(fig_5_10_eigenvalues.draw, "fig-5-10-eigenvalues", 7.4, 4.6)
     page(slender_links.draw, "slender-links", 4.6, 7.6)

@@ -52,11 +52,24 @@ def keys(section: str) -> set[str]:
     }
 
 
+TOLERANCES = """
+device = "my-device.toml"
+stiffness_N_per_m = 700
+damping_Ns_per_m = 1.5
+draw = { samples = 72, index_samples = 32 }
+[[tolerance]]
+key = "plant.mass_kg"
+distribution = "normal"
+standard_deviation_percent = 10
+"""
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     (tmp_path / "my-device.toml").write_text(DEVICE)
     (tmp_path / "walls.csv").write_text("stiffness_N_per_m,damping_Ns_per_m\n4000,10\n9000,10\n")
     (tmp_path / "my-study.toml").write_text(STUDY)
+    (tmp_path / "my-tolerances.toml").write_text(TOLERANCES)
     (tmp_path / "strokes.csv").write_text(csv_text(bench_record(1, forward=0.45, friction=0.003, amplitude=0.045)))
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -115,6 +128,11 @@ def test_the_keys_that_come_out_are_those_explained(folder):
     assert set(document) - asked == keys("experiment")
     document = document_of("sweep", "my-study.toml")
     assert set(document) - asked == keys("sweep")
+    document = document_of("tolerance", "my-tolerances.toml")
+    inner = [document[name][0] for name in ("bands", "indices", "quantiles", "narrower")]
+    assert set(document) - asked == keys("tolerance")
+    for one in (*inner, document["indices"][1]["indices"][0], document["bands"][0]["stiffest"]):
+        assert all(f"`{key}`" in PAGE for key in one)
     report = document_of("report", TWO_MASS, "--output", "report.html")
     assert set(report) >= {"file", "summary", "stiffness_max_N_per_m", *(asked - {"reason"})}
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from zwidth.show.output import printable
 from zwidth.show.units import amount, number, percent, typed
 
 if TYPE_CHECKING:
-    from zwidth.study.tolerances.band import Band, BandWall
-    from zwidth.study.tolerances.indices import Indices
+    from zwidth.study.tolerances.band import BandWall
+    from zwidth.study.tolerances.indices import Index, Indices
     from zwidth.study.tolerances.intervals import Interval
     from zwidth.study.tolerances.result import ToleranceStudy
     from zwidth.study.tolerances.tolerance import Tolerance
@@ -80,36 +80,50 @@ def outcome_sentences(result: ToleranceStudy) -> Iterator[str]:
     yield from (f"  {printable(reason)}" for reason in result.reasons[:3])
 
 
-def band_sentence(band: Band) -> str:
-    """The stiffest wall of a band, a more cautious one, and how they did on further devices."""
-    of = typed(percent(band.probability))
-    if band.stiffest is None:
-        return f"no wall with K > 0 is stable in {of} of the drawn devices"
-    first = f"the stiffest wall of {of} of the drawn devices is {_tried(band.stiffest)}"
-    if band.certain is None:
-        return f"{first}; they are too few for a more cautious one"
-    if band.probability < 0.5:  # nobody promises what most devices do not render
-        return first
-    return f"{first}; more cautious is {_tried(band.certain)}"
+def band_rows(result: ToleranceStudy) -> Iterator[list[str]]:
+    """Of each band its share, the stiffest wall and a more cautious one, with the further devices that have it."""
+    for band in result.bands:
+        walls = [_tried(band.stiffest)]
+        # nobody promises what most devices do not render
+        walls.append(_tried(band.certain) if band.probability >= 0.5 else "")
+        yield [typed(percent(band.probability)), *walls]
 
 
-def _tried(wall: BandWall) -> str:
+def _tried(wall: BandWall | None) -> str:
+    if wall is None:
+        return "none"
     place = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
-    if wall.share is None:
-        return place
-    return f"{place}, which {share_text(wall.share)} of {wall.unseen} further ones render"
+    return place if wall.share is None else f"{place}; {share_text(wall.share)} of {wall.unseen} further ones"
 
 
-def index_sentence(outcome: Indices) -> str:
-    """Which tolerances an outcome's spread comes from; those that cannot be told from 0 are said to be so."""
-    if not outcome.indices:
-        return f"{outcome.name}: no index, {outcome.reason}"
-    certain = sorted((one for one in outcome.indices if one.total_is_certain), key=lambda one: -one.total.value)
-    rest = [one.key for one in outcome.indices if not one.total_is_certain]
-    parts = [f"{one.key} has a part in {typed(percent(one.total.value))} of the spread" for one in certain]
-    if rest:
-        parts.append(f"{', '.join(rest)}: cannot be told from no part at all")
-    return f"{outcome.name}: {'; '.join(parts)}"
+def index_rows(outcomes: Sequence[Indices]) -> Iterator[list[str]]:
+    """Of each tolerance its part in the spread of each outcome: the total index with its interval.
+
+    outcomes  those that have indices
+    """
+    for each in zip(*(one.indices for one in outcomes), strict=True):
+        yield [each[0].key, *map(_part, each)]
+
+
+def _part(one: Index) -> str:
+    low, high = number(100.0 * one.total.low), number(100.0 * one.total.high)
+    if not one.total_is_certain:
+        return typed(f"0, as far as can be told ({low} to {high} %)")
+    return typed(f"{percent(one.total.value)} ({low} to {high} %)")
+
+
+def narrower_rows(result: ToleranceStudy) -> Iterator[list[str]]:
+    """Of each tolerance, half as wide, the share of devices with the wall, and the gain."""
+    for one in result.tightened:
+        gain = _gain(one.gain)
+        yield [one.key, share_text(one.share), gain if one.is_certain else f"0, as far as can be told: {gain}"]
+
+
+def no_index_sentences(result: ToleranceStudy) -> Iterator[str]:
+    """Which outcomes have no index, and why."""
+    for one in result.indices:
+        if not one.indices:
+            yield f"no index of {one.name}: {one.reason}"
 
 
 def advice_sentence(result: ToleranceStudy) -> str:

@@ -135,6 +135,8 @@ class SweepCommand(Command):
             yield f"linear: leaves out {', '.join(document['left_out'])}"
         if result.study.document.get("optimise"):
             yield "[optimise] is not used: a sweep computes the designs that the axes name"
+        if result.study.document.get("tolerance"):
+            yield "[[tolerance]] is not used: `zwidth tolerance` draws devices within it"
         if count <= LISTED:
             headings = [*(axis.key for axis in sampling.axes), *map(_heading, columns)]
             designs = [

@@ -21,8 +21,10 @@ from zwidth.show.cli.resumable import open_store, report_kept_work, resume_optio
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.tolerance_text import (
     advice_sentence,
-    band_sentence,
-    index_sentence,
+    band_rows,
+    index_rows,
+    narrower_rows,
+    no_index_sentences,
     outcome_sentences,
     tolerance_text,
     wall_sentence,
@@ -62,6 +64,12 @@ class ToleranceFile(Question):
             return read_question(self.name, self.samples, self.seed)
         except TooLarge as error:
             raise BadInput(f"{self.name}: {error}") from None
+
+    @cached_property
+    def aside(self) -> list[str]:
+        """Tables of the file that are for other commands."""
+        tables = {"axis": "[[axis]]", "optimise": "[optimise]"}
+        return [shown for key, shown in tables.items() if key in self.asked.aside]
 
     def device(self) -> Device:
         """The device in the middle of its tolerances. Raises what reading the study does."""
@@ -141,6 +149,9 @@ class ToleranceCommand(Command):
         yield f"{printable(document['name'])}: {devices}, seed {question.seed}"
         if document["left_out"]:
             yield f"linear: leaves out {', '.join(document['left_out'])}"
+        asked = case.question
+        if isinstance(asked, ToleranceFile) and asked.aside:
+            yield f"{' and '.join(asked.aside)} is not used: the devices are those of the device file"
         rows = [
             [one.key, tolerance_text(one), ", ".join(tie.key for tie in one.ties)] for one in question.tolerances
         ]
@@ -150,8 +161,16 @@ class ToleranceCommand(Command):
             return
         yield wall_sentence(result)
         yield from _quantile_tables(result)
-        yield from map(band_sentence, result.bands)
-        yield from map(index_sentence, result.indices)
+        yield table(
+            ["rendered by", "stiffest wall of the drawn devices", "more cautious"], list(band_rows(result))
+        )
+        with_indices = [one for one in result.indices if one.indices]
+        if with_indices:
+            headings = ["part in the spread of", *(one.name for one in with_indices)]
+            yield table(headings, list(index_rows(with_indices)))
+        yield from no_index_sentences(result)
+        if result.tightened:
+            yield table(["half of", "renders the wall", "gain"], list(narrower_rows(result)))
         yield advice_sentence(result)
 
     def write(

@@ -6,10 +6,12 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from zwidth.show.figures.stability import edges_of, frame
@@ -41,10 +43,9 @@ def tolerance_figure(result: ToleranceStudy) -> Figure:
         if not bars:
             draw_bands(made.add_subplot(), result)
             return made
-        parts: Any = made.subfigures(2, 1, height_ratios=[SIZE[1], below])
-        above, under = parts
-        draw_bands(above.subplots(), result)
-        draw_worth(under.subplots(), result)
+        above, under = made.subplots(2, 1, height_ratios=[SIZE[1], below])
+        draw_bands(above, result)
+        draw_worth(under, result)
         return made
 
 
@@ -55,15 +56,9 @@ def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
     for n, band in enumerate(bands):
         share = n / max(len(bands) - 1, 1)
         colour = tuple((LIGHTEST + share * (DARKEST - LIGHTEST)).tolist())
-        ax.add_collection(
-            PolyCollection(
-                band_polygons(band),
-                facecolors=[colour],
-                edgecolors=[colour],
-                linewidths=0.4,
-                zorder=1.1 + 0.1 * n,
-                label=f"stable in at least {_percent(band.probability)} of the devices",
-            )
+        text = f"stable in at least {_percent(band.probability)} of the devices"
+        ax.add_patch(
+            PathPatch(band_path(band), facecolor=colour, edgecolor="none", zorder=1.1 + 0.1 * n, label=text)
         )
     if result.nominal is not None:
         for n, edge in enumerate(edges_of(result.nominal.regions)):
@@ -80,15 +75,22 @@ def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
     legend_above(ax)
 
 
-def band_polygons(band: Band) -> list[Floats]:
-    """A band as polygons (k, 2) of walls [K, B]: a trapezium for each two pieces that meet between two lines."""
-    out = []
+def band_path(band: Band) -> Path:
+    """A band as a path of walls [K, B]: between two dampings a trapezium for each two pieces that meet."""
+    parts = []
     for (low, one), (high, other) in pairwise(zip(band.dampings.tolist(), band.pieces, strict=True)):
         for a, b in one:
             for c, d in other:
                 if max(a, c) < min(b, d):
-                    out.append(np.array([[a, low], [b, low], [d, high], [c, high]]))
-    return out
+                    parts.append(shapely.Polygon([(a, low), (b, low), (d, high), (c, high)]))
+    whole = shapely.union_all([part for part in parts if part.is_valid])
+    rings = [
+        Path(shapely.get_coordinates(ring), closed=True)
+        for cell in shapely.get_parts(shapely.orient_polygons(whole))
+        if isinstance(cell, shapely.Polygon)
+        for ring in (cell.exterior, *cell.interiors)
+    ]
+    return Path.make_compound_path(*rings) if rings else Path(np.empty((0, 2)))
 
 
 def draw_worth(ax: Axes, result: ToleranceStudy) -> None:
@@ -104,7 +106,17 @@ def draw_worth(ax: Axes, result: ToleranceStudy) -> None:
         ax.barh(n, value, height=0.34, color=face, edgecolor=BLUE, linewidth=1.0, zorder=2.0)
         ax.plot([low, high], [n, n], color=BLACK, linewidth=1.1, zorder=3.0, marker="|", markersize=6.0)
         place = ax.get_yaxis_transform()
-        ax.text(0.0, n + 0.26, key, transform=place, ha="left", va="bottom", fontsize=TICK_SIZE, zorder=4.0)
+        ax.text(
+            0.0,
+            n + 0.26,
+            key,
+            transform=place,
+            ha="left",
+            va="bottom",
+            fontsize=TICK_SIZE,
+            zorder=4.0,
+            backgroundcolor="white",
+        )
     ax.set_yticks([])
     ax.set_ylim(-0.5, len(bars) - 0.1)
     ax.spines["left"].set_visible(False)
@@ -148,15 +160,13 @@ def _share(share: Interval) -> str:
 
 def _view(result: ToleranceStudy) -> tuple[float, float, float, float]:
     """The part with K >= 0 and B >= 0 that the widest band and the edge in the middle reach."""
-    corners = [one for band in result.bands for one in band_polygons(band)]
-    walls = np.concatenate([*corners, np.ones((1, 2)) * 1e-9])
-    reach = [walls]
+    reach = [walls for band in result.bands if len(walls := np.asarray(band_path(band).vertices))]
     if result.nominal is not None and result.nominal.regions:
         reach.append(np.vstack(result.nominal.regions))
     wall = result.question.study.wall
     if wall.stiffness is not None and wall.damping is not None:
         reach.append(np.array([[wall.stiffness, wall.damping]]))
-    K, B = np.maximum(np.concatenate(reach).max(axis=0), 0.0)
-    if not corners and result.nominal is None:
+    if not reach:
         return (0.0, 1.0, 0.0, 1.0)
+    K, B = np.maximum(np.concatenate(reach).max(axis=0), 0.0)
     return -0.03 * float(K), MARGIN * float(K), -0.04 * float(B), MARGIN * float(B)

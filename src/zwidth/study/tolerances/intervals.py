@@ -53,7 +53,7 @@ def quantile_ranks(share: float, count: int) -> tuple[int, int, int]:
     Order Statistics, known at second hand). l is the largest and u the smallest rank with at most 2.5 % beyond
     them.
 
-    Returns  rank of the estimate, ceil(share * count), and l and u; l = 0 and u = count + 1 where there are too few
+    Returns  rank of the estimate, ceil(share * count), and l and u; l = 0, u = count + 1 where there are too few
              draws for a bound
 
     >>> quantile_ranks(0.5, 100)

@@ -40,6 +40,7 @@ class ToleranceQuestion:
     index_samples  base samples of the sensitivity indices, a power of 2; 0: no indices
     quantiles      shares 0..1, ascending, of the quantiles of measures and the bands of the chart
     seed           of the random numbers
+    aside          keys of the study file that are for other commands
     """
 
     study: Study
@@ -48,6 +49,7 @@ class ToleranceQuestion:
     index_samples: int = INDEX_SAMPLES
     quantiles: tuple[float, ...] = tuple(one / 100.0 for one in QUANTILES)
     seed: int = SEED
+    aside: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         keys = ", ".join(one.key for one in self.tolerances)
@@ -109,7 +111,8 @@ def question_of(
         faults += draw_faults(draw)
 
     study = study_of(own, label, needs=("tolerance",), further=further)
-    return question_with(study, tuple(found), draw)
+    aside = tuple(key for key in document if key in OF_A_SWEEP)
+    return replace(question_with(study, tuple(found), draw), aside=aside)
 
 
 def question_with(study: Study, tolerances: tuple[Tolerance, ...], draw: Mapping[str, Any]) -> ToleranceQuestion:
@@ -126,13 +129,17 @@ def question_with(study: Study, tolerances: tuple[Tolerance, ...], draw: Mapping
     return question
 
 
-def wall_faults(document: Mapping[str, Any]) -> Faults:
-    """The fault of a wall of which one number is missing."""
+def wall_faults(document: Mapping[str, Any], names: Mapping[str, str] | None = None) -> Faults:
+    """The fault of a wall of which one number is missing.
+
+    names  what keys are called where they come from arguments
+    """
     there = [key for key in WALL if key in document]
     if len(there) != 1:
         return []
     missing = next(key for key in WALL if key not in document)
-    return [((there[0],), f"needs {missing} beside it: the probability that this wall is stable")]
+    shown = (names or {}).get(missing, missing)
+    return [((there[0],), f"needs {shown} beside it: the probability that this wall is stable")]
 
 
 def draw_faults(draw: Mapping[str, Any]) -> Faults:

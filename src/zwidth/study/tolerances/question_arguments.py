@@ -60,7 +60,7 @@ def question_over(
     faults: Faults = []
     study = check_study(document, LABEL, device, {}, by_name, faults, spelling=as_argument, needs=("tolerance",))
     found = tolerances_of(document, device, faults)
-    faults += wall_faults(document) + draw_faults(drawn)
+    faults += wall_faults(document, ARGUMENTS) + draw_faults(drawn)
     if angles is not None:
         try:
             device.position(angles)
@@ -97,6 +97,6 @@ def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
     if first == "draw" and rest:
         first, *rest = rest
     if first == "tolerance" and rest and isinstance(rest[0], int):
-        rest = [keys[rest[0]], *rest[1:]]
+        rest = [keys[rest[0]], *rest[1:]] if rest[1:] != ["key"] else []  # the message names the key
     argument = ARGUMENTS.get(str(first), str(first))
     return Fault(argument, ".".join(map(str, rest)), message)

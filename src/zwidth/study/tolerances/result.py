@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +12,7 @@ from zwidth.chart.point_chart import chart_at
 from zwidth.device.faults import plural
 from zwidth.measures.definition import NO_VALUE, OK, STATUS
 from zwidth.result import Result
+from zwidth.study.designs.study import Study
 from zwidth.study.designs.sweep import Sweep
 from zwidth.study.designs.sweep_job import SweepJob
 from zwidth.study.jobs.job import CellValues
@@ -147,8 +148,7 @@ class ToleranceStudy(Result):
 
         A narrower tolerance that does not raise the share for certain is not among them.
         """
-        certain = [one for one in self.tightened if one.is_certain]
-        return tuple(one for one in certain if one.may_be_best)
+        return tuple(one for one in self.tightened if one.gain.low > 0.0 and one.may_be_best)
 
     def dataset(self) -> xr.Dataset:
         """The drawn devices: their numbers, measures and status along the dimension `design`."""
@@ -184,12 +184,10 @@ class ToleranceStudy(Result):
         return self._sweep.table()
 
     @property
-    def _sweep(self) -> Sweep:
-        return Sweep(self.job_study, self.job, self.cells)
+    def study(self) -> Study:
+        """The study of the drawn devices."""
+        return replace(self.question.study, sampling=self.job.sampling, columns=self.job.columns)
 
     @property
-    def job_study(self) -> Any:
-        """The study of the drawn devices."""
-        from dataclasses import replace
-
-        return replace(self.question.study, sampling=self.job.sampling, columns=self.job.columns)
+    def _sweep(self) -> Sweep:
+        return Sweep(self.study, self.job, self.cells)

@@ -35,7 +35,7 @@ class Tightened:
     @property
     def is_certain(self) -> bool:
         """Whether the gain can be told from 0."""
-        return self.gain.low > 0.0
+        return self.gain.low > 0.0 or self.gain.high < 0.0
 
     @property
     def may_be_best(self) -> bool:

@@ -1,0 +1,205 @@
+"""Every way in which a study of tolerances can be wrong, told in one line each."""
+
+from __future__ import annotations
+
+import pytest
+
+import zwidth
+from tests.study.tolerance_cases import tolerance_document, tolerance_faults, uniform
+from zwidth.device.faults import DeviceError
+from zwidth.memory_limit import TooLarge
+from zwidth.study.designs.study_file import study_of
+from zwidth.study.tolerances.question import question_of
+from zwidth.study.tolerances.tolerance_study import tolerance
+
+LENGTH = "links.upper-right.length_m"
+
+
+def one(key=LENGTH, distribution="normal", **more):
+    return {"key": key, "distribution": distribution, **more}
+
+
+WRONG = [
+    (
+        one(distribution="gauss"),
+        "distribution: must be 'normal', 'uniform', 'triangular' or 'lognormal', got the",
+    ),
+    (one(), "has no width; give standard_deviation, standard_deviation_percent or low and high"),
+    (one(distribution="uniform"), "has no width; give plus_minus, plus_minus_percent or low and high"),
+    (one(standard_deviation=0.0), "standard_deviation: must be greater than 0, got 0"),
+    (one(standard_deviation_percent=-5), "standard_deviation_percent: must be greater than 0, got -5"),
+    (one(standard_deviation="5 %"), "standard_deviation: must be a number, got the text '5 %'"),
+    (one(plus_minus=0.01), "plus_minus: is not the width of a normal distribution; give standard_deviation, "),
+    (
+        one(distribution="lognormal", standard_deviation=0.01),
+        "standard_deviation: is not the width of a lognormal distribution; give standard_deviation_percent or low",
+    ),
+    (
+        one(standard_deviation=0.01, standard_deviation_percent=1),
+        "standard_deviation_percent: and standard_deviation exclude each other; remove one of them",
+    ),
+    (one(low=0.1), "low: needs high beside it"),
+    (one(high=0.1), "high: needs low beside it"),
+    (one(low=0.2, high=0.1), "low: must be below high, got 0.2 and 0.1; exchange them"),
+    (one(distribution="uniform", low=0.1, high=0.1), "low: must be below high, got 0.1 and 0.1"),
+    (
+        one(distribution="uniform", plus_minus=0.01, cut_at_deviations=3),
+        "cut_at_deviations: goes with a normal or lognormal distribution; a uniform one has ends: remove it",
+    ),
+    (
+        one(distribution="triangular", low=0.2, high=0.3),
+        f"low: and high must enclose the value of '{LENGTH}' in the device file, 0.147, the likeliest",
+    ),
+    (
+        one(distribution="uniform", plus_minus_percent=150),
+        f"plus_minus_percent: leads to values of '{LENGTH}' from -0.0735 to 0.3675; it must be at least 0",
+    ),
+    (
+        one("damping.mode_ratio", "uniform", low=0.1, high=3.0),
+        "high: leads to values of 'damping.mode_ratio' from 0.1 to 3; it must be at least 0 and at most 2",
+    ),
+    (
+        one("damping.mode_ratio", low=-3.0, high=-2.0),
+        "low: and high have their middle at -2.5, which 'damping.mode_ratio' may not be",
+    ),
+    (
+        one("reference.position_m.0", "uniform", plus_minus_percent=5),
+        "plus_minus_percent: needs a value of 'reference.position_m.0' other than 0 in the device file; give plus",
+    ),
+    (
+        one("reference.position_m.0", "lognormal", standard_deviation_percent=5),
+        "standard_deviation_percent: needs a value of 'reference.position_m.0' other than 0 in the device file; "
+        "give another distribution",
+    ),
+    (
+        one("reference.position_m.0", "lognormal", low=-0.1, high=0.1),
+        "distribution: lognormal needs numbers above 0, got -0.1 for 'reference.position_m.0'",
+    ),
+    (
+        one("links.upper-right.length", standard_deviation=1),
+        "key: 'links.upper-right.length' is not a key of a device file; did you mean",
+    ),
+    (
+        one("links.upper-right", standard_deviation=1),
+        "key: 'links.upper-right' is not a single number; the numbers in",
+    ),
+    (
+        one("loop.velocity.filter.order", standard_deviation=1),
+        "key: 'loop.velocity.filter.order' takes whole numbers, of which there is no tolerance; compare them with",
+    ),
+    (one("name", standard_deviation=1), "key: 'name' takes no number"),
+    (
+        one("at", standard_deviation=1),
+        "key: 'at' is a circumstance of the study; a tolerance is of a number of the",
+    ),
+    (
+        one("loop.delay_samples", standard_deviation=0.1),
+        "key: 'loop.delay_samples' has no value in the device file; set it first, or give low and high",
+    ),
+    (
+        one(standard_deviation=0.01, tie=["links.upper-left.lenth_m"]),
+        "tie.0: 'links.upper-left.lenth_m' is not a key",
+    ),
+    (one(standard_deviation=0.01, widht=1), "widht: is not a key of a [[tolerance]]"),
+]
+
+
+@pytest.mark.parametrize(("table", "message"), WRONG)
+def test_a_wrong_tolerance_is_one_line(table, message):
+    (line,) = tolerance_faults(tolerance_document(table))
+    assert line.removeprefix("tolerance.0.").removeprefix("tolerance.0: ").startswith(message)
+
+
+WRONG_STUDIES = [
+    ({"tolerance": []}, "tolerance: must have at least 1 element"),
+    ({"tolerances": []}, "tolerances: is not a key of a study file; did you mean 'tolerance'?"),
+    ({"draw": {"samples": 0}}, "draw.samples: must be at least 1, got 0"),
+    ({"draw": {"samples": 71}}, "draw.samples: 71 devices bound no quantile of 5 %; give 72 or more"),
+    ({"draw": {"quantiles_percent": [1, 50]}}, None),
+    (
+        {"draw": {"quantiles_percent": [0.1, 50]}},
+        "draw.samples: 1000 devices bound no quantile of 0.1 %; give 3688 or more",
+    ),
+    ({"draw": {"quantiles_percent": [50, 100]}}, "draw.quantiles_percent.1: must be between 0 and 100, got 100"),
+    ({"draw": {"quantiles_percent": []}}, "draw.quantiles_percent: must have at least 1 element"),
+    ({"draw": {"seed": -1}}, "draw.seed: must be at least 0, got -1"),
+    ({"draw": {"index_samples": 100}}, "draw.index_samples: must be a power of 2, got 100; give 64 or 128"),
+    ({"draw": {"sample": 100}}, "draw.sample: is not a key of [draw]; did you mean 'samples'?"),
+    ({"draw": 7}, "draw: must be a table, got 7"),
+    ({"seed": 2}, "seed: is read with sampling = 'latin-hypercube' only"),
+    ({"stiffness_N_per_m": 100.0}, "stiffness_N_per_m: needs damping_Ns_per_m beside it"),
+    ({"damping_Ns_per_m": 1.0}, "damping_Ns_per_m: needs stiffness_N_per_m beside it"),
+    ({"measures": ["isotrpy"]}, "measures.0: no measure is named 'isotrpy'; did you mean isotropy?"),
+    ({"device": "no-such"}, "no-such: is neither a file nor a bundled device"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG_STUDIES)
+def test_a_wrong_study_is_one_line(change, message):
+    document = tolerance_document(one(standard_deviation=0.001)) | change
+    if "tolerances" in change:
+        del document["tolerance"]
+    lines = tolerance_faults(document)
+    if message is None:
+        assert lines == []
+    else:
+        (line,) = lines
+        assert line.startswith(message)
+
+
+def test_a_number_is_set_once():
+    twice = tolerance_document(one(standard_deviation=0.01), one("mechanism." + LENGTH, standard_deviation=0.01))
+    (line,) = tolerance_faults(twice)
+    by = f"is set by the tolerance '{LENGTH}' already; remove one of the two"
+    assert line == f"tolerance.1.key: 'mechanism.{LENGTH}' {by}"
+    tied = tolerance_document(one(standard_deviation=0.01, tie=["links.upper-left.length_m"]))
+    tied["tolerance"].append(one("links.upper-left.length_m", standard_deviation=0.01))
+    (line,) = tolerance_faults(tied)
+    assert "goes with the tolerance 'links.upper-right.length_m' already" in line
+
+
+def test_all_faults_come_together():
+    lines = tolerance_faults(
+        tolerance_document(one(), one("nmae", standard_deviation=1), stiffness_N_per_m=3, draw={"seed": -1})
+    )
+    assert len(lines) == 4
+
+
+def test_samples_and_seed_may_be_given_beside_the_file():
+    document = tolerance_document(one(standard_deviation=0.001), draw={"samples": 10, "seed": -4})
+    question = question_of(document, samples=80, seed=3)
+    assert (question.samples, question.seed) == (80, 3)
+    assert tolerance_faults(document, samples=20, seed=3) == [
+        "draw.samples: 20 devices bound no quantile of 5 %; give 72 or more"
+    ]
+
+
+def test_what_a_sweep_varies_is_left_aside_and_a_sweep_leaves_tolerances_aside():
+    axis = {"key": LENGTH, "values": [0.1, 0.2]}
+    both = tolerance_document(one(standard_deviation=0.001), measures=["isotropy"], axis=[axis])
+    assert question_of(both).tolerances[0].key == LENGTH
+    assert study_of(both).sampling.count == 2
+    del both["axis"]
+    with pytest.raises(DeviceError, match=r"axis: is missing; add it \(what is varied, one \[\[axis\]\] each\)"):
+        study_of(both)
+
+
+def test_too_many_devices_are_refused_before_any_is_drawn():
+    with pytest.raises(TooLarge, match=r"devices, 900000000 drawn .* would take .* lower samples"):
+        question_of(tolerance_document(one(standard_deviation=0.001), draw={"samples": 900_000_000}))
+
+
+def test_arguments_are_called_by_their_names():
+    device = zwidth.load("five-bar")
+    with pytest.raises(DeviceError) as raised:
+        tolerance(device, {LENGTH: {"distribution": "normal"}, "nmae": uniform(3.0)}, stiffness=3.0, samples=10)
+    assert list(map(str, raised.value.faults)) == [
+        f"tolerances: {LENGTH}: has no width; give standard_deviation, standard_deviation_percent or low and high",
+        "tolerances: 'nmae' is not a key of a device file; did you mean 'name'?",
+        "stiffness: needs damping beside it: the probability that this wall is stable",
+        "samples: 10 devices bound no quantile of 5 %; give 72 or more",
+    ]
+    with pytest.raises(TypeError, match="tolerances must be a dictionary of paths and distributions, got"):
+        tolerance(device, [LENGTH])
+    with pytest.raises(ValueError, match="tolerances has no path; write such as"):
+        tolerance(device, {})
