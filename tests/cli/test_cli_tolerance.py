@@ -214,9 +214,9 @@ def test_everything_wrong_comes_at_once(folder):
     assert refusal_lines("tolerance", path, "--seed", -1)
     assert refusal_lines("tolerance", "missing.toml") == ["missing.toml: no such file; give a study file"]
     path = study(folder, MASS, wall='measures = ["isotropy", "decay_time"]\n')
-    assert [line.split(": ", 3)[3] for line in refusal_lines("tolerance", path)] == [
-        "isotropy needs a mechanism; this device gives its plant only",
-        "decay_time needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m",
+    assert refusal_lines("tolerance", path) == [
+        "series.toml: measures: isotropy needs a [mechanism]; this device gives its [plant] only",
+        "series.toml: measures: decay_time needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m",
     ]
 
 
