@@ -17,7 +17,7 @@ from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
 from zwidth.device.text_file import UnreadableFileError, read_text
-from zwidth.device.toml_access import tables
+from zwidth.device.toml_access import table, tables
 from zwidth.measures.definition import Measure
 from zwidth.measures.user_measures import load_measures
 from zwidth.study.designs.axis_tables import Faults
@@ -72,15 +72,15 @@ def _device_instead(label: str, what: str) -> DeviceError:
 
 
 def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fault]) -> dict[str, Any]:
-    """The operators that an axis names, by name: their tables, None for nobody.
+    """The operators that an axis or the task names, by name: their tables, None for nobody.
 
     folder       that files are looked for in
     file_faults  gets the faults of their files
     """
     operators: dict[str, Any] = {}
-    for _, axis in tables(document, "axis"):
-        values = axis.get("values")
-        for name in values if axis.get("key") == "operator" and isinstance(values, list) else []:
+    lists = [axis.get("values") for _, axis in tables(document, "axis") if axis.get("key") == "operator"]
+    for names in (*lists, table(document, "task").get("operators")):
+        for name in names if isinstance(names, list) else []:
             if isinstance(name, str) and name:
                 try:
                     operators[name] = _operator(name, folder)
