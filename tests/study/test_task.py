@@ -92,7 +92,7 @@ def test_a_ball_and_directions_in_space():
     assert (found.directions[:, 2] > 0).all()
     r = np.linalg.norm(found.positions - found.positions[0], axis=1)
     np.testing.assert_allclose(r[1:], 0.01)
-    assert found.grid.shape == (19, 7, 3)
+    assert found.grid.shape == (19, 1, 3)
 
 
 def test_faults_of_a_task_have_their_lines():

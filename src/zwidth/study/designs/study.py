@@ -60,6 +60,7 @@ class Study:
     wall       stiffness, damping and frequency that some measures need, as far as no axis sets them
     plane      grid over the workspace; None where no measure is over it
     task       where measures are taken instead; None without a [task]
+    user_measures  measures of the user's own, by name
     spelling   how messages spell arguments: as keys of a file or as arguments in Python
     """
 
@@ -76,6 +77,7 @@ class Study:
     wall: WantedWall = field(default_factory=WantedWall)
     plane: PlaneGrid | None = None
     task: Task | None = None
+    user_measures: Mapping[str, Measure] = field(default_factory=dict)
     spelling: Spelling = as_key
 
     def __repr__(self) -> str:
@@ -156,6 +158,7 @@ def check_study(
         wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
         plane=plane,
         task=task,
+        user_measures=user_measures or {},
         spelling=spelling,
     )
     if not study.turns:

@@ -26,9 +26,10 @@ from zwidth.study.designs.study import Study, check_study
 STUDIES: Final = BundledFiles("zoo", "study", "a study file", "a study needs a device, measures and an [[axis]]")
 
 
-def read_study(path: str | os.PathLike[str]) -> Study:
+def read_study(path: str | os.PathLike[str], *, bounds: bool = False) -> Study:
     """The study that a file describes.
 
+    bounds  whether it is read for an optimiser, see `study_of`
     Raises DeviceError  with all faults of the file, those of the device file it names among them
            TooLarge     where its designs would not fit into memory
     """
@@ -39,13 +40,14 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         if error.missing and label in bundled_names():
             raise _device_instead(label, "a bundled device") from None
         raise fail(label, "", f"{error}; give a study file") from None
-    return study_of(parse_document(text, label, STUDIES), label)
+    return study_of(parse_document(text, label, STUDIES), label, bounds=bounds)
 
 
-def study_of(document: dict[str, Any], label: str = "study") -> Study:
+def study_of(document: dict[str, Any], label: str = "study", *, bounds: bool = False) -> Study:
     """The study that a document describes.
 
     label   what messages call it; files that it names lie beside it
+    bounds  whether it is read for an optimiser: ranges of axes are bounds, and measures those of [optimise]
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
     """
@@ -57,7 +59,8 @@ def study_of(document: dict[str, Any], label: str = "study") -> Study:
     folder = File(label).parent
     device = _device(document, folder, faults, file_faults)
     operators = axis_operators(document, folder, file_faults)
-    study = check_study(document, label, device, operators, _own_measures(document, folder, faults), faults)
+    own_measures = _own_measures(document, folder, faults)
+    study = check_study(document, label, device, operators, own_measures, faults, bounds=bounds)
     if study is None or file_faults:
         raise DeviceError([*in_order(faults, document, label), *file_faults])
     return study

@@ -72,7 +72,7 @@ class SweepJob:
     label                of the device, for messages
     operators            as in `Study`
     columns              the measures to compute
-    positions            (..., 3) of the workspace or (n, d, 3) of the task [m]; None where no column is over any
+    positions            (..., 3) of the workspace or (n, 1, 3) of the task [m]; None where no column is over any
     weights              (...) area that belongs to each position [m^2]
     fixed_circumstances  circumstances that no axis sets
     directions           (d, 3) of the task; None: the one that is a circumstance
@@ -113,7 +113,9 @@ class SweepJob:
     @property
     def _width(self) -> int:
         """Numbers of each column."""
-        return 1 if not self.cells or self.positions is None else self.positions[..., 0].size
+        if not self.cells or self.positions is None:
+            return 1
+        return int(self.positions[..., 0].size) * (1 if self.directions is None else len(self.directions))
 
     @property
     def question(self) -> str:
@@ -193,7 +195,7 @@ class SweepJob:
                 except (PostureError, LoadError, DeviceError):
                     continue  # each design alone says why
                 if over_workspace and self.directions is not None:
-                    point = point.towards(self.directions)
+                    point = point.along_each(self.directions)
                 same = not group.batch.differs and (over_workspace or group.positions is None)
                 decided = group.valid[piece] & ~alone
                 if not (over_workspace or same):
@@ -334,7 +336,7 @@ class Design:
     def workspace(self) -> OperatingPoint:
         """The operating points of all positions of the workspace or the task. Raises _NoPoint."""
         point = self._solve_once("workspace", self.job.positions)
-        return point if self.job.directions is None else point.towards(self.job.directions)
+        return point if self.job.directions is None else point.along_each(self.job.directions)
 
     def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
         if name not in self.points:

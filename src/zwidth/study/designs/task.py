@@ -55,11 +55,8 @@ class Task:
 
     @property
     def grid(self) -> Floats | None:
-        """Positions (n, d, 3), each once for every direction; None where there are none."""
-        if self.positions is None:
-            return None
-        count = 1 if self.directions is None else len(self.directions)
-        return np.repeat(self.positions[:, None, :], count, axis=1)
+        """Positions (n, 1, 3), the second axis for directions; None where there are none."""
+        return None if self.positions is None else self.positions[:, None, :]
 
 
 def task_of(document: Mapping[str, Any], device: Device, faults: list[Fault], *, finer: int = 1) -> Task | None:
