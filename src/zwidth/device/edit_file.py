@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from zwidth.device import address
@@ -12,13 +12,15 @@ from zwidth.device.read import device_text
 
 
 def edited_text(
-    path: str | os.PathLike[str], settings: Mapping[str, Any], sources: Mapping[str, str] | None = None
+    path: str | os.PathLike[str],
+    settings: Mapping[str, Any] | Sequence[str | tuple[str, Any]],
+    sources: Mapping[str, str] | None = None,
 ) -> str:
     """The text of a device file with numbers set as `Device.with_` sets them; what it does not change stands as it
     is written.
 
     path      of the file, or a bundled name
-    settings  path -> value; `address.UNSET` removes a key
+    settings  path -> value, or pairs of them and texts "PATH=VALUE" as typed; `address.UNSET` removes a key
     sources   path -> where its number comes from, which is noted under [sources]
     Raises    DeviceError  for a file that cannot be read, or paths that lead nowhere
     """
@@ -30,7 +32,7 @@ def edited_text(
     except ValueError as error:
         raise fail(label, "", f"is no TOML: {error}") from None
     before = document.unwrap()
-    after = address.apply(before, list(settings.items()))
+    after = address.apply(before, list(settings.items() if isinstance(settings, Mapping) else settings))
     _carry_over(document, before, after)
     if sources:
         noted = document.setdefault("sources", tomlkit.table())

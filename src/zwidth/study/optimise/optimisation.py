@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from zwidth.device.faults import plural
 from zwidth.measures.definition import OK, STATUS, Note
 from zwidth.result import Result
+from zwidth.study.designs.study import Study
 from zwidth.study.optimise.evaluation import Judgement, margins
 from zwidth.study.optimise.front import hypervolume, knee
 from zwidth.study.optimise.problem import Demand, Problem
@@ -77,6 +78,11 @@ class Optimisation(Result):
             )
             lines.append(f"{'best' if len(self.problem.objectives) == 1 else 'knee'}: {said}")
         return "\n  ".join(lines)
+
+    @property
+    def study(self) -> Study:
+        """Device, variables, task and circumstances."""
+        return self.problem.study
 
     @cached_property
     def values(self) -> Floats:

@@ -101,6 +101,7 @@ class _Archive:
         self.judging = Judge(problem)
         self._shares: list[Floats] = []
         self._judged: list[Judgement] = []
+        self._places: dict[bytes, int] = {}  # of a design's shares
         self._jobs = 0
         self.notes: dict[str, list[Note]] = {column.name: [] for column in problem.columns}
 
@@ -132,14 +133,20 @@ class _Archive:
         return bool((absent == 1.0).all(axis=0).any())
 
     def judge(self, shares: Floats, stage: str, of: int) -> Judgement:
-        """Judge designs and keep them."""
-        found = self._run(values_at(self.problem.variables, shares), stage, self.count, of)
-        judged = self.judging.judge(found)
-        for name, notes in self.judging.reasons(found).items():
-            self.notes[name] += notes
-        self._shares.append(shares)
-        self._judged.append(judged)
-        return judged
+        """Judge designs and keep those that are new."""
+        places, new = [], list[int]()
+        for n, row in enumerate(shares):
+            if (key := row.tobytes()) not in self._places:
+                self._places[key] = len(self._places)
+                new.append(n)
+            places.append(self._places[key])
+        if new:
+            found = self._run(values_at(self.problem.variables, shares[new]), stage, self.count, of)
+            for name, notes in self.judging.reasons(found).items():
+                self.notes[name] += notes
+            self._shares.append(shares[new])
+            self._judged.append(self.judging.judge(found))
+        return self.judgement[places]
 
     def _run(self, designs: list[tuple[Any, ...]], stage: str, done: int, of: int) -> CellValues:
         return self._compute(self.judging.job(designs), stage, done, of)

@@ -12,7 +12,8 @@ shrinks where it does not. Fletcher and Sainz de la Maza 1989 (known at second h
 problems.
 
 Values are exact, and so are their differences: over 1e-4 of the bounds, of the second order inside and at the
-bounds (`gradients`).
+bounds (`gradients`). Where two roots of the loop meet, as at the fastest-decaying wall, a value has an upright
+tangent and no first order: there single variables are changed by ever smaller amounts (`_probes`).
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ Judges: TypeAlias = Callable[[Floats], Judgement]
 STEP: Final = 1e-4  # of the bounds, by which designs are changed for derivatives
 REACH: Final = 0.1  # of the bounds: largest first step
 SMALLEST: Final = 1e-9  # steps and gains below are none
+ROUNDING: Final = 1e-13  # gains below are chance
 LENGTHS: Final = (1.0, 0.5, 0.1)  # at which a step is tried
+PROBED: Final = 1e-3  # of the bounds, by which single variables are changed at first where no step is left
+PROBES: Final = (1.0, 0.25, 0.0625)  # of that, tried at once; then the last of them, and so on
 
 
 @dataclass
@@ -44,14 +48,16 @@ class _Design:
     shares      (v,)   its variables
     judgement   of it
     reach       D, of the bounds
-    inset       (d,)  by how much more than needed the next step keeps the demands, after one that did not
-    done        whether no step makes it better
+    inset       by how much more than needed the next step keeps the demands, after one that did not
+    probing     by how much single variables are changed next, of the bounds; 0: by steps of the program
+    done        whether nothing makes it better
     """
 
     shares: Floats
     judgement: Judgement
     reach: float
     inset: float = 0.0
+    probing: float = 0.0
     done: bool = False
 
 
@@ -71,30 +77,48 @@ def polish(
     spent = 0
     if not len(free):
         return spent
+    around = 2 * len(free)
     while pending := [one for one in designs if not one.done]:
-        each = 2 * len(free) + len(LENGTHS)
-        pending = pending[: (budget - spent) // each]
+        probing = bool(pending[0].probing)
+        each = around * len(PROBES) if probing else around + len(LENGTHS)
+        pending = [one for one in pending if bool(one.probing) == probing][: (budget - spent) // each]
         if not pending:
             break
-        around = np.concatenate([neighbours(one.shares, free) for one in pending])
-        judged = judge(around)
-        spent += len(around)
-        steps = []
-        for n, one in enumerate(pending):
-            piece = slice(n * 2 * len(free), (n + 1) * 2 * len(free))
-            steps.append(_step(problem, one, free, judged[piece], weights))
-        moving = [(one, step) for one, step in zip(pending, steps, strict=True) if step is not None]
-        for one, step in zip(pending, steps, strict=True):
-            one.done = step is None
-        if not moving:
+        if probing:
+            spent += _try_all(problem, [(one, _probes(one, free)) for one in pending], weights, judge)
             continue
-        tried = np.concatenate([_trials(one.shares, free, step) for one, step in moving])
-        judged = judge(tried)
-        spent += len(tried)
-        for n, (one, step) in enumerate(moving):
-            piece = slice(n * len(LENGTHS), (n + 1) * len(LENGTHS))
-            _move(problem, one, tried[piece], judged[piece], weights, float(np.abs(step).max()))
+        judged = judge(np.concatenate([neighbours(one.shares, free) for one in pending]))
+        spent += around * len(pending)
+        moving = []
+        for n, one in enumerate(pending):
+            step = _step(problem, one, free, judged[n * around : (n + 1) * around], weights)
+            if step is None:
+                one.probing = PROBED
+            else:
+                moving.append((one, _trials(one.shares, free, step)))
+        spent += _try_all(problem, moving, weights, judge) if moving else 0
     return spent
+
+
+def _try_all(problem: Problem, tried: list[tuple[_Design, Floats]], weights: Floats, judge: Judges) -> int:
+    """Judge what is tried for each design, and let each go to the best of it. Returns the number judged."""
+    judged, first = judge(np.concatenate([rows for _, rows in tried])), 0
+    for one, rows in tried:
+        _move(problem, one, rows, judged[first : first + len(rows)], weights)
+        first += len(rows)
+    return first
+
+
+def _probes(one: _Design, free: NDArray[np.int64]) -> Floats:
+    """Designs in which each of the free variables is changed by itself, up and down, by some amounts."""
+    rows = []
+    for amount in PROBES:
+        for v in free.tolist():
+            for sign in (-1.0, 1.0):
+                row = one.shares.copy()
+                row[v] = min(max(row[v] + sign * amount * one.probing, 0.0), 1.0)
+                rows.append(row)
+    return np.array(rows)
 
 
 def neighbours(shares: Floats, free: NDArray[np.int64]) -> Floats:
@@ -187,22 +211,25 @@ def _trials(shares: Floats, free: NDArray[np.int64], step: Floats) -> Floats:
     return rows
 
 
-def _move(
-    problem: Problem, one: _Design, tried: Floats, judged: Judgement, weights: Floats, length: float
-) -> None:
+def _move(problem: Problem, one: _Design, tried: Floats, judged: Judgement, weights: Floats) -> None:
     """Go to the best of the designs tried, if it is better; and choose how far the next step may go."""
     own = one.judgement.costs(problem)
     gains = ((own - judged.costs(problem)) / weights).min(axis=1)
     violated = judged.violations(problem).sum(axis=1)
     gains = np.where((violated == 0.0) & np.isfinite(gains), gains, -np.inf)
     best = int(np.argmax(gains))
-    if not gains[best] > 0.0:
-        one.reach = length * LENGTHS[-1] / 2.0
-        small = violated[-1] < 1.0
-        one.inset = 2.0 * float(violated[-1]) if small else one.inset
-        one.done = one.reach < SMALLEST
-        return
-    one.shares, one.judgement = tried[best], judged[best : best + 1]
-    one.reach = min(2.0 * length, REACH) if best == 0 else length * LENGTHS[best]
-    one.inset = float(violated[0]) if best else 0.0
-    one.done = gains[best] < SMALLEST
+    lengths = np.abs(tried - one.shares).max(axis=1)
+    better = bool(gains[best] > 0.0)
+    if one.probing:
+        one.probing = 2.0 * float(lengths[best]) if better else one.probing * PROBES[-1] / 2.0
+        one.done = one.probing < SMALLEST or (better and gains[best] < ROUNDING)
+    elif not better:
+        one.reach = float(lengths[-1]) / 2.0
+        one.inset = 2.0 * float(violated[-1]) if violated[-1] < 1.0 else one.inset
+        one.probing = PROBED if one.reach < SMALLEST else 0.0
+    else:
+        one.reach = min(2.0 * float(lengths[0]), REACH) if best == 0 else float(lengths[best])
+        one.inset = float(violated[0]) if best else 0.0
+        one.probing = PROBED if gains[best] < SMALLEST else 0.0
+    if better:
+        one.shares, one.judgement = tried[best], judged[best : best + 1]

@@ -68,7 +68,7 @@ def simulate_contact(problem: Problem, design: dict[str, Any], cells: Sequence[A
     cells   (columns, w)  values at all points, member by member
     """
     try:
-        point = _worst_point(problem, design, cells)
+        point = worst_point(problem, design, cells)
         wall = _wall(problem.study.wall, point)
         if wall is None:
             return Contact(reason="no wall with K > 0 and B >= 0 is stable where it is worst")
@@ -85,7 +85,7 @@ def _wall(wanted: WantedWall, point: OperatingPoint) -> tuple[float, float] | No
     return None if peak is None else (SHARE * peak.stiffness, peak.damping)
 
 
-def _worst_point(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) -> OperatingPoint:
+def worst_point(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) -> OperatingPoint:
     """The operating point at which the first objective is worst, held by whom it is worst with."""
     study, task, column = problem.study, problem.study.task, problem.objectives[0].column
     values = np.asarray(cells[column]).reshape(len(problem.members), -1)
