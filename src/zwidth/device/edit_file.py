@@ -3,38 +3,36 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from zwidth.device import address
 from zwidth.device.faults import dotted, fail
-from zwidth.device.read import LARGEST_FILE
-from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.read import device_text
 
 
 def edited_text(
-    path: str | os.PathLike[str], settings: Mapping[str, Any], sources: Mapping[str, str] | None = None
+    path: str | os.PathLike[str],
+    settings: Mapping[str, Any] | Sequence[str | tuple[str, Any]],
+    sources: Mapping[str, str] | None = None,
 ) -> str:
     """The text of a device file with numbers set as `Device.with_` sets them; what it does not change stands as it
     is written.
 
-    settings  path -> value; `address.UNSET` removes a key
+    path      of the file, or a bundled name
+    settings  path -> value, or pairs of them and texts "PATH=VALUE" as typed; `address.UNSET` removes a key
     sources   path -> where its number comes from, which is noted under [sources]
     Raises    DeviceError  for a file that cannot be read, or paths that lead nowhere
     """
     import tomlkit
 
-    file = Path(path)
+    label = os.fspath(path)
     try:
-        text = read_text(file, LARGEST_FILE)
-        document = tomlkit.parse(text)
-    except UnreadableFileError as error:
-        raise fail(str(file), "", str(error)) from None
+        document = tomlkit.parse(device_text(label))
     except ValueError as error:
-        raise fail(str(file), "", f"is no TOML: {error}") from None
+        raise fail(label, "", f"is no TOML: {error}") from None
     before = document.unwrap()
-    after = address.apply(before, list(settings.items()))
+    after = address.apply(before, list(settings.items() if isinstance(settings, Mapping) else settings))
     _carry_over(document, before, after)
     if sources:
         noted = document.setdefault("sources", tomlkit.table())

@@ -82,6 +82,11 @@ def read(
     return parse_document(_text(label, shelf, pipes), label, shelf), label
 
 
+def device_text(label: str) -> str:
+    """The text of a bundled device or of a file, as it is written. Raises DeviceError where there is none."""
+    return _bundled_text(label, DEVICES) if label in bundled_names() else _text(label, DEVICES, False)
+
+
 def parse_document(text: str, label: str, shelf: BundledFiles = DEVICES) -> dict[str, Any]:
     """The document a TOML text holds; never empty, never nested beyond reason, never of a newer version."""
     try:

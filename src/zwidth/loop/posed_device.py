@@ -192,6 +192,14 @@ class PosedDevice:
         directions = np.broadcast_to(given, (*self.shape, given.shape[-1]))
         return replace(self, directions=directions[..., None, :], wall_matrices=None)
 
+    def along_each(self, directions: Floats) -> Self:
+        """The same postures along several directions each: of points (..., 1), points (..., d).
+
+        directions  (d, 3) unit vectors or (d, 6) screws. Raises NoMechanismError for a device without a mechanism.
+        """
+        spread = replace(self, posture=self._posture.broadcast_to((*self.shape[:-1], len(directions))))
+        return spread.towards(directions)
+
     def in_model(self, model: Model | None) -> Self:
         """The same device, reduced to another model. Under load the posture is the one that the model has there,
         whose drives and links bend, or do not.

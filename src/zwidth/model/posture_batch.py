@@ -29,7 +29,9 @@ from zwidth.model.roadmap import roadmap
 from zwidth.threads import in_chunks
 
 SERIAL_MOST: Final = 8  # postures up to which threads cost more than they bring
-ROADMAP_LEAST: Final = 64  # postures of one design, from which on a roadmap pays
+# Postures of one design from which on its roadmap, which takes as long as some ten thousand straight ways, pays
+# even where straight ways lead to all of them.
+ROADMAP_LEAST: Final = 16384
 
 
 @dataclass(frozen=True)

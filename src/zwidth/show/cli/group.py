@@ -27,6 +27,7 @@ COMMANDS: Final = {
     "map": ("map", "MapCommand"),
     "sweep": ("sweep", "SweepCommand"),
     "tolerance": ("tolerance", "ToleranceCommand"),
+    "optimise": ("optimise", "OptimiseCommand"),
     "report": ("report", "ReportCommand"),
     "sensitivity": ("sensitivity", "SensitivityCommand"),
     "felt": ("felt", "FeltCommand"),

@@ -33,7 +33,12 @@ SHOWN_REASONS: Final = 6  # printed for people
 
 @dataclass(frozen=True)
 class StudyQuestion(Question):
-    """What a study file asks; `name` is the file."""
+    """What a study file asks; `name` is the file.
+
+    bounds  whether it is read for an optimiser
+    """
+
+    bounds: bool = False
 
     @cached_property
     def study(self) -> Study:
@@ -42,7 +47,7 @@ class StudyQuestion(Question):
         from zwidth.study.designs.study_file import read_study
 
         try:
-            return read_study(self.name)
+            return read_study(self.name, bounds=self.bounds)
         except TooLarge as error:
             raise BadInput(f"{self.name}: {error}") from None
 
@@ -51,14 +56,28 @@ class StudyQuestion(Question):
         return self.study.device
 
 
-def about_a_study(command: Callback) -> Callback:
-    """Give a command STUDY.toml, as a `StudyQuestion`."""
+def about_a_study(command: Callback, *, bounds: bool = False) -> Callback:
+    """Give a command STUDY.toml, as a `StudyQuestion`; `bounds` as there."""
 
     @wraps(command)
     def with_study(study: str, **more: Any) -> int:
-        return command(StudyQuestion(study), **more)
+        return command(StudyQuestion(study, bounds=bounds), **more)
 
     return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
+
+
+def circumstances_of_study(case: CommandLine) -> dict[str, Any]:
+    """What an answer about a study states first; designs may differ in posture, direction, model and delay."""
+    device = case.device
+    return {
+        "name": device.name,
+        "device": device.label,
+        "study": case.question.name,
+        "operator": device.operator_name,
+        **({} if device.load is None else {"load": device.document["load"]}),
+        "sampling_period_s": device.controller.sampling_period,
+        "left_out": list(device.linear_omissions),
+    }
 
 
 class SweepCommand(Command):
@@ -83,17 +102,7 @@ class SweepCommand(Command):
         return about_a_study(command)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        # designs may differ in posture, direction, model and delay
-        device = case.device
-        return {
-            "name": device.name,
-            "device": device.label,
-            "study": case.question.name,
-            "operator": device.operator_name,
-            **({} if device.load is None else {"load": device.document["load"]}),
-            "sampling_period_s": device.controller.sampling_period,
-            "left_out": list(device.linear_omissions),
-        }
+        return circumstances_of_study(case)
 
     def compute(self, case: CommandLine) -> Sweep:
         from zwidth.measures.definition import MeasureError

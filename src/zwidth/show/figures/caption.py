@@ -129,6 +129,10 @@ def facts_of_study(study: Any) -> dict[str, Any]:
         facts["position_m"] = None if isinstance(study.at, Mapping) else device.position(study.at)
     if device.load is not None and not any(key.startswith("load.") for key in keys):
         facts["load"] = table_of_load(device.load)
+    if (task := study.task) is not None:
+        facts["position_m"] = None
+        facts["direction"] = facts.get("direction") if task.directions is None else None
+        facts["operator"] = ", ".join(task.operators) or facts["operator"]
     varied_facts = {"at": "position_m"}
     fixed = {key: value for key, value in facts.items() if key not in {varied_facts.get(k, k) for k in keys}}
     return fixed | {"varied": keys, "left_out": device.linear_omissions}

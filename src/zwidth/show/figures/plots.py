@@ -276,6 +276,12 @@ def _tolerance(ax: Axes, result: Any) -> None:
     draw_bands(ax, result)
 
 
+def _optimisation(ax: Axes, result: Any) -> None:
+    from zwidth.show.figures.optimise import draw_optimisation
+
+    draw_optimisation(ax, result)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "CommonChart": _robust,
@@ -304,4 +310,5 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "CommonArea": _common_area,
     "Identification": _identification,
     "ToleranceStudy": _tolerance,
+    "Optimisation": _optimisation,
 }

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from math import isfinite, isnan
+from dataclasses import replace
+from math import ceil, floor, isfinite, isnan
+from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device import address
@@ -12,23 +14,35 @@ from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, pl
 from zwidth.device.schema import device_file as schema
 from zwidth.device.toml_access import is_number, tables
 from zwidth.model.reduction import MODELS
+from zwidth.study.designs.catalogue import CatalogueError, read_catalogue
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, Tie, spread
 
 UNITS: Final = {"stiffness_N_per_m": "N/m", "damping_Ns_per_m": "N s/m", "frequency_Hz": "Hz"}
 NUMBER: Final = ("number", "integer")
+SEARCH: Final = "search"  # how designs are spread over bounds
 
 Fault = tuple[KeyPath, str]
 Faults = list[Fault]
 SetNumbers = dict[KeyPath, tuple[str, str]]  # what is set: as it is written, and the axis that sets it
 
 
-def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Faults) -> tuple[Axis, ...]:
+def axes_of(
+    document: dict[str, Any],
+    device: Device | None,
+    faults_of_axes: Faults,
+    folder: Path = Path(),
+    *,
+    bounds: bool = False,
+) -> tuple[Axis, ...]:
     """The axes of a study that have no fault; the faults of the others are added to `faults_of_axes`.
 
     document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
     device    None if it could not be loaded; paths are then not looked up
+    folder    that catalogues are looked for in
+    bounds    whether ranges are the bounds of an optimiser's variables: they need no count, and may be of numbers
+              that are whole
     """
-    sampling = document.get("sampling", "grid")
+    sampling = SEARCH if bounds else document.get("sampling", "grid")
     axes, taken = [], SetNumbers()
     if sampling == "paired":
         faults_of_axes += _pairing_faults(document)
@@ -38,19 +52,27 @@ def axes_of(document: dict[str, Any], device: Device | None, faults_of_axes: Fau
         key = table.get("key")
         if not isinstance(key, str) or not key:
             continue
-        faults = list(overlap_faults(key, ("key",), key, device, taken))
+        own = [] if "catalogue" in table else [(key, ("key",))]
+        faults = [fault for path, where in own for fault in overlap_faults(path, where, key, device, taken)]
         axis: Axis | None = None
-        if key in CIRCUMSTANCES:
+        if "catalogue" in table:
+            axis = _catalogue_axis(table, key, device, folder, taken, faults)
+        elif key in CIRCUMSTANCES:
             faults += _circumstance_faults(key, table, device)
             axis = _axis(table, key, UNITS.get(key, "m" if key == "at" else ""), ())
             if table.get("tie"):
                 faults.append((("tie",), f"goes with a number of the device file, not with {key}; remove it"))
         elif device is not None:
-            message = list(key_faults(device.document, key, _values(table)))
+            message = list(key_faults(device.document, key, _values(table), whole_ranges=bounds))
             faults += message
             if not message:
                 ties = list(ties_of(table, key, device, taken, faults))
                 axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
+                whole = table.get("integer") is True or _takes_whole_numbers(device.document, key)
+                if axis is not None and bounds and whole and axis.span is not None:
+                    if floor(axis.span[1]) - ceil(axis.span[0]) < 1:
+                        faults.append((("range",), "holds fewer than two whole numbers; widen it"))
+                    axis = replace(axis, whole=True)
         faults_of_axes += [((*here, *path), message) for path, message in faults]
         if axis is not None and not faults:
             axes.append(axis)
@@ -81,6 +103,16 @@ def _pairing_faults(document: dict[str, Any]) -> Iterator[Fault]:
 def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
     """Faults of an axis that has no values, gives them twice (range and values), or has a key too many."""
     span, values = table.get("range"), table.get("values")
+    if "catalogue" in table:
+        for key in ("range", "values", "count", "scale", "tie", "integer"):
+            if key in table:
+                yield ((key,), "does not go with a catalogue; remove one of the two")
+        if not table.get("set"):
+            example = 'set = { "drives.motor.motor_inertia_kg_m2" = "inertia_kg_m2" }'
+            yield ((), f"has a catalogue and no set; say which column is which number, such as {example}")
+        return
+    if "set" in table:
+        yield (("set",), "is read with a catalogue only; remove it, or give catalogue = FILE.csv")
     if span is None and values is None:
         yield ((), "has no values; give range = [low, high] and count, or values = [...]")
     if span is not None and values is not None:
@@ -99,10 +131,41 @@ def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
             ("count",),
             "is for a grid; a Latin hypercube has one count for all axes: move it to the top",
         )
-    elif span is not None and sampling != "latin-hypercube" and "count" not in table:
+    elif span is not None and sampling not in ("latin-hypercube", SEARCH) and "count" not in table:
         yield ((), "has a range and no count; add the number of its values, such as count = 11")
     if table.get("scale") == "log" and isinstance(span, list) and span and is_number(span[0]) and not span[0] > 0:
         yield (("range",), f'must begin above 0 where scale = "log", got {quote(span)}')
+
+
+def _catalogue_axis(
+    table: dict[str, Any], key: str, device: Device | None, folder: Path, taken: SetNumbers, faults: Faults
+) -> Axis | None:
+    """The axis of a catalogue; None where it has a fault, which is added to `faults`."""
+    given, file = table.get("set"), table["catalogue"]
+    columns = {path: heading for path, heading in given.items() if isinstance(heading, str)} if given else {}
+    if key in CIRCUMSTANCES:
+        faults.append((("key",), f"'{key}' is a circumstance; call what the catalogue holds otherwise"))
+    for path in columns if device is not None else ():
+        assert device is not None
+        wrong = [(("set", path), message) for _, message in key_faults(device.document, path, _SOME_NUMBER)]
+        faults += wrong or overlap_faults(path, ("set", path), key, device, taken)
+    if not isinstance(file, str) or not file or not columns:
+        return None
+    try:
+        parts = read_catalogue(folder / file, columns)
+    except CatalogueError as error:
+        faults += [(("catalogue",), f"{file}: {line}") for line in str(error).splitlines()]
+        return None
+    return None if faults else Axis(key, tuple(parts), parts=tuple(parts.values()))
+
+
+_SOME_NUMBER: Final[list[tuple[KeyPath, Any]]] = [(("set",), 1)]
+
+
+def _takes_whole_numbers(document: dict[str, Any], key: str) -> bool:
+    """Whether the device file allows no other numbers at a path."""
+    kinds = {kind.get("type") for kind in schema.subschemas(address.resolve(document, key))}
+    return "integer" in kinds and "number" not in kinds
 
 
 def _values(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
@@ -170,8 +233,13 @@ def _exclude(one: KeyPath, other: KeyPath) -> bool:
     return all(of) and of[0] != of[1]
 
 
-def key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]]) -> Iterator[Fault]:
-    """Faults of a key that no device file has, or of values of a kind that the schema does not allow there."""
+def key_faults(
+    document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]], *, whole_ranges: bool = False
+) -> Iterator[Fault]:
+    """Faults of a key that no device file has, or of values of a kind that the schema does not allow there.
+
+    whole_ranges  whether a number that is whole may have a range
+    """
     try:
         steps = address.resolve(document, key)
         now = address.get(document, key) if address.exists(document, key) else None
@@ -195,7 +263,7 @@ def key_faults(document: dict[str, Any], key: str, values: list[tuple[KeyPath, A
     spanned = any(where[0] == "range" for where, _ in values)
     if spanned and not kinds & {*NUMBER}:
         yield (("range",), f"cannot be used: '{key}' takes text; write values = [...] with the texts")
-    elif spanned and "number" not in kinds:
+    elif spanned and "number" not in kinds and not whole_ranges:
         yield (("range",), f"cannot be used: '{key}' takes whole numbers; write values = [1, 2, 3]")
     else:
         texts = _texts(steps)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from zwidth.device.faults import comma_list, nearest
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.definition import FAILED, NO_VALUE, OK, Measure, MeasureValues
+from zwidth.measures.definition import FAILED, NO_VALUE, OK, Better, Measure, MeasureValues
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
 from zwidth.model.argument_checks import wrong_type
 from zwidth.study.workspace.workspace_summary import CONDITIONS
@@ -109,10 +109,13 @@ class Column:
         return value, status, next((note.reason for note in values.notes if note.status == status), "")
 
 
-def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) -> Column:
+def column_named(
+    name: str, user_measures: Mapping[str, Measure] | None = None, better: Better | None = None
+) -> Column:
     """The column of a name, such as "isotropy" or "average(isotropy)".
 
     user_measures  measures of a user's own, by name
+    better         which values are better of a measure that leaves it open
     Raises         ValueError  for an unknown name, with the nearest known one
 
     >>> column_named("average(isotropy)").measure.name
@@ -120,14 +123,14 @@ def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) 
     """
     parts = re.fullmatch(r"\s*(\w+)\s*\(\s*([^()]*?)\s*\)\s*", name)
     if parts is None:
-        measure = find_measure(name.strip(), user_measures)
+        measure = _judged(find_measure(name.strip(), user_measures), better)
         return Column(measure.name, measure)
     over, inner = parts.groups()
     if over not in STATISTICS:
         near = nearest(over, STATISTICS)
         hint = f"did you mean {near}({inner})?" if near else f"there are {comma_list(list(STATISTICS))}"
         raise ValueError(f"{over} is not a statistic over the workspace; {hint}")
-    measure = find_measure(inner, user_measures)
+    measure = _judged(find_measure(inner, user_measures), better)
     if over in JUDGING and measure.better is None:
         raise ValueError(
             f"{over}({measure.name}): whether more or less is better depends on the purpose; "
@@ -138,6 +141,10 @@ def column_named(name: str, user_measures: Mapping[str, Measure] | None = None) 
             f"{over}({measure.name}): {over} applies to {comma_list(OF[over])} only; write average({measure.name})"
         )
     return Column(f"{over}({measure.name})", measure, over)
+
+
+def _judged(measure: Measure, better: Better | None) -> Measure:
+    return measure if measure.better is not None or better is None else replace(measure, better=better)
 
 
 def measure_list(measures: Any) -> list[str | Measure]:

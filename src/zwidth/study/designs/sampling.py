@@ -11,6 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.study.designs.catalogue import Part
+
 WANTED: Final = ("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz")
 CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)
 
@@ -55,12 +57,14 @@ def _times(value: Any, factor: float) -> Any:
 class Axis:
     """A number or a circumstance that a study varies.
 
-    key     a path of the device file, or one of CIRCUMSTANCES
+    key     a path of the device file, one of CIRCUMSTANCES, or what a catalogue is of
     values  values of a grid; of a Latin hypercube those it chooses from, () where it has a range
     span    lowest and highest value; None: only the listed values
     log     whether the range is divided evenly in the logarithm
     ties    numbers that change with this one
     unit    "" for none
+    whole   whether the values are whole numbers
+    parts   of a catalogue: the numbers that each of the values, the name of a part, stands for
     """
 
     key: str
@@ -69,11 +73,33 @@ class Axis:
     log: bool = False
     ties: tuple[Tie, ...] = ()
     unit: str = ""
+    whole: bool = False
+    parts: tuple[Part, ...] = ()
 
     @property
     def numeric(self) -> bool:
         """Whether its values are numbers."""
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
+
+    def columns(self, values: Sequence[Any]) -> Iterator[tuple[str, Sequence[Any]]]:
+        """Each path, or the circumstance, that the axis sets, with what it is at each of its values; tied numbers
+        last.
+
+        >>> list(Axis("a", (1.0,), ties=(Tie("b", 2.0),)).columns([3.0, 4.0]))
+        [('a', [3.0, 4.0]), ('b', [6.0, 8.0])]
+        """
+        if self.parts:
+            chosen = [self.parts[self.values.index(value)] for value in values]
+            yield from ((path, [part[n][1] for part in chosen]) for n, (path, _) in enumerate(self.parts[0]))
+            return
+        yield self.key, values
+        for tie in self.ties:
+            yield tie.key, [tie.value(value) for value in values]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Each path, or the circumstance, that the axis sets."""
+        return tuple(key for key, _ in self.columns(()))
 
     def at(self, share: float) -> Any:
         """The value at a share 0 <= share < 1 of the way along the axis."""
@@ -175,6 +201,4 @@ class Sampling:
 def settings(axes: tuple[Axis, ...], values: tuple[Any, ...]) -> Iterator[tuple[str, Any]]:
     """Path and value of each number that a design changes, tied numbers after those they are tied to."""
     for axis, value in zip(axes, values, strict=True):
-        yield axis.key, value
-        for tie in axis.ties:
-            yield tie.key, tie.value(value)
+        yield from ((key, one) for key, (one,) in axis.columns([value]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import prod
+from pathlib import Path as File
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -19,6 +20,7 @@ from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
 from zwidth.study.designs.study_schema import StudyFile, description, unknown
+from zwidth.study.designs.task import DEMANDS, Task, task_of
 from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of
 
 PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
@@ -57,6 +59,8 @@ class Study:
     at, direction, assembly, model   circumstances that no axis sets; None: those of the device file
     wall       stiffness, damping and frequency that some measures need, as far as no axis sets them
     plane      grid over the workspace; None where no measure is over it
+    task       where measures are taken instead; None without a [task]
+    user_measures  measures of the user's own, by name
     spelling   how messages spell arguments: as keys of a file or as arguments in Python
     """
 
@@ -72,6 +76,8 @@ class Study:
     model: str | None = None
     wall: WantedWall = field(default_factory=WantedWall)
     plane: PlaneGrid | None = None
+    task: Task | None = None
+    user_measures: Mapping[str, Measure] = field(default_factory=dict)
     spelling: Spelling = as_key
 
     def __repr__(self) -> str:
@@ -97,7 +103,8 @@ def check_study(
     *,
     plane: PlaneGrid | None = None,
     spelling: Spelling = as_key,
-    needs: Sequence[str] = ("measures", "axis"),
+    bounds: bool = False,
+    needs: Sequence[str] | None = None,
 ) -> Study | None:
     """The study that a document describes; None where anything is wrong with it, which is added to `faults`.
 
@@ -105,7 +112,8 @@ def check_study(
     operators      as in `Study`
     user_measures  a user's measures by name; None: they could not be loaded, and no measure is looked up
     plane          grid over the workspace; None: as the document's [workspace] says
-    needs          keys that the document must have, besides those that every study has
+    bounds         whether the axes are the variables of an optimiser, and the measures those of [optimise]
+    needs          keys that the document must have; None: axis, and without bounds measures
     Raises         TooLarge  where the designs would not fit into memory
     """
     checked: StudyFile | None = None
@@ -113,7 +121,7 @@ def check_study(
         checked = StudyFile.model_validate(document)
     except ValidationError as error:
         faults += validation_messages(error, document, description, unknown)
-    faults += _missing(document, needs)
+    faults += _missing(document, needs or (("axis",) if bounds else ("measures", "axis")))
     if device is not None and device.response is not None:
         faults.append(
             (
@@ -123,10 +131,11 @@ def check_study(
         )
         device = None
     columns = () if user_measures is None else _columns(document, user_measures, faults)
-    axes = axes_of(document, device, faults)
+    axes = axes_of(document, device, faults, File(label).parent, bounds=bounds)
     _check_sampling(document, faults)
     _check_circumstances(document, device, faults)
-    plane = _plane(document, device, columns, plane, faults, spelling)
+    task = _task(document, device, columns, faults, bounds)
+    plane = None if task else _plane(document, device, columns, plane, faults, spelling)
     if faults or checked is None or device is None:
         return None
     hypercube = checked.sampling == "latin-hypercube"
@@ -149,6 +158,8 @@ def check_study(
         model=checked.model,
         wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
         plane=plane,
+        task=task,
+        user_measures=user_measures or {},
         spelling=spelling,
     )
     if not study.turns:
@@ -258,6 +269,27 @@ def _plane(
     except ValueError as error:  # an assembly that is singular throughout, or does not close
         faults.append((("workspace",), f"no plane can be laid through it: {error}"))
     return None
+
+
+def _task(
+    document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: Faults, bounds: bool
+) -> Task | None:
+    """The task of the study; None without one, or where anything is wrong with it."""
+    if "task" not in document:
+        return None
+    if "workspace" in document:
+        faults.append((("workspace",), "and [task] exclude each other; remove one of them"))
+    if not bounds:
+        given = table(document, "task")
+        for key in ("operators", *DEMANDS):
+            if key in given:
+                faults.append((("task", key), "is for an optimiser; remove it, or vary operator by an axis"))
+        if columns and not any(column.statistic for column in columns):
+            message = f"is used only by measures over it, such as worst({columns[0].measure.name}); remove it"
+            faults.append((("task",), message))
+    if device is None or any(path[0] in ("task", "at", "assembly", "direction") for path, _ in faults):
+        return None
+    return task_of(document, device, faults)
 
 
 def _check_size(checked: StudyFile, hypercube: bool) -> None:

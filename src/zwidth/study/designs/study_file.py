@@ -18,7 +18,7 @@ from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
 from zwidth.device.text_file import UnreadableFileError, read_text
-from zwidth.device.toml_access import tables
+from zwidth.device.toml_access import table, tables
 from zwidth.measures.definition import Measure
 from zwidth.measures.user_measures import load_measures
 from zwidth.study.designs.axis_tables import Faults
@@ -27,14 +27,15 @@ from zwidth.study.designs.study import Study, check_study
 STUDIES: Final = BundledFiles("zoo", "study", "a study file", "a study needs a device, measures and an [[axis]]")
 
 
-def read_study(path: str | os.PathLike[str]) -> Study:
+def read_study(path: str | os.PathLike[str], *, bounds: bool = False) -> Study:
     """The study that a file describes.
 
+    bounds  whether it is read for an optimiser, see `study_of`
     Raises DeviceError  with all faults of the file, those of the device file it names among them
            TooLarge     where its designs would not fit into memory
     """
     label = os.fspath(path)
-    return study_of(read_document(label), label)
+    return study_of(read_document(label), label, bounds=bounds)
 
 
 def read_document(label: str) -> dict[str, Any]:
@@ -51,13 +52,16 @@ def read_document(label: str) -> dict[str, Any]:
 def study_of(
     document: dict[str, Any],
     label: str = "study",
-    needs: Sequence[str] = ("measures", "axis"),
+    *,
+    bounds: bool = False,
+    needs: Sequence[str] | None = None,
     further: Callable[[Device | None, Faults], None] | None = None,
 ) -> Study:
     """The study that a document describes.
 
     label    what messages call it; files that it names lie beside it
-    needs    keys that it must have
+    bounds   whether it is read for an optimiser: ranges of axes are bounds, and measures those of [optimise]
+    needs    keys that it must have, see `check_study`
     further  adds the faults of tables that a sweep leaves aside, such as [[tolerance]]
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
@@ -70,8 +74,8 @@ def study_of(
     folder = File(label).parent
     device = _device(document, folder, faults, file_faults)
     operators = axis_operators(document, folder, file_faults)
-    own = _own_measures(document, folder, faults)
-    study = check_study(document, label, device, operators, own, faults, needs=needs)
+    own_measures = _own_measures(document, folder, faults)
+    study = check_study(document, label, device, operators, own_measures, faults, bounds=bounds, needs=needs)
     if further is not None:
         further(device, faults)
     if study is None or faults or file_faults:
@@ -88,15 +92,15 @@ def _device_instead(label: str, what: str) -> DeviceError:
 
 
 def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fault]) -> dict[str, Any]:
-    """The operators that an axis names, by name: their tables, None for nobody.
+    """The operators that an axis or the task names, by name: their tables, None for nobody.
 
     folder       that files are looked for in
     file_faults  gets the faults of their files
     """
     operators: dict[str, Any] = {}
-    for _, axis in tables(document, "axis"):
-        values = axis.get("values")
-        for name in values if axis.get("key") == "operator" and isinstance(values, list) else []:
+    lists = [axis.get("values") for _, axis in tables(document, "axis") if axis.get("key") == "operator"]
+    for names in (*lists, table(document, "task").get("operators")):
+        for name in names if isinstance(names, list) else []:
             if isinstance(name, str) and name:
                 try:
                     operators[name] = _operator(name, folder)

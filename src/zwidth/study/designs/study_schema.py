@@ -61,7 +61,8 @@ class AxisSection(Section):
     """What is varied: a number of the device file, or a circumstance."""
 
     key: Text = documented_key(
-        "what is varied: a dotted path of the device file, or a circumstance such as assembly"
+        "what is varied: a dotted path of the device file, a circumstance such as assembly, or with a catalogue a "
+        "name for what it holds"
     )
     range: Bounds | None = documented_key("lowest and highest value", default=None)
     count: WholeNumber | None = documented_key(
@@ -69,6 +70,14 @@ class AxisSection(Section):
     )
     values: tuple[Any, ...] | None = documented_key("the values", min_length=1, default=None)
     scale: Literal["linear", "log"] = documented_key("how the range is divided", default="linear")
+    integer: bool = documented_key("whether an optimiser takes whole numbers of the range alone", default=False)
+    catalogue: Text | None = documented_key(
+        "a CSV file beside this one, of parts to choose from: a column 'name', and columns of numbers",
+        default=None,
+    )
+    set: dict[Text, Text] = documented_key(
+        "for a catalogue: path of the device file -> the column that holds its number", default={}
+    )
     tie: tuple[TieEntry, ...] = documented_key("a list of numbers that change with this one", default=())
 
 
@@ -135,13 +144,58 @@ class StudyWorkspaceSection(Section):
     ] = documented_key("points along both axes, or along each", default=(15, 15))
 
 
+def _one_or_more(value: Any) -> Any:
+    return [value] if is_number(value) else value
+
+
+Counts = Annotated[
+    tuple[Annotated[WholeNumber, Field(ge=1, le=MOST)], ...],
+    Field(min_length=1, max_length=3),
+    BeforeValidator(_one_or_more),
+]
+Span = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)]
+
+
+class TaskSection(Section):
+    """What the device is for: where it must reach, along which directions, held by whom, and what is demanded
+    everywhere there."""
+
+    box_m: Annotated[tuple[Span, ...], Field(min_length=2, max_length=3)] | None = documented_key(
+        "a box that must be reached: [lower, upper] along x, y and in space z", "m", default=None
+    )
+    center_m: Position | None = documented_key("centre of a disk, or in space of a ball", "m", default=None)
+    radius_m: Number | None = documented_key("radius of the disk or ball", "m", gt=0, default=None)
+    points_m: Annotated[tuple[Position, ...], Field(min_length=1)] | None = documented_key(
+        "points that must be reached", "m", default=None
+    )
+    count: Counts | None = documented_key(
+        "points of a box along all axes, or along each; rings of a disk, shells of a ball", default=None
+    )
+    directions: (
+        Annotated[WholeNumber, Field(ge=1, le=MOST)] | Annotated[tuple[Direction, ...], Field(min_length=1)] | None
+    ) = documented_key("how many directions, spread evenly, or a list of them", default=None)
+    operators: tuple[Text, ...] = documented_key(
+        "who holds the device: bundled names, files beside this one, none", default=()
+    )
+    peak_force_N: Number | None = documented_key("least peak force", "N", gt=0, default=None)
+    continuous_force_N: Number | None = documented_key("least continuous force", "N", gt=0, default=None)
+    friction_N: Number | None = documented_key("largest dry friction felt", "N", gt=0, default=None)
+    apparent_mass_kg: Number | None = documented_key("largest mass felt", "kg", gt=0, default=None)
+    resolution_m: Number | None = documented_key("largest step of the position", "m", gt=0, default=None)
+
+
 class OptimiseSection(Section):
     """What `zwidth optimise` reads besides; `zwidth sweep` does not read it."""
 
-    objectives: dict[Text, Literal["max", "min"]] = documented_key('measure -> "max" or "min"', default={})
+    objectives: dict[Text, Literal["max", "min"]] = documented_key(
+        'measure -> "max" or "min"', default={}, min_length=1
+    )
     constraints: dict[Text, Text] = documented_key('measure -> such as "<= 0.3"', default={})
-    budget: WholeNumber | None = documented_key("designs to try", ge=1, default=None)
+    budget: WholeNumber | None = documented_key("designs to try", ge=1, le=MOST, default=None)
     seed: WholeNumber | None = documented_key("seed of the random numbers", ge=LEAST_SEED, default=None)
+    front: WholeNumber | None = documented_key(
+        "designs of the front to keep, at most", ge=1, le=1000, default=None
+    )
 
 
 class StudyFile(Section):
@@ -150,7 +204,9 @@ class StudyFile(Section):
     file_version: WholeNumber = VERSION
     device: Text = documented_key("a bundled name, or a file beside this one")
     measures: tuple[Text, ...] = documented_key(
-        "the measures to compute for each design", min_length=1, default=()
+        "the measures to compute for each design; an optimiser computes those of [optimise]",
+        min_length=1,
+        default=(),
     )
     measures_file: Text | None = documented_key("a file of your own measures, beside this one", default=None)
     sampling: Literal["grid", "latin-hypercube", "paired"] = documented_key(
@@ -174,6 +230,7 @@ class StudyFile(Section):
     damping_Ns_per_m: Number | None = documented_key("of the wanted wall", "N s/m", ge=0, default=None)
     frequency_Hz: Number | None = documented_key("at which the hand moves", "Hz", gt=0, default=None)
     workspace: StudyWorkspaceSection | None = documented_key("for measures over a workspace", default=None)
+    task: TaskSection | None = documented_key("what the device is for", default=None)
     optimise: OptimiseSection | None = documented_key("for an optimiser", default=None)
     draw: DrawSection | None = documented_key("for a study of tolerances", default=None)
 
@@ -184,6 +241,7 @@ _TABLES: Final[dict[str, Any]] = {
     "tie": TieSection,
     "draw": DrawSection,
     "workspace": StudyWorkspaceSection,
+    "task": TaskSection,
     "optimise": OptimiseSection,
 }
 
@@ -221,6 +279,8 @@ def unknown(path: KeyPath) -> str:
         DrawSection: "[draw]",
         TieSection: "a tie",
         StudyWorkspaceSection: "[workspace]",
+        TaskSection: "[task]",
+        OptimiseSection: "[optimise]",
     }
-    place = here.get(section, "[optimise]" if section is OptimiseSection else "a study file")
+    place = here.get(section, "a study file")
     return f"is not a key of {place}; {suggestion(key, list(section.model_fields))}"

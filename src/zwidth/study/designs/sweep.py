@@ -69,9 +69,12 @@ class Sweep(Result):
         return f"{NO_DESIGN}: {next((sentence for _, sentence in note_sentences(self)), status)}"
 
     def design(self, number: int) -> dict[str, Any]:
-        """Path -> value of each number and circumstance that a design sets, by its number from 0."""
+        """Path -> value of each number and circumstance that a design sets, by its number from 0; and the
+        part of each catalogue."""
         sampling = self.job.sampling
-        return dict(settings(sampling.axes, sampling.values(number)))
+        values = sampling.values(number)
+        parts = {axis.key: value for axis, value in zip(sampling.axes, values, strict=True) if axis.parts}
+        return parts | dict(settings(sampling.axes, values))
 
     def dataset(self) -> xr.Dataset:
         """The values over the axes, with units and the study; see `sweep_data.as_dataset`."""

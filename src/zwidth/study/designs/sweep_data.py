@@ -70,11 +70,13 @@ def _columns(sweep: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str,
             yield f"{axis.key}_{COMPONENTS[n]}", (padded[:, n], attributes)
     else:
         yield axis.key, (np.array(values), attributes | {"role": "axis"})
-    for tie in axis.ties:
-        tied = np.array([tie.value(value) for value in values])
-        unit = unit_of(sweep.study.device.document, tie.key)
+    for key, each in axis.columns(values):
+        if key == axis.key:
+            continue
+        tied = np.array(each)
+        unit = unit_of(sweep.study.device.document, key)
         for place in np.ndindex(tied.shape[1:]):
-            path = ".".join([tie.key, *map(str, place)])
+            path = ".".join([key, *map(str, place)])
             yield path, (tied[(slice(None), *place)], {**unit_attributes(unit), "long_name": path})
 
 
@@ -99,7 +101,7 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
         "axes": [
             {"key": axis.key, "unit": axis.unit or None}
             | ({"values": axis.values} if sampling.size is None or axis.span is None else {"range": axis.span})
-            | {"tied": [tie.key for tie in axis.ties]}
+            | {"tied": [key for key in axis.keys if key != axis.key]}
             for axis in sampling.axes
         ],
         "units": {column.name: column.unit or None for column in sweep.job.columns},

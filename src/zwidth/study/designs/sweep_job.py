@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
-Found: TypeAlias = tuple[float, int, str]  # value, status and reason
+Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
 WALL: Final = ("stiffness", "damping", "frequency")  # of the wanted wall, as arguments
 
 
@@ -72,9 +72,12 @@ class SweepJob:
     label                of the device, for messages
     operators            as in `Study`
     columns              the measures to compute
-    positions            (..., 3) of the workspace [m]; None where no column is over the workspace
+    positions            (..., 3) of the workspace or (n, 1, 3) of the task [m]; None where no column is over any
     weights              (...) area that belongs to each position [m^2]
     fixed_circumstances  circumstances that no axis sets
+    directions           (d, 3) of the task; None: the one that is a circumstance
+    complete             whether a column over all positions needs a value at each of them, as a task does
+    cells                whether columns are not reduced: a number for each position, the columns one after another
     """
 
     document: dict[str, Any]
@@ -85,6 +88,9 @@ class SweepJob:
     positions: NDArray[np.float64] | None
     weights: NDArray[np.float64] | None
     fixed_circumstances: dict[str, Any]
+    directions: NDArray[np.float64] | None = None
+    complete: bool = False
+    cells: bool = False
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def __repr__(self) -> str:
@@ -100,8 +106,16 @@ class SweepJob:
 
     @property
     def measures(self) -> tuple[str, ...]:
-        """Columns, as they are written in the study."""
-        return tuple(one.name for one in self.columns)
+        """Columns, as they are written in the study; of unreduced ones each cell."""
+        names = tuple(one.name for one in self.columns)
+        return tuple(f"{name}, cell {n}" for name in names for n in range(self._width)) if self.cells else names
+
+    @property
+    def _width(self) -> int:
+        """Numbers of each column."""
+        if not self.cells or self.positions is None:
+            return 1
+        return int(self.positions[..., 0].size) * (1 if self.directions is None else len(self.directions))
 
     @property
     def question(self) -> str:
@@ -117,23 +131,26 @@ class SweepJob:
             self.columns,
             self.positions,
             self.fixed_circumstances,
+            self.directions,
+            self.complete,
+            self.cells,
         )
 
     def compute(self, first: int, last: int) -> CellValues:
         """Designs first to last - 1: together; alone where a design has no value together, or has to say why."""
-        shape = last - first, len(self.columns)
+        shape = last - first, len(self.columns), self._width
         values, status = np.full(shape, np.nan), np.full(shape, MISSING, dtype=np.uint8)
         reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
 
         def fill(row: int, column: int, found: Found) -> None:
             values[row, column], status[row, column], reason = found
             if reason:
-                reasons[column].setdefault((found[1], reason), []).append(first + row)
+                reasons[column].setdefault((int(np.max(found[1])), reason), []).append(first + row)
 
         for group in self._grouping.groups(list(self._design_columns(first, last))):
             for row, column, found in self._together(group, first):
                 fill(row, column, found)
-        for row, column in np.argwhere(status == MISSING).tolist():
+        for row, column in np.argwhere((status == MISSING).all(axis=-1)).tolist():
             fill(row, column, self._alone(first + row, self.columns[column]))
         notes = [
             tuple(
@@ -141,7 +158,9 @@ class SweepJob:
             )
             for kinds in reasons
         ]
-        return CellValues(values, status, tuple(notes))
+        flat = last - first, len(self.columns) * self._width
+        each = tuple(note for note in notes for _ in range(self._width))
+        return CellValues(values.reshape(flat), status.reshape(flat), each)
 
     @cached_property
     def _grouping(self) -> DesignGrouping:
@@ -150,9 +169,8 @@ class SweepJob:
     def _design_columns(self, first: int, last: int) -> Iterator[DesignColumn]:
         """Each key that an axis, or a number tied to it, sets in designs first to last - 1."""
         for axis, values, places in self.sampling.columns(first, last):
-            yield DesignColumn(axis.key, values, places)
-            for tie in axis.ties:
-                yield DesignColumn(tie.key, [tie.value(value) for value in values], places)
+            for key, each in axis.columns(values):
+                yield DesignColumn(key, each, places)
 
     def _together(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
         """Row, column and value of each design of a group that need not be asked for alone."""
@@ -161,7 +179,7 @@ class SweepJob:
         if isinstance(chosen.get("at"), Mapping):  # joint angles are solved for one design at a time
             return
         for over_workspace in (False, True):
-            columns = [n for n, one in enumerate(self.columns) if (one.statistic is not None) == over_workspace]
+            columns = [n for n, one in enumerate(self.columns) if self._over_positions(one) == over_workspace]
             cells = self.positions[..., 0].size if over_workspace and self.positions is not None else 1
             size = max(1, MOST_CELLS // cells)
             for start in range(0, len(group.rows) if columns else 0, size):
@@ -176,6 +194,8 @@ class SweepJob:
                     continue
                 except (PostureError, LoadError, DeviceError):
                     continue  # each design alone says why
+                if over_workspace and self.directions is not None:
+                    point = point.along_each(self.directions)
                 same = not group.batch.differs and (over_workspace or group.positions is None)
                 decided = group.valid[piece] & ~alone
                 if not (over_workspace or same):
@@ -226,13 +246,13 @@ class SweepJob:
         """
         measure = one.measure
         if same and not measure.of_wall:
-            yield from [_column_value(one, measure, point, self.weights)] * len(designs)
+            yield from [self._column_value(one, measure, point)] * len(designs)
             return
         together = not same and measured_together(measure, point) and (measure.of_designs or not measure.of_wall)
         if not together:
             for place, number in enumerate(designs):
                 wanted = measure.at_wall(self.design(int(number)).wall)
-                yield _column_value(one, wanted, point if same else point[place], self.weights)
+                yield self._column_value(one, wanted, point if same else point[place])
             return
         try:
             result = evaluate(measure.at_wall(self._walls(designs, point)) if measure.of_wall else measure, point)
@@ -244,12 +264,35 @@ class SweepJob:
             reasons.setdefault(note.status, []).append(note.reason)
         for place in range(len(designs)):
             values, status = result.values[place], result.status[place]
-            if one.statistic is None:
-                found = float(values), int(status), ""
-            else:
-                found = one.reduce(MeasureValues(values, status), point[place], self.weights)
-            known = reasons.get(found[1], [])
+            found = self._reduced(one, MeasureValues(values, status), point if same else point[place])
+            known = reasons.get(int(np.max(found[1])), [])
             yield None if len(known) > 1 else (*found[:2], found[2] or "".join(known))
+
+    def _over_positions(self, one: Column) -> bool:
+        return one.statistic is not None and self.positions is not None
+
+    def _reduced(self, one: Column, found: MeasureValues, point: OperatingPoint) -> Found:
+        """Value, status and reason of a column from the measure's values at one point, or at all positions."""
+        if self.cells:
+            reason = found.notes[0].reason if found.notes else ""
+            return found.values.ravel(), found.status.ravel(), reason
+        if one.statistic is None:
+            return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
+        if self.complete and (found.status != OK).any():
+            kinds, counts = np.unique(found.status[found.status != OK], return_counts=True)
+            status = int(kinds[np.argmax(counts)])
+            return np.nan, status, next((note.reason for note in found.notes if note.status == status), "")
+        return one.reduce(found, point, self.weights)
+
+    def _column_value(self, one: Column, measure: Measure, point: OperatingPoint) -> Found:
+        """Value, status and reason of one column; its measure is about the design's wanted wall."""
+        try:
+            if not self._over_positions(one) and measure.each:
+                status = int(point.status)
+                return (np.nan, status, "") if status != OK else evaluate_safely(lambda: measure.compute(point))
+            return self._reduced(one, evaluate(measure, point), point)
+        except MeasureError as error:
+            return np.nan, NO_VALUE, error.spelled(as_key)
 
     def _walls(self, designs: NDArray[np.int64], point: OperatingPoint) -> WantedWall | WantedWalls:
         """The walls wanted of some designs, along the first of the points' axes."""
@@ -269,15 +312,15 @@ class SweepJob:
             self._cache["design"] = number, self.design(number)
         design = self._cache["design"][1]
         try:
-            point = design.point() if one.statistic is None else design.workspace()
+            point = design.workspace() if self._over_positions(one) else design.point()
         except _NoPoint as none:
             return np.nan, none.status, none.reason
-        return _column_value(one, one.measure.at_wall(design.wall), point, self.weights)
+        return self._column_value(one, one.measure.at_wall(design.wall), point)
 
     @cached_property
     def _in_mechanism(self) -> frozenset[str]:
         """The axes and tied numbers that stand in [mechanism]."""
-        keys = {key for axis in self.sampling.axes for key in (axis.key, *(tie.key for tie in axis.ties))}
+        keys = {key for axis in self.sampling.axes for key in axis.keys}
         own = keys - {*CIRCUMSTANCES}
         return frozenset(key for key in own if address.resolve(self.document, key)[0] == "mechanism")
 
@@ -314,8 +357,9 @@ class Design:
         return self._solve_once("point", self._circumstance("at"))
 
     def workspace(self) -> OperatingPoint:
-        """The operating points of all positions of the workspace. Raises _NoPoint."""
-        return self._solve_once("workspace", self.job.positions)
+        """The operating points of all positions of the workspace or the task. Raises _NoPoint."""
+        point = self._solve_once("workspace", self.job.positions)
+        return point if self.job.directions is None else point.along_each(self.job.directions)
 
     def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
         if name not in self.points:
@@ -375,22 +419,6 @@ def _error_text(error: Exception) -> str:
     return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)
 
 
-def _column_value(
-    one: Column, measure: Measure, point: OperatingPoint, weights: NDArray[np.float64] | None
-) -> tuple[float, int, str]:
-    """Value, status and reason of one column; its measure is about the design's wanted wall."""
-    try:
-        if one.statistic is not None:
-            return one.reduce(evaluate(measure, point), point, weights)
-        if measure.each:
-            status = int(point.status)
-            return (np.nan, status, "") if status != OK else evaluate_safely(lambda: measure.compute(point))
-        result = evaluate(measure, point)
-    except MeasureError as error:
-        return np.nan, NO_VALUE, error.spelled(as_key)
-    return float(result.values), int(result.status), result.notes[0].reason if result.notes else ""
-
-
 def sweep_job(study: Study) -> SweepJob:
     """The job of a study, for which a `Store` can be made.
 
@@ -399,12 +427,25 @@ def sweep_job(study: Study) -> SweepJob:
     wanted = {KEYS[name]: getattr(study.wall, name) for name in WALL}
     circumstances = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
     fixed = {key: value for key, value in circumstances.items() if value is not None}
-    plane = study.plane
+    plane, task = study.plane, study.task
     positions, weights = (None, None) if plane is None else (plane.positions, areas(plane.x, plane.y))
+    if task is not None:
+        positions = task.grid
     # the sources of a device's numbers change no result; they need not be read again for each design
     document = {key: value for key, value in study.device.document.items() if key != "sources"}
     columns, designs = study.columns, study.sampling
-    job = SweepJob(document, study.device.label, study.operators, designs, columns, positions, weights, fixed)
+    job = SweepJob(
+        document,
+        study.device.label,
+        study.operators,
+        designs,
+        columns,
+        positions,
+        weights,
+        fixed,
+        directions=None if task is None else task.directions,
+        complete=task is not None,
+    )
     _check_measures(job, study.spelling)
     return job
 

@@ -1,0 +1,153 @@
+"""`zwidth optimise`: the best designs of a study, and what cannot be had together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.answer import table
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import Callback, refuse_empty
+from zwidth.show.cli.resumable import resume_options
+from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
+from zwidth.show.output import DATA, FIGURES, OutputError, printable, write_text
+from zwidth.show.units import number, typed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from zwidth.study.optimise.optimisation import Optimisation
+
+PAGES: Final = (".html", ".htm")
+
+
+def _designs_option(command: Callback) -> Callback:
+    option: Any = click.option(
+        "--designs",
+        metavar="FOLDER",
+        callback=refuse_empty,
+        help="Write a device file for each design of the front into this folder.",
+    )
+    decorated: Callback = option(command)
+    return decorated
+
+
+class OptimiseCommand(Command):
+    """Find the best designs of a device for a task: variables, objectives and demands, described in STUDY.toml.
+
+    The front holds designs of which none is better in every objective. With --resume a run can be stopped, and the
+    same command continues it.
+    """
+
+    name = "optimise"
+    summary = "Find the best designs, described by a study file."
+    examples = (
+        "zwidth optimise my-study.toml",
+        "zwidth optimise my-study.toml --output before-and-after.html --designs better",
+        "zwidth optimise my-study.toml --resume my-study.search --output front.svg",
+    )
+    options = (_designs_option, resume_options)
+    outputs = (*FIGURES, *DATA, *PAGES)
+    output_help = "Write a report (.html), a figure of the front (.png .svg .pdf) or the data (.csv .json)."
+    keys = ("designs", "values", "status", "knee", "baseline")
+
+    def about(self, command: Callback) -> Callback:
+        return about_a_study(command, bounds=True)
+
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        return circumstances_of_study(case)
+
+    def compute(self, case: CommandLine) -> Optimisation:
+        from zwidth.measures.definition import MeasureError
+        from zwidth.memory_limit import TooLarge
+        from zwidth.study.jobs.store import StoreError
+        from zwidth.study.optimise.optimise import optimise
+
+        question = case.question
+        assert isinstance(question, StudyQuestion)
+        try:
+            return optimise(question.study, case["resume"], case.progress, case["workers"])
+        except (TooLarge, StoreError) as error:
+            raise BadInput(f"{question.name}: {error}") from None
+        except MeasureError as error:
+            raise BadInput(*(f"{question.name}: optimise: {line}" for line in str(error).splitlines())) from None
+
+    def reason(self, case: CommandLine, result: Optimisation) -> str | None:
+        return result.reason
+
+    def heading(self, case: CommandLine) -> str:
+        return ""
+
+    def pages(self, case: CommandLine, result: Optimisation, document: Mapping[str, Any]) -> Iterator[Any]:
+        from zwidth.show.report.optimisation_text import sentences
+
+        said = [printable(typed(sentence)) for sentence in sentences(result)]
+        yield f"{printable(document['name'])}: {said[0]}"
+        if document["left_out"]:
+            yield f"linear: leaves out {', '.join(document['left_out'])}"
+        if len(result.front):
+            yield table(*front_table(result))
+        yield from said[1:]
+
+    def write(
+        self, case: CommandLine, result: Optimisation, document: dict[str, Any], reason: str | None
+    ) -> str | None:
+        assert case.path is not None
+        if case.writes(PAGES):
+            from zwidth.show.report.optimisation import optimisation_page
+
+            write_text(case.path, optimisation_page(result))
+            return reason
+        return super().write(case, result, document, reason)
+
+    def write_others(self, case: CommandLine, result: Optimisation) -> dict[str, Path]:
+        if case["designs"] is None or not len(result.front):
+            return {}
+        from zwidth.study.optimise.device_files import device_files
+
+        folder = Path(case["designs"])
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise OutputError(f"{printable(str(folder))}: cannot be made: {why[:1].lower() + why[1:]}") from None
+        for name, text in device_files(result):
+            write_text(folder / name, text)
+        return {"designs_folder": folder}
+
+    def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
+        from zwidth.show.figures.caption import facts_of_study
+
+        assert isinstance(case.question, StudyQuestion)
+        return facts_of_study(case.question.study)
+
+    def draw(self, case: CommandLine, result: Optimisation) -> Figure:
+        from zwidth.show.figures.optimise import front_figure
+
+        return front_figure(result, *self.size)
+
+
+def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
+    """Headings, and a row for the device as it is and for each design of the front."""
+    from zwidth.show.report.optimisation_text import short_names
+    from zwidth.study.designs.sweep_data import axis_value_text
+    from zwidth.study.optimise.optimise import own_values
+
+    problem = found.problem
+    headings = ["", *short_names([axis.key for axis in problem.variables])]
+    headings += [f"{one.name} [{one.unit}]" if one.unit else one.name for one in problem.columns]
+    rows = []
+    if found.baseline is not None:
+        own = [axis_value_text(value) for value in own_values(problem)]
+        rows.append(["as it is", *own, *(typed(number(value)) for value in found.baseline.values[0].tolist())])
+    word = "best" if len(problem.objectives) == 1 else "knee"
+    for place in range(len(found.front)):
+        design = found.design(place)
+        settings = [axis_value_text(design[axis.key]) for axis in problem.variables]
+        values = [typed(number(value)) for value in found.values[place].tolist()]
+        rows.append([f"{place + 1} {word}" if place == found.knee else str(place + 1), *settings, *values])
+    return headings, rows

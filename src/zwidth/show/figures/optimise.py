@@ -1,0 +1,110 @@
+"""The front of an optimisation: what cannot be had together; or how the best value was approached."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+
+from zwidth.show.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    VERMILION,
+    context,
+    draw_empty,
+    figure,
+    label,
+    legend_above,
+)
+from zwidth.study.designs.column import Column
+from zwidth.study.optimise.front import undominated
+from zwidth.study.optimise.optimisation import Optimisation
+
+MOST_PANELS: Final = 3  # pairs of objectives that are drawn
+MOST_POINTS: Final = 4000  # designs that are drawn of those tried; a vector file holds each of them
+BEYOND: Final = 0.6  # of the front's size: how far designs that it dominates are drawn
+
+
+def front_figure(found: Optimisation, width: float = 5.6, height: float = 3.9) -> Figure:
+    """A figure of the front, with a panel for each pair of the first objectives."""
+    pairs = list(combinations(range(len(found.problem.objectives)), 2))[:MOST_PANELS]
+    if len(pairs) < 2:
+        made, ax = figure(width, height)
+        with context():
+            draw_optimisation(ax, found)
+        return made
+    made, first = figure(width, 0.9 * height * len(pairs))
+    with context():
+        first.remove()
+        panels = made.subplots(len(pairs), 1)
+        for n, (ax, (i, j)) in enumerate(zip(panels, pairs, strict=True)):
+            _draw_pair(ax, found, i, j, legend=n == 0)
+    return made
+
+
+def draw_optimisation(ax: Axes, found: Optimisation) -> None:
+    """The front of the first two objectives; of a single one, the best value by the number of designs tried."""
+    if not len(found.front):
+        draw_empty(ax, "no design keeps the demands")
+    elif len(found.problem.objectives) == 1:
+        _draw_approach(ax, found)
+    else:
+        _draw_pair(ax, found, 0, 1, legend=True)
+
+
+def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -> None:
+    problem = found.problem
+    columns = [problem.objectives[n].column for n in (i, j)]
+    front, knee = found.values[:, columns], found.knee
+    tried = found.judgement.values[~found.judgement.violations(problem).any(axis=1)][:, columns]
+    low, high = front.min(axis=0), front.max(axis=0)
+    room = BEYOND * np.where(high > low, high - low, np.abs(high) + 1e-300)
+    inside = ((tried >= low - room) & (tried <= high + room)).all(axis=1)
+    shown = tried[inside][:MOST_POINTS]
+    ax.plot(*shown.T, ".", color=GREY, markersize=2.0, alpha=0.6, label="tried, keeps the demands", zorder=1)
+    signs = problem.signs[[i, j]]
+    best = undominated(front * signs)
+    line = best[np.argsort(front[best, 0])]
+    ax.plot(*front[line].T, "-", color=BLUE, linewidth=1.2, zorder=2)
+    ax.plot(*front.T, "o", color=BLUE, markersize=4.0, label="front", zorder=3)
+    if knee is not None:
+        ax.plot(*front[knee], "D", color=VERMILION, markersize=7.0, label="knee", zorder=4)
+    if found.baseline is not None and not np.isnan(own := found.baseline.values[0, columns]).any():
+        near = ((own >= low - 4.0 * room) & (own <= high + 4.0 * room)).all()
+        if near:
+            ax.plot(*own, "s", color=GREEN, markersize=6.0, label="the device as it is", zorder=4)
+    for axis, column in zip((ax.xaxis, ax.yaxis), columns, strict=True):
+        _name(axis, problem.columns[column])
+    if legend:
+        legend_above(ax, 4)
+
+
+def _draw_approach(ax: Axes, found: Optimisation) -> None:
+    problem = found.problem
+    (objective,) = problem.objectives
+    costs = found.judgement.costs(problem)[:, 0]
+    kept = ~found.judgement.violations(problem).any(axis=1)
+    best = np.minimum.accumulate(np.where(kept, costs, np.inf)) * objective.sign
+    known = np.isfinite(best)
+    tried = np.arange(1, len(best) + 1)
+    ax.step(tried[known], best[known], where="post", color=BLUE, label="best so far")
+    if found.polished:
+        ax.axvline(found.searched, color=GREY, linestyle=":", linewidth=1.0, label="polish begins")
+    if found.baseline is not None and np.isfinite(own := found.baseline.values[0, objective.column]):
+        ax.axhline(own, color=GREEN, linestyle=(0, (5, 1.5)), label="the device as it is")
+    ax.set_xlabel("Designs tried")
+    _name(ax.yaxis, problem.columns[objective.column])
+    legend_above(ax, 3)
+
+
+def _name(axis: Axis, one: Column) -> None:
+    """Name an axis by a column, in its unit if it has one."""
+    if one.unit:
+        label(axis, one.title, one.unit)
+    else:
+        axis.set_label_text(one.title)

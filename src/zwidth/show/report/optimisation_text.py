@@ -1,0 +1,119 @@
+"""What an optimisation found, in sentences."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from zwidth.device.faults import comma_list, plural
+from zwidth.show.units import percent, quantity
+from zwidth.study.optimise.evaluation import margins
+from zwidth.study.optimise.optimisation import Optimisation
+
+SMALL: Final = 5e-4  # share of a value that is said to be no change
+
+
+def sentences(found: Optimisation) -> list[str]:
+    """Sentences on the front: how it was found, what the chosen design gains, what holds designs back, and what a
+    finer grid and simulation say. One alone where no design keeps the demands."""
+    tried = plural(len(found.shares), "design")
+    if not len(found.front):
+        return [f"{tried} tried: {found.reason}"]
+    said = [_how_found(found, tried), _gain(found), *_held_back(found), *_finer(found), *_contacts(found)]
+    return [sentence for sentence in said if sentence]
+
+
+def _how_found(found: Optimisation, tried: str) -> str:
+    if len(found.problem.objectives) == 1:
+        return f"the best of {tried} tried"
+    return f"{plural(len(found.front), 'design')} of the front, of {tried} tried"
+
+
+def _gain(found: Optimisation) -> str:
+    """The chosen design beside the device as it is."""
+    problem, knee = found.problem, found.knee
+    assert knee is not None
+    chosen = "the best design" if len(problem.objectives) == 1 else "the knee"
+    parts = []
+    for objective in problem.objectives:
+        one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
+        part = f"{one.name} {quantity(value, one.unit)}"
+        if found.baseline is not None and np.isfinite(own := float(found.baseline.values[0, objective.column])):
+            part += f" instead of {quantity(own, one.unit)}"
+        parts.append(part)
+    return f"{chosen} has {comma_list(parts)}"
+
+
+def _held_back(found: Optimisation) -> list[str]:
+    """What holds designs of the front back: variables at their bounds, demands kept exactly."""
+    counts = Counter(text for place in range(len(found.front)) for text in found.active(place))
+    if not counts:
+        return ["no variable is at a bound, and no demand is kept with nothing to spare"]
+    many = len(found.front)
+    return [
+        f"{text} in {'all designs' if count == many else plural(count, 'design')} of the front"
+        if many > 1
+        else text
+        for text, count in counts.most_common()
+    ]
+
+
+def _finer(found: Optimisation) -> list[str]:
+    """What the worst values become on a finer grid."""
+    if found.finer is None:
+        return []
+    problem, said = found.problem, []
+    for n, one in enumerate(problem.columns):
+        fine, coarse = found.finer.values[:, n], found.values[:, n]
+        if np.isnan(fine).any():
+            lost = plural(int(np.isnan(fine).sum()), "design")
+            said.append(f"on a grid twice as fine {one.name} has no value in {lost}")
+            continue
+        change = float(np.max(np.abs(fine - coarse) / np.maximum(np.abs(coarse), 1e-300)))
+        if change > SMALL:
+            said.append(f"on a grid twice as fine {one.name} changes by at most {percent(change)}")
+    for demand in problem.demands:
+        with np.errstate(invalid="ignore"):
+            kept = margins(found.finer.values[:, demand.column], demand.bound, demand.at_least) >= 0.0
+        if not kept.all():
+            said.append(f"on a grid twice as fine {plural(int((~kept).sum()), 'design')} breaks {demand.text}")
+    return said or ["a grid twice as fine gives the same values"]
+
+
+def _contacts(found: Optimisation) -> list[str]:
+    """What nonlinear simulation says of the walls."""
+    done = [one for one in found.contacts if not one.reason]
+    said = []
+    if done:
+        stable = sum(one.stable is True for one in done)
+        share = (
+            "the wanted wall"
+            if found.study.wall.stiffness is not None
+            else "a wall of 90 % of the largest stiffness"
+        )
+        said.append(
+            f"{share}, simulated with friction, encoder steps and limits where the design is worst, is stable in "
+            f"{stable} of {plural(len(done), 'design')}"
+        )
+    missed = [one for one in found.contacts if one.reason]
+    if missed:
+        said.append(f"{plural(len(missed), 'design')} could not be simulated: {missed[0].reason}")
+    return said
+
+
+def short_names(paths: Sequence[str]) -> list[str]:
+    """The shortest end of each path that begins with a name and tells it from the others.
+
+    >>> short_names(["links.a.length_m", "links.b.length_m", "loop.delay_s", "plant.mass_kg.0.1"])
+    ['a.length_m', 'b.length_m', 'delay_s', 'mass_kg.0.1']
+    """
+    names = []
+    for path in paths:
+        steps = path.split(".")
+        ends = (".".join(steps[-n:]) for n in range(1, len(steps) + 1) if not steps[-n].isdigit())
+        others = [other for other in paths if other != path]
+        names.append(next((end for end in ends if not any(f".{one}".endswith(f".{end}") for one in others)), path))
+    return names

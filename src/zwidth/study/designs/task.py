@@ -1,0 +1,207 @@
+"""The task that a device is designed for: where it must reach, along which directions it renders, who holds it,
+and what is demanded of it everywhere there.
+
+Without a task the best device is a vanishing one: short, light, stiff, and of no use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device.device import Device
+from zwidth.device.faults import DeviceError
+from zwidth.device.toml_access import is_number, table
+from zwidth.measures.definition import MeasureError
+from zwidth.model.posture import PostureError, handle_motions
+from zwidth.study.workspace.extreme_direction import sphere
+
+Floats = NDArray[np.float64]
+Fault = tuple[tuple[str | int, ...], str]
+
+# Key of [task] -> the measure that it bounds, and whether it is a lower bound.
+DEMANDS: Final[dict[str, tuple[str, bool]]] = {
+    "peak_force_N": ("peak_force", True),
+    "continuous_force_N": ("continuous_force", True),
+    "friction_N": ("friction_force", False),
+    "apparent_mass_kg": ("rigid_mass", False),
+    "resolution_m": ("position_resolution", False),
+}
+SHAPES: Final = ("box_m", "radius_m", "points_m")
+PER_AXIS: Final = 5  # points of a box along each axis
+RINGS: Final = 3  # of a disk, or shells of a ball
+DIRECTIONS: Final = 4
+MOST: Final = 100_000  # points of a shape times directions
+
+
+@dataclass(frozen=True)
+class Task:
+    """Where, along which directions and with whom a device is used.
+
+    positions   (n, 3)  of the handle [m]; None: the device's reference, or a plant
+    directions  (d, 3)  unit vectors along which walls are rendered; None: the device's own
+    operators   names of who holds it; (): as the device file says
+    demands     key of [task] -> bound, for each demand
+    """
+
+    positions: Floats | None
+    directions: Floats | None
+    operators: tuple[str, ...]
+    demands: Mapping[str, float]
+
+    @property
+    def grid(self) -> Floats | None:
+        """Positions (n, 1, 3), the second axis for directions; None where there are none."""
+        return None if self.positions is None else self.positions[:, None, :]
+
+
+def task_of(document: Mapping[str, Any], device: Device, faults: list[Fault], *, finer: int = 1) -> Task | None:
+    """The task that a study's [task] describes; None where anything is wrong with it, which is added to `faults`.
+
+    document  of the study; values of the wrong type are left to its schema
+    finer     so many times as many steps between the points of the shape, and directions; the coarser are among
+              them
+    """
+    given = table(dict(document), "task")
+    found: list[Fault] = list(_shape_faults(given, device))
+    positions = None if found else _positions(given, document, device, found, finer)
+    directions = None if found else _directions(given, document, device, found, finer)
+    many = (1 if positions is None else len(positions)) * (1 if directions is None else len(directions))
+    if many > MOST:
+        found.append((("count",), f"makes {many} points and directions, {MOST} are allowed; lower it"))
+    faults += [(("task", *path), message) for path, message in found]
+    if found:
+        return None
+    operators = given.get("operators", ())
+    demands = {key: float(given[key]) for key in DEMANDS if is_number(given.get(key))}
+    return Task(positions, directions, tuple(operators), demands)
+
+
+def _shape_faults(given: Mapping[str, Any], device: Device) -> Iterator[Fault]:
+    shapes = [key for key in SHAPES if key in given]
+    if len(shapes) > 1:
+        yield ((shapes[1],), f"and {shapes[0]} exclude each other; remove one of them")
+    if shapes and device.mechanism is None:
+        yield ((shapes[0],), "needs the workspace of a [mechanism]; this device gives its [plant] only; remove it")
+    if ("radius_m" in given) != ("center_m" in given):
+        key, other = ("radius_m", "center_m") if "radius_m" in given else ("center_m", "radius_m")
+        yield ((key,), f"goes with {other}; give both")
+    if "count" in given and not {"box_m", "radius_m"} & given.keys():
+        yield (("count",), "is read with box_m or radius_m only; remove it")
+    if isinstance(given.get("count"), list) and "radius_m" in given:
+        yield (("count",), "must be one number with radius_m: rings round the centre, or shells")
+    if "directions" in given and device.mechanism is None:
+        yield (("directions",), "needs a [mechanism]; this device's [plant] renders one direction; remove it")
+    box = given.get("box_m")
+    for n, span in enumerate(box if isinstance(box, list) else []):
+        if isinstance(span, list) and len(span) == 2 and all(map(is_number, span)) and not span[0] <= span[1]:
+            yield (("box_m", n), f"must be [lower, upper] with lower <= upper, got {span}")
+
+
+def _positions(
+    given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
+) -> Floats | None:
+    """Positions (n, 3) of the shape's points; None without a mechanism."""
+    if device.mechanism is None:
+        return None
+    count = given.get("count")
+    try:
+        if "points_m" in given:
+            return np.array([device.position(point) for point in given["points_m"]])
+        if "box_m" in given:
+            box = given["box_m"]
+            each = [count] * len(box) if not isinstance(count, list) else count
+            if len(each) != len(box):
+                faults.append((("count",), f"must be one number, or {len(box)} for the axes of box_m"))
+                return None
+            lines = [_line(span, PER_AXIS if n is None else n, finer) for span, n in zip(box, each, strict=True)]
+            corners = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(box))
+            return np.array([device.position(point) for point in corners.tolist()])
+        if "radius_m" in given:
+            rings = (RINGS if count is None else count) * finer
+            center, radius = device.position(given["center_m"]), float(given["radius_m"])
+            return center + radius * _round_points(rings, len(given["center_m"]) == 3)
+        point = device.at(document.get("at"), assembly=document.get("assembly"))
+    except DeviceError as error:
+        key = next((key for key in SHAPES if key in given), "")
+        faults.append(((key,) if key else (), error.faults[0].message))
+        return None
+    except (PostureError, MeasureError, ValueError) as error:
+        faults.append(((), f"the reference cannot be had: {error}; give the shape, such as box_m"))
+        return None
+    return np.asarray(point.posture.position, dtype=np.float64)[None] if point.posture is not None else None
+
+
+def _line(span: Sequence[float], count: int, finer: int) -> Floats:
+    """Coordinates along one axis of a box; a single one where it has no extent, or one point is wanted."""
+    low, high = map(float, span)
+    if low == high or count == 1:
+        return np.array([0.5 * (low + high)])
+    return np.linspace(low, high, (count - 1) * finer + 1)
+
+
+def _round_points(rings: int, solid: bool) -> Floats:
+    """Points (n, 3) of the unit disk, on rings round its centre with 6 points more on each, or of the unit ball,
+    on shells; the outermost lie on its rim. Twice as many rings hold the coarser ones."""
+    points = [np.zeros((1, 3))]
+    for k in range(1, rings + 1):
+        if solid:
+            points.append(k / rings * np.vstack([sphere(12 * k * k), np.eye(3), -np.eye(3)]))
+            continue
+        angle = 2.0 * np.pi * np.arange(6 * k) / (6 * k)
+        points.append(k / rings * np.stack([np.cos(angle), np.sin(angle), np.zeros(6 * k)], axis=-1))
+    return np.vstack(points)
+
+
+def _directions(
+    given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
+) -> Floats | None:
+    """Unit vectors (d, 3) along which walls are rendered; None: the device's own."""
+    wanted = given.get("directions")
+    if device.mechanism is None or wanted is None:
+        return None
+    if isinstance(wanted, list):
+        try:
+            return np.array([device.direction(one) for one in wanted])
+        except DeviceError as error:
+            faults.append((("directions",), error.faults[0].message))
+            return None
+    if device.renders_moments(document.get("direction")):
+        faults.append((("directions",), "are spread over ways, and this device renders moments; list them"))
+        return None
+    if "direction" in document:
+        faults.append((("directions",), "and the study's direction exclude each other; remove one of them"))
+        return None
+    try:
+        posture = device.at(document.get("at"), assembly=document.get("assembly")).posture
+    except (PostureError, DeviceError, ValueError) as error:
+        faults.append((("directions",), f"cannot be spread: {error}; list them"))
+        return None
+    assert posture is not None
+    motions = handle_motions(posture)
+    return _spread_directions(motions, device.direction(None), int(wanted) * finer)
+
+
+def _spread_directions(motions: Floats, first: Floats, count: int) -> Floats:
+    """Unit vectors (d, 3) spread over half a circle, or half a sphere: opposite directions have equal walls.
+
+    motions  (3, r)  orthonormal, the directions in which the handle can move
+    first    (3,)    from which they begin
+    """
+    along = motions @ (motions.T @ first)
+    if not np.linalg.norm(along) > 0.0:
+        along = motions[:, 0]
+    along = along / np.linalg.norm(along)
+    if motions.shape[1] == 1:
+        return along[None]
+    if motions.shape[1] == 2:
+        across = np.cross(np.cross(motions[:, 0], motions[:, 1]), along)
+        # the plane's two sides are alike: one of them, whatever the signs of its basis
+        across = across * np.sign(across[np.argmax(np.abs(across))])
+        angle = np.pi * np.arange(count) / count
+        return np.asarray(np.cos(angle)[:, None] * along + np.sin(angle)[:, None] * across)
+    return sphere(2 * count)[:count]

@@ -1,0 +1,194 @@
+"""Designs judged: every column at every point of the task and in all circumstances, reduced to a number each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.measures.definition import NO_VALUE, OK, Note
+from zwidth.measures.overall import global_conditioning_index, overall
+from zwidth.study.designs.column import Column
+from zwidth.study.designs.sampling import Axis, Sampling
+from zwidth.study.designs.sweep_job import SweepJob, sweep_job
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
+from zwidth.study.optimise.problem import Problem
+
+Floats = NDArray[np.float64]
+MOST_VIOLATED: Final = 10.0  # a demand is violated by more only where there is no value
+
+
+@dataclass(frozen=True)
+class EvaluationJob:
+    """Designs as cells: the values of all columns, at each point and in each circumstance.
+
+    sweep    of all designs, each as often as there are members, one after another
+    members  circumstances in which each design is judged
+    """
+
+    sweep: SweepJob
+    members: int
+
+    @property
+    def count(self) -> int:
+        """Number of designs."""
+        return self.sweep.count // self.members
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Columns at each member's points."""
+        own = self.sweep.measures
+        return (
+            own if self.members == 1 else tuple(f"{name}, member {n}" for n in range(self.members) for name in own)
+        )
+
+    @property
+    def question(self) -> str:
+        """Fingerprint that stored results are recognised by."""
+        return fingerprint("evaluation", self.sweep.question, self.members)
+
+    def compute(self, first: int, last: int) -> CellValues:
+        """Designs first to last - 1."""
+        found = self.sweep.compute(first * self.members, last * self.members)
+        if self.members == 1:
+            return found
+        shape = last - first, -1
+        notes = tuple(
+            tuple(replace(note, first=(note.first[0] // self.members,)) for note in each) for each in found.notes
+        )
+        return CellValues(found.values.reshape(shape), found.status.reshape(shape), notes * self.members)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What k designs are worth.
+
+    values     (k, c)  of each column; nan where there is none
+    status     (k, c)  as in `measures.definition`
+    absent     (k, c)  share of the points at which the column has no value
+    cells      (k, c, w)  the column's values at all points, member by member
+    """
+
+    values: Floats
+    status: NDArray[np.uint8]
+    absent: Floats
+    cells: Floats
+
+    def __getitem__(self, index: Any) -> Judgement:
+        return Judgement(self.values[index], self.status[index], self.absent[index], self.cells[index])
+
+    def costs(self, problem: Problem) -> Floats:
+        """Each objective (k, m) with the sign that makes less better; nan where it has no value."""
+        return np.stack([self.values[:, one.column] * one.sign for one in problem.objectives], axis=1)
+
+    def violations(self, problem: Problem) -> Floats:
+        """By how much each demand (k, d) is violated, as a share of its bound, and last whether an objective has
+        no value; 0 where it is kept. What has no value counts more than any violation, and the more points are
+        without the more it counts."""
+        violated = np.zeros((len(self.values), len(problem.demands) + 1))
+        for n, demand in enumerate(problem.demands):
+            margin = margins(self.values[:, demand.column], demand.bound, demand.at_least)
+            short = np.clip(-margin, 0.0, MOST_VIOLATED)
+            violated[:, n] = np.where(np.isnan(margin), self._without(demand.column), short)
+        for objective in problem.objectives:
+            missing = np.isnan(self.values[:, objective.column])
+            without = np.where(missing, self._without(objective.column), 0.0)
+            violated[:, -1] = np.maximum(violated[:, -1], without)
+        return violated
+
+    def _without(self, column: int) -> Floats:
+        return np.asarray(MOST_VIOLATED * (1.0 + self.absent[:, column]))
+
+
+def margins(values: Floats, bound: float, at_least: bool) -> Floats:
+    """Margin by which values keep a bound, as a share of its size (of 1 for a bound of 0); negative where not.
+
+    >>> margins(np.array([0.25, 0.5]), 0.4, at_least=False).tolist()
+    [0.37500000000000006, -0.24999999999999994]
+    """
+    beyond = (values - bound) / (abs(bound) or 1.0)
+    return beyond if at_least else -beyond
+
+
+class Judge:
+    """Turns designs into jobs, and their cells into judgements.
+
+    problem   what is optimised
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        study = replace(problem.study, columns=problem.columns)
+        # checks on the way that the measures exist for this device
+        self._sweep = replace(sweep_job(_small(study)), cells=True)
+
+    def job(self, designs: Sequence[tuple[Any, ...]]) -> EvaluationJob:
+        """The job that computes designs, each by the values of its variables."""
+        members = self.problem.members
+        axes = []
+        for n, variable in enumerate(self.problem.variables):
+            for key, values in variable.columns([design[n] for design in designs]):
+                axes.append(Axis(key, tuple(value for value in values for _ in members)))
+        for key in members[0]:
+            axes.append(Axis(key, tuple(member[key] for _ in designs for member in members)))
+        return EvaluationJob(replace(self._sweep, sampling=Sampling(tuple(axes), paired=True)), len(members))
+
+    def judge(self, found: CellValues) -> Judgement:
+        """The columns of k designs from the cells of their job."""
+        k, columns, members = len(found.values), len(self.problem.columns), len(self.problem.members)
+        shape = (k, members, columns, -1)
+        cells = np.moveaxis(found.values.reshape(shape), 1, 2)
+        status = np.moveaxis(found.status.reshape(shape), 1, 2)
+        values, kinds = np.full((k, columns), np.nan), np.zeros((k, columns), dtype=np.uint8)
+        for c, column in enumerate(self.problem.columns):
+            for i in range(k):
+                values[i, c], kinds[i, c] = self._reduce(column, cells[i, c], status[i, c])
+        absent = (status != OK).mean(axis=(2, 3))
+        return Judgement(values, kinds, absent, cells.reshape(k, columns, -1))
+
+    def reasons(self, found: CellValues) -> dict[str, tuple[Note, ...]]:
+        """Column -> why designs have no value there."""
+        columns, members = len(self.problem.columns), len(self.problem.members)
+        width = found.values.shape[1] // (columns * members)
+        return {one.name: found.notes[n * width] for n, one in enumerate(self.problem.columns)}
+
+    @cached_property
+    def _weights(self) -> Floats | None:
+        return None if self._sweep.weights is None else self._sweep.weights.ravel()
+
+    def _reduce(self, column: Column, cells: Floats, status: NDArray[np.uint8]) -> tuple[float, int]:
+        """Value and status of a column from its values (members, w) at all points."""
+        if column.statistic is None:
+            cells, status = cells[:, :1], status[:, :1]
+        wrong = status != OK
+        if wrong.any() and (self._sweep.complete or column.statistic is None):
+            kinds, counts = np.unique(status[wrong], return_counts=True)
+            return float("nan"), int(kinds[np.argmax(counts)])
+        better = column.measure.better
+        if column.statistic is None:
+            return float(cells.max() if better == "lower" else cells.min()), OK
+        weights = None if self._weights is None else np.broadcast_to(self._weights, cells.shape)
+        if column.statistic == "conditioning_index":
+            value = global_conditioning_index(cells, status, weights)
+        else:
+            value = float(getattr(overall(cells, status, weights, better), column.statistic))
+        return value, NO_VALUE if np.isnan(value) else OK
+
+
+def _small(study: Any) -> Any:
+    """The study with the designs at the ends and in the middle of its bounds, for checks."""
+    from zwidth.study.optimise.variables import values_at
+
+    axes = study.sampling.axes
+    corners = values_at(axes, np.array([0.0, 0.5, 1.0])[:, None] * np.ones(len(axes)))
+    listed = tuple(
+        replace(axis, values=tuple(row[n] for row in corners), parts=())
+        for n, axis in enumerate(axes)
+        if not axis.parts
+    )
+    return replace(study, sampling=Sampling(listed, paired=True)) if listed else study

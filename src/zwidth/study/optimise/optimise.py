@@ -1,0 +1,235 @@
+"""Find the best designs of a study: search, polish, and what the front is worth.
+
+found = optimise("study.toml")
+found.values, found.knee
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.device import address
+from zwidth.measures.definition import Note
+from zwidth.progress import Progress
+from zwidth.study.designs.study import Study
+from zwidth.study.designs.study_file import read_study
+from zwidth.study.jobs.executor import merge_notes, run
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.store import Store
+from zwidth.study.jobs.workers import cores
+from zwidth.study.optimise.evaluation import EvaluationJob, Judge, Judgement
+from zwidth.study.optimise.front import ranges, spread_out, undominated
+from zwidth.study.optimise.optimisation import Optimisation
+from zwidth.study.optimise.polish import polish
+from zwidth.study.optimise.problem import Problem, problem_of
+from zwidth.study.optimise.recheck import Contact, finer_problem, simulate_contact
+from zwidth.study.optimise.search import generations
+from zwidth.study.optimise.variables import share_of, values_at
+
+Floats = NDArray[np.float64]
+
+POLISHED: Final = 0.25  # share of the budget that the polish may take
+HOPELESS: Final = 5  # generations without a value at any point of any design, after which the search ends
+
+
+def optimise(
+    study: Study | str | os.PathLike[str],
+    store: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> Optimisation:
+    """Find the designs of a study that are best in its objectives and keep its demands.
+
+    study     a study file, or a `Study` read with bounds
+    store     a folder that keeps what is done, so that the same call goes on from there after it was stopped
+    progress  is called with the stage, the number of designs done, and of all designs
+    workers   processes at most; left out: one for each core
+    Returns   the front, the baseline and how they were found; equal for equal studies, however it was divided
+    Raises    DeviceError   with all faults of the study
+              MeasureError  for measures that do not exist for this device
+              what `executor.run` and `Store` raise
+    """
+    read = study if isinstance(study, Study) else read_study(study, bounds=True)
+    problem = problem_of(read)
+    archive = _Archive(problem, None if store is None else Path(store), progress, workers)
+    baseline = archive.baseline()
+    start = _start(problem)
+    searching, spent = problem.budget - int(POLISHED * problem.budget), 0
+    for number, (shares, tell) in enumerate(generations(problem, searching, start), 1):
+        judged = archive.judge(shares, "searching", problem.budget)
+        spent += len(shares)
+        tell(judged.costs(problem), judged.violations(problem).sum(axis=1))
+        if number == HOPELESS and archive.hopeless:
+            break
+    searched = spent
+    best = archive.front()
+    if len(best):
+        costs = archive.judgement.costs(problem)[best]
+        chosen = best[spread_out(costs, problem.front)]
+        weights = ranges(costs)[1] if len(best) > 1 else np.maximum(np.abs(costs[0]), 1e-300)
+        spent += polish(
+            problem,
+            archive.shares[chosen],
+            archive.judgement[chosen],
+            weights,
+            lambda shares: archive.judge(shares, "polishing", problem.budget),
+            problem.budget - spent,
+        )
+        best = archive.front()
+        costs = archive.judgement.costs(problem)[best]
+        best = best[spread_out(costs, problem.front)]
+    return archive.result(best, baseline, searched, spent - searched)
+
+
+class _Archive:
+    """All designs judged, in their order.
+
+    shares     (n, v)
+    judgement  of them
+    """
+
+    def __init__(
+        self, problem: Problem, folder: Path | None, progress: Progress | None, workers: int | None
+    ) -> None:
+        self.problem, self.folder, self.progress, self.workers = problem, folder, progress, workers
+        self.judging = Judge(problem)
+        self._shares: list[Floats] = []
+        self._judged: list[Judgement] = []
+        self._places: dict[bytes, int] = {}  # of a design's shares
+        self._jobs = 0
+        self.notes: dict[str, list[Note]] = {column.name: [] for column in problem.columns}
+
+    @property
+    def count(self) -> int:
+        """Number of designs."""
+        return sum(map(len, self._shares))
+
+    @property
+    def shares(self) -> Floats:
+        """Of all designs (n, v)."""
+        return np.concatenate(self._shares)
+
+    @property
+    def judgement(self) -> Judgement:
+        """Of all designs."""
+        each = self._judged
+        return Judgement(
+            *(
+                np.concatenate([getattr(one, name) for one in each])
+                for name in ("values", "status", "absent", "cells")
+            )
+        )
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether some objective has no value at any point of any design."""
+        absent = self.judgement.absent[:, [one.column for one in self.problem.objectives]]
+        return bool((absent == 1.0).all(axis=0).any())
+
+    def judge(self, shares: Floats, stage: str, of: int) -> Judgement:
+        """Judge designs and keep those that are new."""
+        places, new = [], list[int]()
+        for n, row in enumerate(shares):
+            if (key := row.tobytes()) not in self._places:
+                self._places[key] = len(self._places)
+                new.append(n)
+            places.append(self._places[key])
+        if new:
+            found = self._run(values_at(self.problem.variables, shares[new]), stage, self.count, of)
+            for name, notes in self.judging.reasons(found).items():
+                self.notes[name] += notes
+            self._shares.append(shares[new])
+            self._judged.append(self.judging.judge(found))
+        return self.judgement[places]
+
+    def _run(self, designs: list[tuple[Any, ...]], stage: str, done: int, of: int) -> CellValues:
+        return self._compute(self.judging.job(designs), stage, done, of)
+
+    def _compute(self, job: EvaluationJob, stage: str, done: int, of: int) -> CellValues:
+        self._jobs += 1
+        store = None if self.folder is None else Store(self.folder / f"{self._jobs:05d}", job)
+
+        def told(_: str, now: int, __: int) -> None:
+            if self.progress is not None:
+                self.progress(stage, min(done + now, of), of)
+
+        batch = -(-job.count // (2 * (self.workers or cores())))
+        return run(job, store, told, self.workers, batch=batch)
+
+    def baseline(self) -> Judgement | None:
+        """The device as it is; None where it has not all of the numbers that vary."""
+        own = own_values(self.problem)
+        if any(value is None for value in own):
+            return None
+        return self.judging.judge(self._run([tuple(own)], "judging the device as it is", 0, 1))
+
+    def front(self) -> NDArray[np.int64]:
+        """Designs that keep all demands and that no other dominates."""
+        if not self._shares:
+            return np.zeros(0, dtype=np.int64)
+        judgement = self.judgement
+        costs = judgement.costs(self.problem)
+        costs[judgement.violations(self.problem).any(axis=1)] = np.nan
+        return undominated(costs)
+
+    def result(
+        self, best: NDArray[np.int64], baseline: Judgement | None, searched: int, polished: int
+    ) -> Optimisation:
+        """The front's designs and how they were found."""
+        judgement = self.judgement
+        notes = {name: merge_notes(each) for name, each in self.notes.items()}
+        found = Optimisation(self.problem, self.shares, judgement, best, baseline, searched, polished, notes)
+        return replace(found, finer=self._finer(best), contacts=self._contacts(found))
+
+    def _finer(self, best: NDArray[np.int64]) -> Judgement | None:
+        """The front on a finer grid of the task."""
+        problem = finer_problem(self.problem)
+        if problem is None or not len(best):
+            return None
+        judging, designs = Judge(problem), values_at(problem.variables, self.shares[best])
+        return judging.judge(
+            self._compute(judging.job(designs), "judging the front on a finer grid", 0, len(best))
+        )
+
+    def _contacts(self, found: Optimisation) -> tuple[Contact, ...]:
+        """A wall of each design of the front, simulated."""
+        contacts = []
+        for place in range(len(found.front)):
+            if self.progress is not None:
+                self.progress("simulating walls of the front", place, len(found.front))
+            cells = found.judgement.cells[found.front[place]]
+            contacts.append(simulate_contact(self.problem, found.settings(place), cells))
+        return tuple(contacts)
+
+
+def own_values(problem: Problem) -> list[Any]:
+    """The variables' values in the device file; None for one that it does not have, and for a catalogue."""
+    document = problem.study.device.document
+    return [
+        address.get(document, axis.key) if not axis.parts and _has(document, axis.key) else None
+        for axis in problem.variables
+    ]
+
+
+def _has(document: dict[str, Any], key: str) -> bool:
+    try:
+        return address.exists(document, key)
+    except Exception:
+        return False
+
+
+def _start(problem: Problem) -> Floats:
+    """The device as it is, as shares (1, v), if it lies within the bounds; else none (0, v)."""
+    own = own_values(problem)
+    shares = [
+        None if value is None else share_of(axis, value)
+        for axis, value in zip(problem.variables, own, strict=True)
+    ]
+    inside = all(share is not None for share in shares)
+    return np.array([shares], dtype=np.float64) if inside else np.zeros((0, len(shares)))

@@ -1,0 +1,316 @@
+"""Optimisations of plants and mechanisms, against closed forms and against random designs."""
+
+import numpy as np
+import pytest
+
+from tests.study.study_cases import axis, study_document
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import load
+from zwidth.device.read import OPERATORS, bundled_names
+from zwidth.measures.definition import OK, OUT_OF_REACH
+from zwidth.study.designs.study_file import study_of
+from zwidth.study.jobs.executor import run
+from zwidth.study.optimise.evaluation import Judge
+from zwidth.study.optimise.optimise import optimise
+from zwidth.study.optimise.problem import problem_of
+from zwidth.study.optimise.variables import values_at
+
+TWO_MASS = "published-two-mass"
+LINKS = [
+    "links.upper-left.length_m",
+    *({"key": f"links.upper-{side}.mass_kg", "power": 1} for side in ("right", "left")),
+    *({"key": f"links.upper-{side}.inertia_kg_m2", "power": 3} for side in ("right", "left")),
+]
+LENGTH = axis("links.upper-right.length_m", range=[0.10, 0.20], tie=LINKS)
+RATIO = axis(
+    "drives.motor-right.transmission_ratio", range=[8.0, 30.0], tie=["drives.motor-left.transmission_ratio"]
+)
+TASK = {"box_m": [[-0.03, 0.03], [0.21, 0.27]], "count": 3, "directions": 2}
+
+
+def problem_study(*axes, objectives, task=None, **more):
+    limits = {key: more.pop(key) for key in ("budget", "seed", "constraints", "front") if key in more}
+    document = study_document(*axes, optimise={"objectives": objectives, **limits}, **more)
+    del document["measures"]
+    if task is not None:
+        document["task"] = task
+    return study_of(document, bounds=True)
+
+
+def judged(study, shares):
+    judge = Judge(problem_of(study))
+    return judge.judge(run(judge.job(values_at(study.sampling.axes, shares)), workers=1))
+
+
+@pytest.mark.parametrize(
+    ("wall", "mass", "radius"),
+    [
+        ((3000.0, 15.0), 0.0510576, 0.895606),
+        ((4000.0, 20.0), 0.0602998, 0.872978),
+        ((5000.0, 25.0), 0.0698500, 0.853952),
+    ],
+)
+def test_the_optimal_mass_of_the_thesis_is_found(wall, mass, radius):
+    # equations 5.14 and 5.15, points B, C and D of 5.3.2
+    found = optimise(
+        problem_study(
+            axis("plant.mass_kg.1.1", range=[0.01, 0.2]),
+            device=TWO_MASS,
+            model="motor-mass",
+            set=["plant.damping_Ns_per_m=unset"],
+            objectives={"spectral_radius": "min"},
+            stiffness_N_per_m=wall[0],
+            damping_Ns_per_m=wall[1],
+            budget=400,
+        ),
+        workers=1,
+    )
+    assert found.design(0)["plant.mass_kg.1.1"] == pytest.approx(mass, rel=2e-6)
+    assert found.values[0, 0] == pytest.approx(radius, rel=1e-6)
+    assert found.baseline.values[0, 0] > radius + 0.05
+
+
+def test_the_stiffest_wall_of_a_mass_and_a_period_lies_at_both_bounds():
+    # K_max = 4 (3 - 2 sqrt 2) m / T^2 of an undamped mass: as heavy and as fast as allowed
+    found = optimise(
+        problem_study(
+            axis("plant.mass_kg", range=[0.05, 0.3]),
+            axis("loop.sampling_period_s", range=[0.0005, 0.002], scale="log"),
+            device="hapkit-course",
+            set=["plant.damping_Ns_per_m=0.0", "operator=unset"],
+            objectives={"stiffness_max": "max"},
+            budget=200,
+        ),
+        workers=1,
+    )
+    assert found.design(0) == {"plant.mass_kg": 0.3, "loop.sampling_period_s": 0.0005}
+    assert found.values[0, 0] == pytest.approx(4.0 * (3.0 - 2.0 * np.sqrt(2.0)) * 0.3 / 0.0005**2, rel=1e-9)
+    assert found.active(0) == ["plant.mass_kg at its upper bound", "loop.sampling_period_s at its lower bound"]
+
+
+@pytest.fixture(scope="module")
+def front():
+    study = problem_study(
+        LENGTH,
+        RATIO,
+        objectives={"stiffness_max": "max", "isotropy": "min"},
+        constraints={"rigid_mass": "<= 0.36"},
+        task=TASK,
+        budget=400,
+        front=8,
+    )
+    return optimise(study, workers=1)
+
+
+def test_stiffness_and_dexterity_cannot_be_had_together(front):
+    # the thesis's finding (5.3), as a front: what is stiffer is less isotropic
+    stiffness, isotropy, mass = front.values.T
+    assert len(front.front) == 8
+    assert (np.diff(stiffness) < 0).all()
+    assert (np.diff(isotropy) < 0).all()
+    assert (mass <= 0.36).all()
+    assert stiffness.max() / stiffness.min() > 1.005
+    assert 0 <= front.knee < 8
+
+
+def test_a_front_s_values_are_those_of_single_devices_at_single_points(front):
+    for place in (0, front.knee):
+        device = load("five-bar").with_(front.settings(place))
+        points = [
+            device.at((x, y), u) for x in (-0.03, 0.0, 0.03) for y in (0.21, 0.24, 0.27) for u in ((0, 1), (1, 0))
+        ]
+        stiffness = min(float(point.measure("stiffness_max")) for point in points)
+        others = [max(float(point.measure(name)) for point in points) for name in ("isotropy", "rigid_mass")]
+        np.testing.assert_allclose(front.values[place], [stiffness, *others], rtol=1e-10)
+
+
+def test_random_designs_nearby_and_anywhere_do_not_dominate_the_front(front):
+    random = np.random.default_rng(11)
+    costs = front.judgement.costs(front.problem)[front.front]
+    for reach, many in ((0.01, 150), (0.1, 150), (1.0, 150)):
+        around = np.repeat(front.shares[front.front], -(-many // len(front.front)), axis=0)
+        tried = np.clip(around + reach * random.uniform(-1.0, 1.0, around.shape), 0.0, 1.0)
+        other = judged(front.study, tried)
+        kept = ~other.violations(front.problem).any(axis=1)
+        rivals = other.costs(front.problem)[kept]
+        better = (rivals[:, None] < costs - 1e-7 * np.abs(costs)).all(axis=-1)
+        assert not better.any(), reach
+
+
+def test_equal_studies_give_equal_bits_and_another_seed_nearly_the_same(front):
+    again = optimise(front.study, workers=1)
+    assert again.shares.tobytes() == front.shares.tobytes()
+    assert again.values.tobytes() == front.values.tobytes()
+    other = optimise(
+        problem_study(
+            LENGTH,
+            RATIO,
+            objectives={"stiffness_max": "max", "isotropy": "min"},
+            constraints={"rigid_mass": "<= 0.36"},
+            task=TASK,
+            budget=400,
+            front=8,
+            seed=2,
+        ),
+        workers=1,
+    )
+    assert other.shares.tobytes() != front.shares.tobytes()
+    reference = np.array([0.0, 3.0])
+    assert other.hypervolume(reference) == pytest.approx(front.hypervolume(reference), rel=2e-3)
+
+
+def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bits(front, tmp_path):
+    class Stop(Exception):
+        pass
+
+    def stop(stage, done, of):
+        if stage == "polishing" and done > 330:
+            raise Stop
+
+    with pytest.raises(Stop):
+        optimise(front.study, tmp_path / "store", stop, workers=1)
+    stages = []
+    resumed = optimise(
+        front.study, tmp_path / "store", lambda stage, done, of: stages.append((stage, done)), workers=1
+    )
+    assert resumed.shares.tobytes() == front.shares.tobytes()
+    assert resumed.judgement.cells.tobytes() == front.judgement.cells.tobytes()
+
+
+def test_a_design_is_judged_by_the_worst_of_all_operators():
+    task = {**TASK, "operators": ["none", bundled_names(OPERATORS)[0]]}
+    study = problem_study(RATIO, objectives={"stiffness_max": "max"}, task=task, budget=20)
+    shares = np.array([[0.2], [0.8]])
+    both = judged(study, shares)
+    alone = [
+        judged(
+            problem_study(
+                RATIO, objectives={"stiffness_max": "max"}, task={**task, "operators": [one]}, budget=20
+            ),
+            shares,
+        )
+        for one in task["operators"]
+    ]
+    assert (both.values == np.minimum(alone[0].values, alone[1].values)).all()
+    assert both.cells.shape[-1] == 2 * alone[0].cells.shape[-1]
+    assert (alone[0].values != alone[1].values).any()
+
+
+def test_a_catalogue_and_whole_numbers_are_chosen_from(tmp_path):
+    (tmp_path / "motors.csv").write_text("name,inertia\nlight,6e-7\nheavy,3e-6\nmiddle,1e-6\n")
+    document = {
+        "device": "five-bar",
+        "axis": [
+            {
+                "key": "motor",
+                "catalogue": "motors.csv",
+                "set": {f"drives.motor-{side}.motor_inertia_kg_m2": "inertia" for side in ("right", "left")},
+            },
+            axis("loop.delay_samples", range=[0, 3], integer=True),
+            axis("assembly", "elbows-in", "elbows-out"),
+        ],
+        "optimise": {"objectives": {"stiffness_max": "max"}, "budget": 60},
+    }
+    found = optimise(study_of(document, str(tmp_path / "my.toml"), bounds=True), workers=1)
+    best = found.design(0)
+    assert best["motor"] == "heavy"
+    assert best["drives.motor-left.motor_inertia_kg_m2"] == 3e-6
+    assert best["loop.delay_samples"] == 0
+    every = {tuple(row) for row in found.shares.tolist()}
+    assert len(every) == len(found.shares) <= 24
+    assert found.baseline is None
+
+
+def test_a_task_that_no_design_meets_says_which_demand_fails_first():
+    study = problem_study(
+        LENGTH,
+        objectives={"stiffness_max": "max"},
+        constraints={"rigid_mass": "<= 0.001", "isotropy": "<= 5"},
+        task=TASK,
+        budget=40,
+    )
+    found = optimise(study, workers=1)
+    assert not len(found.front)
+    assert found.knee is None
+    assert found.reason.startswith("no design keeps rigid_mass <= 0.001, the best of ")
+    records = {one.demand.key: one for one in found.demands}
+    assert records["rigid_mass"].kept == 0.0
+    assert records["isotropy"].kept > 0.9
+
+
+def test_demands_that_are_kept_apart_and_never_together():
+    study = problem_study(
+        LENGTH,
+        objectives={"stiffness_max": "max"},
+        constraints={"stiffness_max": ">= 3510", "isotropy": "<= 1.5"},
+        task=TASK,
+        budget=40,
+    )
+    found = optimise(study, workers=1)
+    assert found.reason.startswith("no design keeps all demands together: ")
+    assert "stiffness_max >= 3510 is kept by" in found.reason
+
+
+def test_an_objective_without_a_value_anywhere_ends_the_search_early():
+    far = {"box_m": [[1.0, 1.1], [1.0, 1.1]], "count": 2}
+    found = optimise(problem_study(LENGTH, objectives={"stiffness_max": "max"}, task=far, budget=400), workers=1)
+    assert found.reason.startswith("worst(stiffness_max) has no value in any design tried (")
+    assert "out of reach" in found.reason
+    assert len(found.shares) < 100
+    assert (found.judgement.status == OUT_OF_REACH).all()
+
+
+def test_faults_of_an_optimisation_have_their_lines():
+    def faults(**optimise_table):
+        document = study_document(LENGTH, optimise=optimise_table)
+        try:
+            problem_of(study_of(document, "my.toml", bounds=True))
+        except DeviceError as error:
+            return [str(fault) for fault in error.faults]
+        return []
+
+    good = {"objectives": {"stiffness_max": "max"}}
+    cases = [
+        ({}, ": has no objectives; add such as objectives = "),
+        (
+            {"objectives": {"stifness_max": "max"}},
+            ".objectives.stifness_max: no measure is named",
+        ),
+        ({"objectives": {"isotropy": "low"}}, ".objectives.isotropy: must be"),
+        (
+            {**good, "constraints": {"isotropy": "2"}},
+            '.constraints.isotropy: must be such as "<= 0.3"',
+        ),
+        (
+            {**good, "constraints": {"isotropy": "<= nan"}},
+            ".constraints.isotropy: must be such as",
+        ),
+        (
+            {"objectives": {"worst(isotropy)": "min"}},
+            ".objectives.worst(isotropy): worst(isotropy) needs",
+        ),
+        ({**good, "budget": 3}, ".budget: must be at least 20 designs, got 3"),
+        ({**good, "budgit": 3}, ".budgit: is not a key of [optimise]; did you mean 'budget'?"),
+    ]
+    for given, line in cases:
+        lines = faults(**given)
+        assert any(one.startswith(f"my.toml: optimise{line}") for one in lines), (lines, line)
+    assert not faults(**good)
+    upside_down = study_document(axis(LENGTH["key"], range=[0.2, 0.1]), optimise=good)
+    no_number = study_document(axis("links.upper-right.lenght_m", range=[0.1, 0.2]), optimise=good)
+    for document, line in ((upside_down, "range: must be [lower, upper]"), (no_number, "did you mean")):
+        with pytest.raises(DeviceError) as caught:
+            study_of(document, "my.toml", bounds=True)
+        assert line in str(caught.value)
+
+
+def test_the_finer_grid_and_the_simulation_are_of_the_front(front):
+    assert front.finer.values.shape == front.values.shape
+    # a finer grid holds the coarser one, so that what is worst can only become worse
+    assert (front.finer.values[:, 0] <= front.values[:, 0]).all()
+    assert (front.finer.values[:, 1:] >= front.values[:, 1:]).all()
+    assert len(front.contacts) == len(front.front)
+    for place, contact in enumerate(front.contacts):
+        assert contact.stiffness == pytest.approx(0.9 * front.values[place, 0], rel=1e-9)
+        assert contact.stable is True
+    assert (front.judgement.status[front.front] == OK).all()

@@ -1,0 +1,117 @@
+"""The points and directions of a task, and statistics over them."""
+
+import numpy as np
+import pytest
+
+from tests.study.study_cases import faults, study_document
+from zwidth.device.load import load
+from zwidth.measures.definition import OK, OUT_OF_REACH
+from zwidth.study.designs.study_file import study_of
+from zwidth.study.designs.sweep import run_study
+from zwidth.study.designs.task import task_of
+
+FIVE_BAR = load("five-bar")
+PERIOD = {"key": "loop.sampling_period_s", "values": [0.001, 0.002]}
+BOX = {"box_m": [[-0.03, 0.03], [0.22, 0.27]], "count": [2, 3], "directions": 3}
+
+
+def task(device=FIVE_BAR, finer=1, **given):
+    wrong = []
+    found = task_of({"task": given}, device, wrong, finer=finer)
+    assert not wrong
+    return found
+
+
+def test_a_column_over_a_task_is_the_statistic_of_single_points():
+    measures = ["worst(stiffness_max)", "average(stiffness_max)", "uniformity(stiffness_max)", "stiffness_max"]
+    swept = run_study(study_of(study_document(PERIOD, measures=measures, task=BOX)))
+    for row, period in zip(swept.cells.values, PERIOD["values"], strict=True):
+        device = FIVE_BAR.with_({"loop.sampling_period_s": period})
+        each = [
+            float(device.at((x, y), (np.sin(a), np.cos(a))).measure("stiffness_max"))
+            for x in (-0.03, 0.03)
+            for y in (0.22, 0.245, 0.27)
+            for a in np.pi * np.arange(3) / 3
+        ]
+        at_reference = float(device.at().measure("stiffness_max"))
+        expected = [min(each), np.mean(each), min(each) / max(each), at_reference]
+        np.testing.assert_allclose(row, expected, rtol=1e-11)
+
+
+def test_a_task_that_is_not_reached_everywhere_gives_no_value():
+    far = {"box_m": [[-0.03, 0.03], [0.22, 0.60]]}
+    measures = ["worst(isotropy)", "share(isotropy)"]
+    swept = run_study(study_of(study_document(PERIOD, measures=measures, task=far)))
+    assert (swept.cells.status == OUT_OF_REACH).all()
+    assert np.isnan(swept.cells.values).all()
+    near = {"box_m": BOX["box_m"]}
+    swept = run_study(study_of(study_document(PERIOD, measures=measures, task=near)))
+    assert (swept.cells.status == OK).all()
+
+
+@pytest.mark.parametrize("directions", [1, 2, 4, 5])
+def test_directions_go_evenly_round_half_a_circle(directions):
+    u = task(directions=directions).directions
+    assert u.shape == (directions, 3)
+    np.testing.assert_allclose(u[0], [0, 1, 0], atol=1e-15)
+    doubled = np.sort(np.angle((u[:, 0] + 1j * u[:, 1]) ** 2) % (2 * np.pi))
+    np.testing.assert_allclose(np.diff(doubled), 2 * np.pi / directions, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"box_m": BOX["box_m"], "count": [3, 4]},
+        {"center_m": [0.0, 0.25], "radius_m": 0.04, "count": 2},
+        {"box_m": [[0.0, 0.0], [0.2, 0.3]], "directions": 3},
+    ],
+)
+def test_a_finer_task_holds_the_points_and_directions_of_the_coarser(shape):
+    coarse, fine = task(**shape), task(finer=2, **shape)
+    for name in ("positions", "directions"):
+        some, more = getattr(coarse, name), getattr(fine, name)
+        if some is None:
+            continue
+        distance = np.linalg.norm(some[:, None] - more, axis=-1)
+        assert distance.min(axis=1).max() < 1e-12
+        assert len(more) > len(some)
+
+
+def test_a_disk_reaches_its_rim_evenly():
+    points = task(center_m=[0.01, 0.25], radius_m=0.05, count=3).positions
+    r = np.linalg.norm(points - [0.01, 0.25, 0.0], axis=1)
+    assert len(points) == 1 + 6 + 12 + 18
+    assert r.max() == pytest.approx(0.05)
+    assert np.isclose(r, 0.05).sum() == 18
+
+
+def test_a_ball_and_directions_in_space():
+    arm = load("phantom-premium-1.5")
+    found = task(arm, center_m=list(arm.at().posture.position), radius_m=0.01, count=1, directions=7)
+    np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1.0)
+    assert (found.directions[:, 2] > 0).all()
+    r = np.linalg.norm(found.positions - found.positions[0], axis=1)
+    np.testing.assert_allclose(r[1:], 0.01)
+    assert found.grid.shape == (19, 1, 3)
+
+
+def test_faults_of_a_task_have_their_lines():
+    measures = ["worst(isotropy)"]
+    cases = [
+        ({"box_m": [[0, 1], [0, 1]], "points_m": [[0, 0]]}, "task.points_m: and box_m exclude each other"),
+        ({"center_m": [0, 0]}, "task.center_m: goes with radius_m; give both"),
+        ({"count": 3}, "task.count: is read with box_m or radius_m only"),
+        ({"box_m": [[1, 0], [0, 1]]}, "task.box_m.0: must be [lower, upper] with lower <= upper, got [1, 0]"),
+        ({"box_m": [[0, 1], [0, 1]], "count": [1, 2, 3]}, "task.count: must be one number, or 2 for the axes"),
+        ({"box_m": [[0, 1], [0, 1]], "count": 400, "directions": 4}, "task.count: makes 640000 points"),
+        ({"directions": [[0, 0]]}, "task.directions"),
+        ({"bux_m": 1}, "task.bux_m: is not a key of [task]; did you mean 'box_m'?"),
+        ({"operators": ["none"]}, "task.operators: is for an optimiser"),
+    ]
+    for given, line in cases:
+        lines = faults(study_document(PERIOD, measures=measures, task=given))
+        assert any(one.startswith(line) for one in lines), (lines, line)
+    both = study_document(PERIOD, measures=measures, task={}, workspace={})
+    assert any(one.startswith("workspace: and [task] exclude each other") for one in faults(both))
+    unused = study_document(PERIOD, measures=["isotropy"], task={})
+    assert any("is used only by measures over it, such as worst(isotropy)" in one for one in faults(unused))
