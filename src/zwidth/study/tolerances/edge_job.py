@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from zwidth.study.jobs.journal import fingerprint
 
 Floats = NDArray[np.float64]
 
+MOST_KNOWN: Final = 4096  # devices whose outlines are kept in memory; each takes some 20 kB
 MOST_INTERVALS: Final = 4  # of stable stiffness on one line of one device; of more, the longest are kept
 
 
@@ -66,16 +67,35 @@ def stable_intervals(outlines: Sequence[Floats], dampings: Floats) -> Floats:
     return out
 
 
+class Outlines(NamedTuple):
+    """The outlines of a device's stable set.
+
+    walks   closed walks (k, 2) of walls [K, B]; None where it has no chart
+    status  OK, or why it has none
+    reason  in words
+    """
+
+    walks: Sequence[Floats] | None
+    status: int = OK
+    reason: str = ""
+
+
 @dataclass(frozen=True)
 class EdgeJob:
     """The devices of a sweep as cells, each with its intervals of stable stiffness on lines of equal damping.
 
     sweep     the devices; its measures are not computed
     dampings  (d,) ascending [N s/m]
+    known     device's number -> its outlines, of the first MOST_KNOWN devices that this process has charted; jobs
+              of other dampings may share it
     """
 
     sweep: SweepJob
     dampings: Floats
+    known: dict[int, Outlines] = field(default_factory=dict, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "known": {}}
 
     @property
     def count(self) -> int:
@@ -102,42 +122,53 @@ class EdgeJob:
         values = np.zeros((last - first, len(self.measures)))
         status = np.full(values.shape, OK, dtype=np.uint8)
         notes: list[Note] = []
-        for row, point in self.points(first, last):
-            found, why = _outlines(point) if isinstance(point, OperatingPoint) else (None, point)
+        for number, (found, kind, reason) in self.outlines(first, last):
+            row = number - first
             if found is None:
-                kind, reason = why
                 values[row], status[row] = np.nan, kind
-                notes.append(Note(kind, reason, 1, (first + row,)))
+                notes.append(Note(kind, reason, 1, (number,)))
             else:
                 values[row] = np.nan_to_num(stable_intervals(found, self.dampings), nan=0.0).ravel()
         return CellValues(values, status, (tuple(notes), *[()] * (len(self.measures) - 1)))
 
-    def points(self, first: int, last: int) -> Iterator[tuple[int, OperatingPoint | tuple[int, str]]]:
-        """Each device's number from `first` and its point; or status and reason, where it has none."""
-        known = np.zeros(last - first, dtype=bool)
+    def outlines(self, first: int, last: int) -> Iterator[tuple[int, Outlines]]:
+        """Number and outlines of each of the devices first to last - 1."""
+        numbers = range(first, last)
+        if all(number in self.known for number in numbers):
+            yield from ((number, self.known[number]) for number in numbers)
+            return
+        together = np.zeros(last - first, dtype=bool)
         for rows, points in self.sweep.points_together(first, last):
-            known[rows] = True
-            yield from ((row, points[place]) for place, row in enumerate(rows.tolist()))
-        for row in np.flatnonzero(~known).tolist():
-            yield row, self.sweep.point_alone(first + row)
+            together[rows] = True
+            for place, row in enumerate(rows.tolist()):
+                yield first + row, self._remembered(first + row, _outlines(points[place]))
+        for row in np.flatnonzero(~together).tolist():
+            point = self.sweep.point_alone(first + row)
+            found = _outlines(point) if isinstance(point, OperatingPoint) else Outlines(None, *point)
+            yield first + row, self._remembered(first + row, found)
+
+    def _remembered(self, number: int, found: Outlines) -> Outlines:
+        if len(self.known) < MOST_KNOWN:
+            self.known[number] = found
+        return found
 
 
-def _outlines(point: OperatingPoint) -> tuple[Sequence[Floats] | None, tuple[int, str]]:
-    """The outlines of a device's stable set; or None with status and reason."""
+def _outlines(point: OperatingPoint) -> Outlines:
+    """The outlines of a device's stable set."""
     try:
         if point.charted_by_response:
-            return chart_at(point, decay=False).regions, (OK, "")
-        return trace_edge(Tracer(point.loop)).outlines, (OK, "")
+            return Outlines(chart_at(point, decay=False).regions)
+        return Outlines(trace_edge(Tracer(point.loop)).outlines)
     except ChartError as error:
-        return None, (UNDECIDED, str(error))
+        return Outlines(None, UNDECIDED, str(error))
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-        return None, (FAILED, str(error))
+        return Outlines(None, FAILED, str(error))
 
 
-def highest_damping(sweep: SweepJob, count: int) -> float:
+def highest_damping(job: EdgeJob, count: int) -> float:
     """Largest damping of a stable wall with K >= 0 of the first `count` devices [N s/m]; 0 if there is none."""
     largest = 0.0
-    for _, point in EdgeJob(sweep, np.empty(0)).points(0, min(count, sweep.count)):
-        for walk in (_outlines(point)[0] or ()) if isinstance(point, OperatingPoint) else ():
+    for _, found in job.outlines(0, min(count, job.count)):
+        for walk in found.walks or ():
             largest = max(largest, float(walk[walk[:, 0] >= 0.0, 1].max(initial=0.0)))
     return largest

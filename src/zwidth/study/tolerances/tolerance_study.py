@@ -222,11 +222,12 @@ def _coverage(
     Returns  the count of stable devices, and how many have no chart and count as not stable
     """
     job = sweep_job(question.study_of(_axes(question, values), [WALL_IS_STABLE] if question.has_wall else []))
-    top = ABOVE * highest_damping(job, TRIED) or 1.0
+    first = EdgeJob(job, np.empty(0))
+    top = ABOVE * highest_damping(first, TRIED) or 1.0
     dampings, intervals = np.empty(0), np.empty((question.samples, 0, MOST_INTERVALS, 2))
     wanted, rounds, n = np.linspace(0.0, top, LINES + 1), 0, 0
     while True:
-        edges = compute(f"edges-{n}", EdgeJob(job, wanted), "computing charts of devices")
+        edges = compute(f"edges-{n}", replace(first, dampings=wanted), "computing charts of devices")
         found = np.where(edges.status == OK, edges.values, 0.0)
         intervals = np.concatenate([intervals, found.reshape(len(found), len(wanted), MOST_INTERVALS, 2)], axis=1)
         dampings = np.concatenate([dampings, wanted])
