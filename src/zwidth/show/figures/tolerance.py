@@ -106,21 +106,11 @@ def draw_worth(ax: Axes, result: ToleranceStudy) -> None:
         ax.barh(n, value, height=0.34, color=face, edgecolor=BLUE, linewidth=1.0, zorder=2.0)
         ax.plot([low, high], [n, n], color=BLACK, linewidth=1.1, zorder=3.0, marker="|", markersize=6.0)
         place = ax.get_yaxis_transform()
-        ax.text(
-            0.0,
-            n + 0.26,
-            key,
-            transform=place,
-            ha="left",
-            va="bottom",
-            fontsize=TICK_SIZE,
-            zorder=4.0,
-            backgroundcolor="white",
-        )
+        ax.plot([0.0, 0.0], [n - 0.24, n + 0.24], color=BLACK, linewidth=0.8, zorder=2.5)
+        ax.text(0.0, n + 0.26, key, transform=place, ha="left", va="bottom", fontsize=TICK_SIZE, zorder=4.0)
     ax.set_yticks([])
     ax.set_ylim(-0.5, len(bars) - 0.1)
     ax.spines["left"].set_visible(False)
-    ax.axvline(0.0, color=BLACK, linewidth=0.6, zorder=2.5)
     if result.tightened:
         label(ax.xaxis, "More devices with the wall, by half this tolerance", "%", plain=True)
     else:
