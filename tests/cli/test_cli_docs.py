@@ -37,6 +37,9 @@ count = 5
 [[axis]]
 key = "loop.delay_samples"
 values = [0, 1]
+[optimise]
+objectives = { stiffness_max = "max", fastest_decay = "min" }
+budget = 30
 """
 
 

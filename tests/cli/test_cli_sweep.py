@@ -267,7 +267,7 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture
 def arms(folder):
-    (text,) = blocks("toml")
+    text, _ = blocks("toml")  # and an axis of a catalogue
     (folder / "arms.toml").write_text(text)
     return folder
 

@@ -15,6 +15,8 @@ from .load.bending import Bending as Bending
 from .load.bending import bending as bending
 from .load.load_path import LoadPath as LoadPath
 from .load.load_path import load_path as load_path
+from .optimise.optimisation import Optimisation as Optimisation
+from .optimise.optimise import optimise as optimise
 from .robust.family import Family as Family
 from .robust.family import Range as Range
 from .robust.robust_study import RobustError as RobustError

@@ -34,7 +34,10 @@ from zwidth.study.optimise.variables import share_of, values_at
 
 Floats = NDArray[np.float64]
 
-POLISHED: Final = 0.25  # share of the budget that the polish may take
+POLISHED: Final = 0.25  # share of the budget that the polish of a front may take
+POLISHED_ALONE: Final = 0.5  # the same with one objective: there it counts most
+STARTS: Final = 4  # designs that are polished with one objective
+APART: Final = 0.1  # of the bounds, by which these differ in some variable
 HOPELESS: Final = 5  # generations without a value at any point of any design, after which the search ends
 
 
@@ -60,7 +63,8 @@ def optimise(
     archive = _Archive(problem, None if store is None else Path(store), progress, workers)
     baseline = archive.baseline()
     start = _start(problem)
-    searching, spent = problem.budget - int(POLISHED * problem.budget), 0
+    alone = len(problem.objectives) == 1
+    searching, spent = problem.budget - int((POLISHED_ALONE if alone else POLISHED) * problem.budget), 0
     for number, (shares, tell) in enumerate(generations(problem, searching, start), 1):
         judged = archive.judge(shares, "searching", problem.budget)
         spent += len(shares)
@@ -71,7 +75,7 @@ def optimise(
     best = archive.front()
     if len(best):
         costs = archive.judgement.costs(problem)[best]
-        chosen = best[spread_out(costs, problem.front)]
+        chosen = archive.best_apart() if alone else best[spread_out(costs, problem.front)]
         weights = ranges(costs)[1] if len(best) > 1 else np.maximum(np.abs(costs[0]), 1e-300)
         spent += polish(
             problem,
@@ -177,6 +181,18 @@ class _Archive:
         costs = judgement.costs(self.problem)
         costs[judgement.violations(self.problem).any(axis=1)] = np.nan
         return undominated(costs)
+
+    def best_apart(self) -> NDArray[np.int64]:
+        """Some of the best designs that keep all demands, of a single objective, not close to each other."""
+        kept = np.asarray(~self.judgement.violations(self.problem).any(axis=1))
+        costs, shares = self.judgement.costs(self.problem)[:, 0], self.shares
+        chosen: list[int] = []
+        for row in np.argsort(np.where(kept, costs, np.inf), kind="stable").tolist():
+            if len(chosen) == STARTS or not kept[row]:
+                break
+            if all(np.abs(shares[row] - shares[other]).max() > APART for other in chosen):
+                chosen.append(row)
+        return np.array(chosen, dtype=np.int64)
 
     def result(
         self, best: NDArray[np.int64], baseline: Judgement | None, searched: int, polished: int

@@ -1,17 +1,19 @@
-"""Polish of designs that a search has found: steps of sequential linear programming.
+"""Polish of designs that a search has found: steps of linear programs over what is known to first order.
 
-A worst value over many points is the least of many smooth functions, and has a kink wherever another of them
-becomes the least; the best design mostly lies in such a kink. So no single derivative is followed. The values at
-all points, with their derivatives, are taken to first order, and
+A worst value over many points is the least of many smooth functions, and a largest stiffness is itself the
+lesser of two where arcs of the edge meet. The best design mostly lies where such functions change places: on a
+ridge, where no single derivative is of use. So a bundle of them is kept: values at all points of the task, with
+their derivatives, at the design and at designs near by that were tried and found worse. The step is the solution
+of a linear program,
 
-    the largest s,  such that every objective j becomes better by s w_j at each of its points,
-                    every demand is kept at each of its points, and no variable moves by more than D
+    the largest s,  such that every objective j becomes better by s w_j, to first order at each point, seen from
+                    each design of the bundle; every demand is kept, seen so, and no variable moves by more than D
 
-is a linear program. Its step is tried at several lengths; D grows where the step keeps what it promised, and
-shrinks where it does not. Fletcher and Sainz de la Maza 1989 (known at second hand) have the method for smooth
-problems.
+It is tried at several lengths. Where it does not keep what it promised, the nearest of the designs tried joins
+the bundle, and D shrinks. Bundles for one objective: Lemarechal 1975, Schramm and Zowe 1992 (both known at second
+hand).
 
-Values are exact, and so are their differences: over 1e-4 of the bounds, of the second order inside and at the
+Values are exact, and so are their differences: over 1e-5 of the bounds, of the second order inside and at the
 bounds (`gradients`). Where two roots of the loop meet, as at the fastest-decaying wall, a value has an upright
 tangent and no first order: there single variables are changed by ever smaller amounts (`_probes`).
 """
@@ -19,7 +21,7 @@ tangent and no first order: there single variables are changed by ever smaller a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -32,13 +34,30 @@ from zwidth.study.optimise.variables import continuous
 Floats = NDArray[np.float64]
 Judges: TypeAlias = Callable[[Floats], Judgement]
 
-STEP: Final = 1e-4  # of the bounds, by which designs are changed for derivatives
+STEP: Final = 1e-5  # of the bounds, by which designs are changed for derivatives
 REACH: Final = 0.1  # of the bounds: largest first step
 SMALLEST: Final = 1e-9  # steps and gains below are none
 ROUNDING: Final = 1e-13  # gains below are chance
+KEPT: Final = 12  # designs in a bundle
+TRIED: Final = 0.3  # share of the budget after which, with one objective, only the best design is polished
+NEAR: Final = 4.0  # times D: farther designs say nothing of the next step
 LENGTHS: Final = (1.0, 0.5, 0.1)  # at which a step is tried
 PROBED: Final = 1e-3  # of the bounds, by which single variables are changed at first where no step is left
 PROBES: Final = (1.0, 0.25, 0.0625)  # of that, tried at once; then the last of them, and so on
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """What is known to first order round one design.
+
+    shares      (f,)  its free variables
+    objectives  of each, less being better: values (p,) at p points, and their derivatives (p, f)
+    demands     of each, likewise
+    """
+
+    shares: Floats
+    objectives: list[tuple[Floats, Floats]]
+    demands: list[tuple[Floats, Floats]]
 
 
 @dataclass
@@ -47,16 +66,21 @@ class _Design:
 
     shares      (v,)   its variables
     judgement   of it
+    joining     shares and judgement of each design that joins the bundle next
+    bundle      the newest last
     reach       D, of the bounds
-    inset       by how much more than needed the next step keeps the demands, after one that did not
+    bend        violation of demands per square of a step's length: by so much D^2 more than needed the next step
+                keeps them
     probing     by how much single variables are changed next, of the bounds; 0: by steps of the program
     done        whether nothing makes it better
     """
 
     shares: Floats
     judgement: Judgement
-    reach: float
-    inset: float = 0.0
+    joining: list[tuple[Floats, Judgement]]
+    bundle: list[_Linear] = field(default_factory=list)
+    reach: float = REACH
+    bend: float = 0.0
     probing: float = 0.0
     done: bool = False
 
@@ -73,31 +97,46 @@ def polish(
     Returns     number of designs judged
     """
     free = np.flatnonzero(continuous(problem.variables))
-    designs = [_Design(row, judgements[n : n + 1], REACH) for n, row in enumerate(shares)]
-    spent = 0
-    if not len(free):
-        return spent
-    around = 2 * len(free)
+    each = [(row, judgements[n : n + 1]) for n, row in enumerate(shares)] if len(free) else []
+    designs = [_Design(row, judged, [(row, judged)]) for row, judged in each]
+    spent, around = 0, 2 * len(free)
     while pending := [one for one in designs if not one.done]:
+        if len(weights) == 1 and spent > TRIED * budget:
+            pending = [min(pending, key=lambda one: one.judgement.costs(problem)[0, 0])]
         probing = bool(pending[0].probing)
-        each = around * len(PROBES) if probing else around + len(LENGTHS)
-        pending = [one for one in pending if bool(one.probing) == probing][: (budget - spent) // each]
+        needed = around * len(PROBES) if probing else 2 * around + len(LENGTHS)
+        pending = [one for one in pending if bool(one.probing) == probing][: (budget - spent) // needed]
         if not pending:
             break
         if probing:
             spent += _try_all(problem, [(one, _probes(one, free)) for one in pending], weights, judge)
             continue
-        judged = judge(np.concatenate([neighbours(one.shares, free) for one in pending]))
-        spent += around * len(pending)
+        spent += _extend_bundles(problem, pending, free, judge)
         moving = []
-        for n, one in enumerate(pending):
-            step = _step(problem, one, free, judged[n * around : (n + 1) * around], weights)
+        for one in pending:
+            step = _step(problem, one, free, weights)
             if step is None:
                 one.probing = PROBED
             else:
                 moving.append((one, _trials(one.shares, free, step)))
         spent += _try_all(problem, moving, weights, judge) if moving else 0
     return spent
+
+
+def _extend_bundles(problem: Problem, designs: list[_Design], free: NDArray[np.int64], judge: Judges) -> int:
+    """Add to each bundle the designs that are to join it. Returns the number of designs judged."""
+    joining = [(one, *new) for one in designs for new in one.joining]
+    if not joining:
+        return 0
+    judged = judge(np.concatenate([neighbours(shares, free) for _, shares, _ in joining]))
+    around = 2 * len(free)
+    for n, (one, shares, own) in enumerate(joining):
+        beside = judged[n * around : (n + 1) * around]
+        pieces = [_pieces(problem, g.column, shares, own, free, beside, g.sign) for g in problem.objectives]
+        kept = [_pieces(problem, d.column, shares, own, free, beside, d.sign) for d in problem.demands]
+        one.bundle = [*one.bundle, _Linear(shares[free], pieces, kept)][-KEPT:]
+        one.joining = []
+    return len(joining) * around
 
 
 def _try_all(problem: Problem, tried: list[tuple[_Design, Floats]], weights: Floats, judge: Judges) -> int:
@@ -156,53 +195,58 @@ def gradients(shares: Floats, free: NDArray[np.int64], here: Floats, around: Flo
     return np.stack(slopes, axis=-1)
 
 
-def _step(
-    problem: Problem, one: _Design, free: NDArray[np.int64], around: Judgement, weights: Floats
-) -> Floats | None:
-    """The step (f,) that the linear program takes; None where none makes the design better."""
+def _step(problem: Problem, one: _Design, free: NDArray[np.int64], weights: Floats) -> Floats | None:
+    """The step (f,) that the linear program takes; None where none makes the design better.
+
+    Where the bundle allows none, D shrinks, and designs farther away leave the bundle, until one is found.
+    """
     from scipy.optimize import linprog
 
     x, count = one.shares[free], len(free)
-    rows, limits = [], []
-    for objective, weight in zip(problem.objectives, weights, strict=True):
-        here, slope = _pieces(problem, objective.column, one, free, around, objective.sign)
-        own = one.judgement.values[0, objective.column] * objective.sign
-        rows.append(np.column_stack([slope / weight, np.ones(len(here))]))
-        limits.append((own - here) / weight)
-    for demand in problem.demands:
-        sign = -1.0 if demand.at_least else 1.0
-        size = abs(demand.bound) or 1.0
-        here, slope = _pieces(problem, demand.column, one, free, around, sign)
-        rows.append(np.column_stack([slope / size, np.zeros(len(here))]))
-        limits.append((sign * demand.bound - here) / size - one.inset)
-    A, b = np.concatenate(rows), np.concatenate(limits)
-    known = np.isfinite(A).all(axis=1) & np.isfinite(b)
-    reach = [(max(-one.reach, -share), min(one.reach, 1.0 - share)) for share in x]
-    found = linprog(
-        np.append(np.zeros(count), -1.0),
-        A_ub=A[known],
-        b_ub=b[known],
-        bounds=[*reach, (0.0, None)],
-        method="highs",
-    )
-    if found.status != 0 or found.x[-1] < SMALLEST:
-        return None
-    return np.asarray(found.x[:count], dtype=np.float64)
+    own = one.judgement.costs(problem)[0]
+    gain = np.append(np.zeros(count), -1.0)
+    while one.reach >= SMALLEST:
+        rows, limits = [], []
+        for linear in one.bundle:
+            away = x - linear.shares
+            if np.abs(away).max() > NEAR * one.reach:
+                continue
+            for cost, weight, (here, slope) in zip(own, weights, linear.objectives, strict=True):
+                rows.append(np.column_stack([slope / weight, np.ones(len(here))]))
+                limits.append((cost - here - slope @ away) / weight)
+            for demand, (here, slope) in zip(problem.demands, linear.demands, strict=True):
+                size = abs(demand.bound) or 1.0
+                rows.append(np.column_stack([slope / size, np.zeros(len(here))]))
+                limits.append((demand.sign * demand.bound - here - slope @ away) / size - one.bend * one.reach**2)
+        A, b = np.concatenate(rows), np.concatenate(limits)
+        known = np.isfinite(A).all(axis=1) & np.isfinite(b)
+        box = [(max(-one.reach, -share), min(one.reach, 1.0 - share)) for share in x]
+        found = linprog(gain, A_ub=A[known], b_ub=b[known], bounds=[*box, (0.0, None)], method="highs")
+        if found.status == 0 and found.x[-1] >= SMALLEST:
+            return np.asarray(found.x[:count], dtype=np.float64)
+        one.reach /= 4.0
+    return None
 
 
 def _pieces(
-    problem: Problem, column: int, one: _Design, free: NDArray[np.int64], around: Judgement, sign: float
+    problem: Problem,
+    column: int,
+    shares: Floats,
+    own: Judgement,
+    free: NDArray[np.int64],
+    around: Judgement,
+    sign: float,
 ) -> tuple[Floats, Floats]:
-    """Values (p,) of a column with their derivatives (p, f), less being better: at every point where the column is
-    the worst of them, else of itself."""
+    """Values (p,) of a column with their derivatives (p, f), less being better: at every point where the column
+    is the worst of them, else of itself."""
     statistic = problem.columns[column].statistic
     worst = problem.columns[column].measure.better == ("higher" if sign < 0.0 else "lower")
     if statistic == "worst" and worst:
-        here, there = one.judgement.cells[0, column], around.cells[:, column]
+        here, there = own.cells[0, column], around.cells[:, column]
     else:
-        here, there = one.judgement.values[0, column, None], around.values[:, column, None]
+        here, there = own.values[0, column, None], around.values[:, column, None]
     with np.errstate(invalid="ignore"):
-        return sign * here, sign * gradients(one.shares, free, here, there)
+        return sign * here, sign * gradients(shares, free, here, there)
 
 
 def _trials(shares: Floats, free: NDArray[np.int64], step: Floats) -> Floats:
@@ -212,7 +256,7 @@ def _trials(shares: Floats, free: NDArray[np.int64], step: Floats) -> Floats:
 
 
 def _move(problem: Problem, one: _Design, tried: Floats, judged: Judgement, weights: Floats) -> None:
-    """Go to the best of the designs tried, if it is better; and choose how far the next step may go."""
+    """Go to the best of the designs tried, if it is better; and choose what is tried next."""
     own = one.judgement.costs(problem)
     gains = ((own - judged.costs(problem)) / weights).min(axis=1)
     violated = judged.violations(problem).sum(axis=1)
@@ -223,13 +267,13 @@ def _move(problem: Problem, one: _Design, tried: Floats, judged: Judgement, weig
     if one.probing:
         one.probing = 2.0 * float(lengths[best]) if better else one.probing * PROBES[-1] / 2.0
         one.done = one.probing < SMALLEST or (better and gains[best] < ROUNDING)
-    elif not better:
-        one.reach = float(lengths[-1]) / 2.0
-        one.inset = 2.0 * float(violated[-1]) if violated[-1] < 1.0 else one.inset
-        one.probing = PROBED if one.reach < SMALLEST else 0.0
     else:
-        one.reach = min(2.0 * float(lengths[0]), REACH) if best == 0 else float(lengths[best])
-        one.inset = float(violated[0]) if best else 0.0
-        one.probing = PROBED if gains[best] < SMALLEST else 0.0
+        # the nearest of the designs tried in vain lies across what keeps the step from its whole length
+        beyond = best - 1 if better else len(tried) - 1
+        each = [best] * better + [beyond] * (beyond >= 0)
+        one.joining = [(tried[n], judged[n : n + 1]) for n in each if np.isfinite(judged.costs(problem)[n]).all()]
+        bends = np.minimum(violated, 1.0) / lengths**2
+        one.bend = max(0.25 * one.bend, 2.0 * float(bends[beyond])) if beyond >= 0 else 0.25 * one.bend
+        one.reach = float(lengths[beyond]) if beyond >= 0 else min(2.0 * float(lengths[0]), REACH)
     if better:
         one.shares, one.judgement = tried[best], judged[best : best + 1]

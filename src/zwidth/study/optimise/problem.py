@@ -56,6 +56,11 @@ class Demand:
     bound: float
 
     @property
+    def sign(self) -> float:
+        """Factor that makes less better."""
+        return -1.0 if self.at_least else 1.0
+
+    @property
     def text(self) -> str:
         """The demand as a reader writes it: "rigid_mass <= 0.3"."""
         return f"{self.key} {'>=' if self.at_least else '<='} {self.bound:g}"

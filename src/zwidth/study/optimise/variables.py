@@ -46,8 +46,8 @@ def settle(axes: Sequence[Axis], shares: Floats) -> Floats:
 def value_at(axis: Axis, share: float) -> Any:
     """The variable's value at a share.
 
-    >>> value_at(Axis("a", (), (1.0, 100.0), log=True), 0.5), value_at(Axis("b", ("x", "y")), 0.7)
-    (10.0, 'y')
+    >>> value_at(Axis("a", (), (1.0, 3.0)), 0.5), value_at(Axis("b", ("x", "y")), 0.7)
+    (2.0, 'y')
     """
     if many := pieces(axis):
         place = min(int(share * many), many - 1)

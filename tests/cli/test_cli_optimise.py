@@ -1,0 +1,184 @@
+"""`zwidth optimise`: the page's study, files, what is said, resuming, and everything refused."""
+
+from __future__ import annotations
+
+import csv
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.cli.command_runner import document_of, parse_strict_json, refusal_lines, run_command
+from tests.interruption import stopped_by_ctrl_c
+from zwidth.device.load import load
+
+PAGE = (Path(__file__).parents[2] / "docs" / "optimise.md").read_text(encoding="utf-8")
+PLANT = """
+device = "hapkit-course"
+set = ["operator=unset"]
+[[axis]]
+key = "plant.mass_kg"
+range = [0.02, 0.1]
+[[axis]]
+key = "plant.damping_Ns_per_m"
+range = [0.1, 2.0]
+[optimise]
+objectives = { stiffness_max = "max", spectral_radius = "min" }
+budget = 60
+front = 5
+"""
+WALL = "stiffness_N_per_m = 500.0\ndamping_Ns_per_m = 1.0\n"
+
+
+def blocks(language: str) -> list[str]:
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    return [text for kind, text in found if kind == language]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "arms.toml").write_text(blocks("toml")[0])
+    (tmp_path / "plant.toml").write_text(WALL + PLANT)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_page_s_study_prints_what_the_page_says(folder):
+    ran = run_command("optimise", "arms.toml", "--workers", "1")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out == blocks("")[0]
+
+
+def test_the_page_s_python_runs(folder):
+    names: dict[str, object] = {}
+    (program,) = blocks("python")
+    exec(compile(program, "optimise.md", "exec"), names)
+
+
+def test_the_page_names_every_key():
+    from zwidth.study.designs.study_schema import OptimiseSection
+    from zwidth.study.designs.task import DEMANDS
+
+    for key in (*OptimiseSection.model_fields, *DEMANDS, "operators"):
+        assert f"`{key}`" in PAGE, key
+
+
+def test_files_and_keys(folder):
+    document = document_of("optimise", "plant.toml", "--output", "front.json", "--designs", "better")
+    written = parse_strict_json(Path("front.json").read_text())
+    assert written | {"designs_folder": "better"} == document
+    count = len(document["designs"])
+    assert 2 <= count <= 5
+    assert len(document["values"]) == len(document["status"]) == len(document["active"]) == count
+    assert document["searched"] + document["polished"] <= 60
+    assert document["baseline"]["values"]["stiffness_max"] > 0
+    for n, (design, values) in enumerate(zip(document["designs"], document["values"], strict=True), 1):
+        device = load(f"better/hapkit-course-{n}.toml")
+        assert device.document["plant"]["mass_kg"] == design["plant.mass_kg"]
+        assert "operator" not in device.document
+        assert float(device.measure("stiffness_max")) == pytest.approx(values["stiffness_max"], rel=1e-13)
+        text = Path(f"better/hapkit-course-{n}.toml").read_text()
+        sources = tomllib.loads(text)["sources"]
+        assert sources["plant.mass_kg"] == f"optimised, study plant.toml, seed 1, design {n}"
+
+
+@pytest.mark.parametrize("kind", ["csv", "svg", "html"])
+def test_other_files(folder, kind):
+    ran = run_command("optimise", "plant.toml", "--output", f"front.{kind}")
+    assert ran.code == 0
+    text = Path(f"front.{kind}").read_text()
+    if kind == "csv":
+        rows = list(csv.DictReader(text.splitlines()))
+        assert sum(row["knee"] == "True" for row in rows) == 1
+        assert {"plant.mass_kg", "stiffness_max_N_per_m", "active"} <= rows[0].keys()
+    elif kind == "html":
+        assert "http" not in text.replace("http-equiv", "").replace("http://www.w3.org", "")
+        assert 'id="charts"' in text
+        assert 'id="front"' in text
+        assert "as it is" in text
+
+
+def changed(text: str, old: str, new: str) -> str:
+    assert old in text
+    return text.replace(old, new)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "before", "after"),
+    [
+        ("range = [0.02, 0.1]", "range = [0.02, 0.03]", "no variable is at a bound", "plant.mass_kg at its upper"),
+        ("front = 5\n", "front = 5\nconstraints = { stiffness_max = '<= 3000' }\n", None, "stiffness_max <= 3000"),
+        (WALL, WALL.replace("500.0", "1000.0"), "the wanted wall, simulated", "the wanted wall, simulated"),
+        (', spectral_radius = "min"', "", "5 designs of the front, of", "the best of"),
+        ("set = [", 'set = ["loop.delay_samples=3", ', None, "the knee has"),
+    ],
+)
+def test_sentences_follow_the_study(folder, old, new, before, after):
+    first = run_command("optimise", "plant.toml").out
+    (folder / "plant.toml").write_text(changed(WALL + PLANT, old, new))
+    second = run_command("optimise", "plant.toml").out
+    assert first != second
+    assert before is None or before in first
+    assert after is None or after in second
+
+
+def test_an_unstable_wanted_wall_is_not_stable_in_simulation(folder):
+    (folder / "plant.toml").write_text(WALL.replace("500.0", "90000.0") + PLANT)
+    out = run_command("optimise", "plant.toml").out
+    assert re.search(r"is stable in 0 of \d+ design", out)
+    (folder / "plant.toml").write_text(WALL + PLANT)
+    out = run_command("optimise", "plant.toml").out
+    many = re.search(r"is stable in (\d+) of (\d+) design", out)
+    assert many is not None
+    assert many[1] == many[2]
+
+
+def test_without_a_design_that_keeps_the_demands(folder):
+    text = changed(WALL + PLANT, "budget", 'constraints = { stiffness_max = ">= 1e9" }\nbudget')
+    (folder / "plant.toml").write_text(text)
+    ran = run_command("optimise", "plant.toml", "--json", "--designs", "none")
+    assert ran.code == 1
+    document = parse_strict_json(ran.out)
+    assert document["designs"] == []
+    assert document["knee"] is None
+    assert document["reason"].startswith("no design keeps stiffness_max >= 1e+09, the best of ")
+    assert document["demands"][0]["kept_share"] == 0.0
+    assert not Path("none").exists()
+    assert run_command("optimise", "plant.toml", "--output", "front.svg").code == 1
+
+
+def test_an_interrupted_run_goes_on_where_it_was(folder):
+    words = ["optimise", "plant.toml", "--resume", "kept", "--json"]
+    expected = document_of(*words[:2])
+    code, out, err = stopped_by_ctrl_c(words, "zwidth.study.jobs.store:Store.write_batch", 4, folder)
+    assert (code, out) == (130, "")
+    assert "kept keeps the finished work; the same command continues from it" in err
+    assert "Traceback" not in err
+    resumed = document_of(*words[:-1])
+    assert resumed == expected
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("range = [0.02, 0.1]", "range = [0.1, 0.02]", "axis.0.range: must be [lower, upper] with lower < upper"),
+        ("plant.mass_kg", "plant.mass", "axis.0.key: 'plant.mass' "),
+        ('stiffness_max = "max"', 'stifness_max = "max"', "optimise.objectives.stifness_max: no measure is named"),
+        ("budget = 60", "budget = 6", "budget: must be at least 20 designs, got 6"),
+        ("[optimise]", "[optimize]", "optimize: is not a key of a study file; did you mean 'optimise'?"),
+        (WALL, "", "optimise: spectral_radius needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m"),
+        ('{ stiffness_max = "max", spectral_radius = "min" }', "{}", "objectives"),
+        ('stiffness_max = "max"', 'isotropy = "min"', "optimise: isotropy needs a [mechanism]"),
+    ],
+)
+def test_what_is_refused(folder, old, new, line):
+    (folder / "plant.toml").write_text(changed(WALL + PLANT, old, new))
+    lines = refusal_lines("optimise", "plant.toml")
+    assert any(line in one for one in lines), lines
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(folder):
+    Path("file").write_text("")
+    (line,) = refusal_lines("optimise", "plant.toml", "--designs", "file/inside")
+    assert line.startswith("file/inside: cannot be made: ")
