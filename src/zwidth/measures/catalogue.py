@@ -25,11 +25,12 @@ def _measure(
     *,
     each: bool = False,
     along: bool = True,
+    wall: bool | None = None,
 ) -> Measure:
     linear = file not in _OF_THE_MECHANISM
     function = f"{_BINDINGS}.{file}:{name}"
     of_designs = file in _OF_DESIGNS and not each
-    wall = file in _OF_A_WALL
+    wall = file in _OF_A_WALL if wall is None else wall
     return Measure(
         name, title, unit, better, source, function, each, along, linear, of_wall=wall, of_designs=of_designs
     )
@@ -101,6 +102,15 @@ _MEASURES: Final = (
     # walls that it can render
     _measure(
         "impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"
+    ),
+    _measure(
+        "impedance",
+        "stiffness_max_decaying",
+        "Largest virtual stiffness with a wanted decay",
+        "N/m",
+        "higher",
+        "exact, by D-decomposition on the circle of the wanted spectral radius",
+        wall=True,
     ),
     _measure(
         "impedance",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -87,10 +87,21 @@ def measure_at(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    *,
+    spectral_radius: float | None = None,
+    stiffness_margin: float | None = None,
+    damping_margin: float | None = None,
+    delay_margin: float | None = None,
+    lowest_frequency: float | None = None,
+    highest_frequency: float | None = None,
+    force: float | None = None,
+    link_radius: float | None = None,
+    colliding_links: Sequence[str] | None = None,
 ) -> MeasureValues:
     """Evaluate a measure, of the catalogue by its name or a user's own, at operating points.
 
     stiffness, damping, frequency  of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures about it
+    spectral_radius ... colliding_links  what else some measures need, as in `measures.wanted.WantedWall`
     Raises  ValueError    for an unknown name
             MeasureError  where this device does not have the measure, or an argument that it needs is missing; the
                           text begins with its name
@@ -98,7 +109,21 @@ def measure_at(
     resolved = find_measure(measure) if isinstance(measure, str) else measure
     require("measure", resolved, Measure)
     try:
-        return evaluate(resolved.at_wall(WantedWall(stiffness, damping, frequency)), point)
+        wanted = WantedWall(
+            stiffness,
+            damping,
+            frequency,
+            spectral_radius,
+            stiffness_margin,
+            damping_margin,
+            delay_margin,
+            lowest_frequency,
+            highest_frequency,
+            force,
+            link_radius,
+            None if colliding_links is None else tuple(colliding_links),
+        )
+        return evaluate(resolved.at_wall(wanted), point)
     except MeasureError as error:
         raise error.with_name(resolved.name) from None
 

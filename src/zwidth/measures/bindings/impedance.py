@@ -13,17 +13,37 @@ from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, NoValueError
-from zwidth.measures.evaluate import evaluate_pointwise, evaluate_safely, notes_of_points
+from zwidth.measures.bindings.preconditions import numbers_of
+from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.evaluate import complete_pointwise, evaluate_pointwise, evaluate_safely, notes_of_points
 
 Floats = NDArray[np.float64]
+Index = tuple[int, ...]
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
+NONE_DECAYS: Final = "no wall with K > 0 and B >= 0 has a spectral radius below the wanted one"
 
 
 def stiffness_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the points' models and loops [N/m]."""
     return _computed(point, STIFFEST, "stiffness", _stiffness_max_at, NONE_STABLE)
+
+
+def stiffness_max_decaying(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Supremum of K over the walls with K > 0, B >= 0 whose spectral radius is below the wanted one [N/m]."""
+    what = "the spectral radius that the wall must not exceed"
+    (radius,) = numbers_of(wanted, point.shape, what, "spectral_radius")
+
+    def alone(at: Index) -> float:
+        peak = largest_stiffness(point[at].loop, float(radius[at]))
+        if peak is None:
+            raise NoValueError(NONE_DECAYS)
+        return peak.stiffness
+
+    numbers = numbers_of_points(point, STIFFEST, radius)
+    if numbers is None:
+        return complete_pointwise(np.full(point.shape, np.nan), alone, point)
+    return _completed(point, numbers.stiffness, numbers.status, alone, NONE_DECAYS)
 
 
 def damping_max(point: OperatingPoint) -> MeasureValues:
@@ -58,14 +78,29 @@ def _computed(
     if numbers is None:
         return evaluate_pointwise(alone, point)
     states = numbers.decay_status if what == DECAY else numbers.status
-    values, found = getattr(numbers, number).reshape(point.shape), states.reshape(point.shape)
-    status, why = point.status.copy(), dict[tuple[int, ...], tuple[int, str]]()
+    return _completed(point, getattr(numbers, number), states, lambda at: alone(point[at]), none_stable)
+
+
+def _completed(
+    point: OperatingPoint,
+    flat: Floats,
+    states: NDArray[np.uint8],
+    alone: Callable[[Index], float],
+    none_stable: str = "",
+) -> MeasureValues:
+    """Values at all points from those of their charts (N,), those in doubt by a function of an index.
+
+    states       (N,)  FOUND, NO_WALL or DOUBTFUL
+    none_stable  as for `_computed`
+    """
+    values, found = flat.reshape(point.shape), states.reshape(point.shape)
+    status, why = point.status.copy(), dict[Index, tuple[int, str]]()
     without = (status == OK) & (found == NO_WALL) & bool(none_stable)
     status[without] = NO_VALUE
     why |= {tuple(int(i) for i in at): (NO_VALUE, none_stable) for at in np.argwhere(without)}
     for index in np.argwhere((status == OK) & (found == DOUBTFUL)):
         at = tuple(int(i) for i in index)
-        values[at], status[at], reason = evaluate_safely(lambda: alone(point[at]))  # noqa: B023
+        values[at], status[at], reason = evaluate_safely(lambda: alone(at))  # noqa: B023
         if reason:
             why[at] = (int(status[at]), reason)
     return MeasureValues(

@@ -11,7 +11,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-WANTED: Final = ("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz")
+from zwidth.measures.wanted import WANTED_BY_KEY
+
+WANTED: Final = tuple(WANTED_BY_KEY)
 CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)
 
 
