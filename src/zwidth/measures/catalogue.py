@@ -11,8 +11,13 @@ from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
 _OF_THE_MECHANISM: Final = ("dexterity", "forces")  # files whose measures need no loop
-_OF_A_WALL: Final = ("wanted_wall", "wall_decay")  # files whose measures are all about a wanted wall
-_OF_DESIGNS: Final = (*_OF_THE_MECHANISM, "impedance", "wall_decay")  # files whose measures take many designs
+_OF_A_WALL: Final = ("wanted_wall", "wall_decay", "margins")  # files whose measures are all about a wanted wall
+_OF_DESIGNS: Final = (
+    *_OF_THE_MECHANISM,
+    "impedance",
+    "wall_decay",
+    "margins",
+)  # files whose measures take many designs
 
 
 def _measure(
@@ -111,6 +116,14 @@ _MEASURES: Final = (
         "higher",
         "exact, by D-decomposition on the circle of the wanted spectral radius",
         wall=True,
+    ),
+    _measure(
+        "margins",
+        "stiffness_max_with_margins",
+        "Largest virtual stiffness with margins",
+        "N/m",
+        "higher",
+        "exact edges by D-decomposition, delays sampled, docs/measures.md",
     ),
     _measure(
         "impedance",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import MissingNumbersError, NoMechanismError
@@ -168,6 +169,33 @@ def complete_pointwise(
         if reason:
             why[index] = (int(status[index]), reason)
     return MeasureValues(values, status, notes_of_points(why))
+
+
+def complete_charts(
+    point: OperatingPoint,
+    flat: NDArray[np.float64],
+    states: NDArray[np.uint8],
+    alone: Callable[[tuple[int, ...]], float],
+    none_stable: str = "",
+) -> MeasureValues:
+    """Values at all points from those of their charts (N,), those in doubt by a function of an index.
+
+    states       (N,)   FOUND, NO_WALL or DOUBTFUL
+    none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
+    """
+    values, found = flat.reshape(point.shape), states.reshape(point.shape)
+    status, why = point.status.copy(), dict[tuple[int, ...], tuple[int, str]]()
+    without = (status == OK) & (found == NO_WALL) & bool(none_stable)
+    status[without] = NO_VALUE
+    why |= {tuple(int(i) for i in at): (NO_VALUE, none_stable) for at in np.argwhere(without)}
+    for index in np.argwhere((status == OK) & (found == DOUBTFUL)):
+        at = tuple(int(i) for i in index)
+        values[at], status[at], reason = evaluate_safely(lambda: alone(at))  # noqa: B023
+        if reason:
+            why[at] = (int(status[at]), reason)
+    return MeasureValues(
+        np.where(status == OK, values, np.nan), status, notes_of_points(dict(sorted(why.items())))
+    )
 
 
 def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:

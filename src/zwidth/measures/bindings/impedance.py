@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
-from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.bindings.preconditions import numbers_of
-from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, NoValueError, WantedWall, WantedWalls
-from zwidth.measures.evaluate import complete_pointwise, evaluate_pointwise, evaluate_safely, notes_of_points
+from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.evaluate import complete_charts, complete_pointwise, evaluate_pointwise
 
 Floats = NDArray[np.float64]
 Index = tuple[int, ...]
@@ -43,7 +42,7 @@ def stiffness_max_decaying(point: OperatingPoint, wanted: WantedWall | WantedWal
     numbers = numbers_of_points(point, STIFFEST, radius)
     if numbers is None:
         return complete_pointwise(np.full(point.shape, np.nan), alone, point)
-    return _completed(point, numbers.stiffness, numbers.status, alone, NONE_DECAYS)
+    return complete_charts(point, numbers.stiffness, numbers.status, alone, NONE_DECAYS)
 
 
 def damping_max(point: OperatingPoint) -> MeasureValues:
@@ -78,34 +77,7 @@ def _computed(
     if numbers is None:
         return evaluate_pointwise(alone, point)
     states = numbers.decay_status if what == DECAY else numbers.status
-    return _completed(point, getattr(numbers, number), states, lambda at: alone(point[at]), none_stable)
-
-
-def _completed(
-    point: OperatingPoint,
-    flat: Floats,
-    states: NDArray[np.uint8],
-    alone: Callable[[Index], float],
-    none_stable: str = "",
-) -> MeasureValues:
-    """Values at all points from those of their charts (N,), those in doubt by a function of an index.
-
-    states       (N,)  FOUND, NO_WALL or DOUBTFUL
-    none_stable  as for `_computed`
-    """
-    values, found = flat.reshape(point.shape), states.reshape(point.shape)
-    status, why = point.status.copy(), dict[Index, tuple[int, str]]()
-    without = (status == OK) & (found == NO_WALL) & bool(none_stable)
-    status[without] = NO_VALUE
-    why |= {tuple(int(i) for i in at): (NO_VALUE, none_stable) for at in np.argwhere(without)}
-    for index in np.argwhere((status == OK) & (found == DOUBTFUL)):
-        at = tuple(int(i) for i in index)
-        values[at], status[at], reason = evaluate_safely(lambda: alone(at))  # noqa: B023
-        if reason:
-            why[at] = (int(status[at]), reason)
-    return MeasureValues(
-        np.where(status == OK, values, np.nan), status, notes_of_points(dict(sorted(why.items())))
-    )
+    return complete_charts(point, getattr(numbers, number), states, lambda at: alone(point[at]), none_stable)
 
 
 def _stiffness_max_at(point: OperatingPoint) -> float:
