@@ -114,7 +114,7 @@ def test_a_missing_or_impossible_radius_is_refused():
     point = load("five-bar").at()
     with pytest.raises(MeasureError, match="give spectral_radius"):
         point.measure("stiffness_max_decaying")
-    with pytest.raises(MeasureError, match="needs spectral_radius above 0 and at most 1, got 1.5"):
+    with pytest.raises(MeasureError, match=r"needs spectral_radius above 0 and at most 1, got 1\.5"):
         point.measure("stiffness_max_decaying", spectral_radius=1.5)
 
 

@@ -66,6 +66,7 @@ def test_a_device_without_stable_walls_has_no_value():
 
 
 def test_missing_margins_are_named_as_arguments_and_as_keys():
-    with pytest.raises(MeasureError, match="give stiffness_margin and damping_margin and delay_margin$") as caught:
+    said = r"give stiffness_margin and damping_margin and delay_margin$"
+    with pytest.raises(MeasureError, match=said) as caught:
         zwidth.load("five-bar").at().measure("stiffness_max_with_margins", stiffness_margin=0.1)
     assert caught.value.spelled(as_key).endswith("and damping_margin and delay_margin_samples")

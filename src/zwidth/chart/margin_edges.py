@@ -34,9 +34,7 @@ Whole = NDArray[np.int64]
 # Nodes, and parts of edges within a strip, for which there is memory at each delay.
 NODES_EACH, PARTS_EACH = 2048, 64
 NO_PIECE, CURVE, STRAIGHT = range(3)
-NEAR_END: Final = (
-    1e-5  # the share of t up to which the end of the curve at a real root is taken for a straight line
-)
+NEAR_END: Final = 1e-5  # share of t up to which the curve is straight where it ends at a real root
 
 
 class EdgeNodes(NamedTuple):
@@ -138,9 +136,8 @@ def _add_curve(memory: EdgeMemory, nodes: EdgeNodes, k: int, loop: int) -> bool:
         if i == 0:
             _, _, K_slope, B_slope = wall_with_slopes(circle, at)
         _, _, next_K_slope, next_B_slope = wall_with_slopes(circle, then)
-        if not _add_turns(
-            circle, nodes, at, then, K_slope * next_K_slope < 0.0, B_slope * next_B_slope < 0.0, loop
-        ):
+        of_K, of_B = K_slope * next_K_slope < 0.0, B_slope * next_B_slope < 0.0
+        if not _add_turns(circle, nodes, at, then, of_K, of_B, loop):
             return False
         K_slope, B_slope = next_K_slope, next_B_slope
         if to_end:
@@ -177,15 +174,14 @@ def add_crossings(
     loops: LoopTable,
     i: int,
     step: int,
-    count: int,
     circle: CircleFactors,
     low: float,
     high: float,
 ) -> bool:
-    """Add a node of the curve wherever a piece of it crosses K = low or K = high, at the place where its chord does;
-    False where memory is full.
+    """Add a node of the curve wherever a piece of it crosses K = low or K = high, at the place where its chord
+    does; False where memory is full.
 
-    i, step, count  the loops are numbers i, i + step, ... of the table, so many
+    i, step  the loops are numbers i, i + step, ... of the table
     """
     filled, k = -1, 0
     while k < nodes.used[0] - 1:

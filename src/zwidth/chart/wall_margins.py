@@ -282,7 +282,7 @@ def _refined(
         return 0.0, True
     nodes, tolerance, half = memory.nodes, COARSE, 10.0 * COARSE
     for _ in range(ROUNDS):
-        if not add_crossings(nodes, loops, i, N, delays, memory.circle, stiffness / a, stiffness * a):
+        if not add_crossings(nodes, loops, i, N, memory.circle, stiffness / a, stiffness * a):
             return 0.0, False
         before = stiffness
         while half < 0.5:

@@ -74,6 +74,28 @@ def tables_of_points(
     return [loop_table(*section_rows(pairs, controller), controller) for controller in controllers]
 
 
+def modes_of_points(point: OperatingPoint) -> RenderedModes | None:
+    """Modes of all points' plants, flat, without operator; None where each point is to be asked alone: a measured
+    response, a reduced given plant or one of a single design, encoders on the links in a reduced model, a load,
+    flexible links, a mechanism that is not plain in a reduced model.
+
+    Their `input` is nan where dampers couple the modes; frequencies and shapes are those without damping.
+    """
+    point.require("dynamics")
+    model = point.model or "full"
+    if point.response is not None or point.load is not None:
+        return None
+    if point.mechanism is None and (model != "full" or not point.shape):
+        return None
+    if point.mechanism is not None and (
+        point.mechanism.flexible
+        or (point.encoders != "motor" and model != "full")
+        or not _known_together(point.mechanism, model)
+    ):
+        return None
+    return _modes(point.flat if point.shape else point, model)
+
+
 def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = True) -> PolePairs:
     """The plants of all points along one axis, held by their operator, as pairs of poles.
 

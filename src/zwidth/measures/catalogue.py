@@ -10,14 +10,15 @@ from zwidth.measures.definition import Better, Measure
 from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
-_OF_THE_MECHANISM: Final = ("dexterity", "forces")  # files whose measures need no loop
+_OF_THE_MECHANISM: Final = ("dexterity", "forces", "geometry")  # files whose measures need no loop
 _OF_A_WALL: Final = ("wanted_wall", "wall_decay", "margins")  # files whose measures are all about a wanted wall
 _OF_DESIGNS: Final = (
     *_OF_THE_MECHANISM,
     "impedance",
     "wall_decay",
     "margins",
-)  # files whose measures take many designs
+    "modes",
+)  # files that take designs at once
 
 
 def _measure(
@@ -104,6 +105,79 @@ _MEASURES: Final = (
         "dexterity", "rigid_mass", "Rigid mass of links and rotors", "kg", None, "Khatib 1987; thesis eq. 2.18"
     ),
     _measure("dexterity", "stiffness", "Structural stiffness", "N/m", "higher", "thesis eq. 2.34"),
+    # room that it needs and leaves, and its first vibration
+    _measure(
+        "modes",
+        "first_mode",
+        "Frequency of the first flexible mode",
+        "Hz",
+        "higher",
+        "least natural frequency above 0 of the plant without wall and hand",
+    ),
+    _measure(
+        "geometry",
+        "distance_to_singularity",
+        "Reciprocal condition number of the homogeneous Jacobian",
+        "",
+        "higher",
+        "Salisbury and Craig 1982; both kinds of singularity, Gosselin and Angeles 1990",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "joint_margin",
+        "Distance of the joints from their limits, in half ranges",
+        "",
+        "higher",
+        "1 in the middle of the range, 0 at a limit, inf without limits",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "link_clearance",
+        "Clearance between links that share no joint",
+        "m",
+        "higher",
+        "distance of rods with round ends, Ericson 2005 (known at second hand)",
+        along=False,
+        wall=True,
+    ),
+    _measure(
+        "geometry",
+        "reach",
+        "Largest distance of a link from the middle of the base",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "reach_x",
+        "Largest distance of a link from the middle of the base along x",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "reach_y",
+        "Largest distance of a link from the middle of the base along y",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "reach_z",
+        "Largest distance of a link from the middle of the base along z",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
     # walls that it can render
     _measure(
         "impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"
@@ -294,6 +368,15 @@ _MEASURES: Final = (
         "N",
         "lower",
         "work of all drives' friction per metre",
+    ),
+    _measure(
+        "forces",
+        "motor_heat",
+        "Heat of all windings while a force is held",
+        "W",
+        "lower",
+        "sum of (torque/motor constant)^2",
+        wall=True,
     ),
 )
 
