@@ -11,13 +11,19 @@ from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
 _OF_THE_MECHANISM: Final = ("dexterity", "forces", "geometry")  # files whose measures need no loop
-_OF_A_WALL: Final = ("wanted_wall", "wall_decay", "margins")  # files whose measures are all about a wanted wall
+_OF_A_WALL: Final = (
+    "wanted_wall",
+    "wall_decay",
+    "margins",
+    "felt",
+)  # files whose measures are all about a wanted wall
 _OF_DESIGNS: Final = (
     *_OF_THE_MECHANISM,
     "impedance",
     "wall_decay",
     "margins",
     "modes",
+    "felt",
 )  # files that take designs at once
 
 
@@ -290,22 +296,28 @@ _MEASURES: Final = (
         each=True,
     ),
     _measure(
-        "wanted_wall",
+        "felt",
         "felt_stiffness",
         "Stiffness felt at the wanted wall",
         "N/m",
         "higher",
         "real part of force per displacement at the handle, docs/felt.md",
-        each=True,
     ),
     _measure(
-        "wanted_wall",
+        "felt",
         "free_motion_force",
         "Force per velocity felt in free motion",
         "N s/m",
         "lower",
         "size of the impedance without a wall, docs/felt.md",
-        each=True,
+    ),
+    _measure(
+        "felt",
+        "impedance_ratio",
+        "Least ratio of the impedances of a wall and of free motion in a band",
+        "",
+        "higher",
+        "dynamic range, Colgate and Brown 1994 (known from the abstract), by frequency",
     ),
     # what a load does
     _measure(
