@@ -19,14 +19,19 @@ ROUNDS: Final = 6  # how often these are tried, each time closer
 DEEPEST: Final = 2  # lowest minima that are looked at so
 
 
-def frequencies_in_band(low: Floats, high: Floats, modes: RenderedModes) -> Floats:
+def frequencies_in_band(
+    low: Floats, high: Floats, modes: RenderedModes, roots: NDArray[np.complex128], period: Floats
+) -> Floats:
     """Frequencies at which a response at the handle is looked at, ascending.
 
     Spread over the band; and where it changes fast, at the undamped resonances of the handle and at the
     antiresonances between them (the zeros of sum h_k^2/(w_k^2 - w^2), one between any two resonances), beside them
-    by a half and by two widths of the damped peak.
+    by a half and by two widths of the damped peak. And at the roots z of the loop on its wall, whose resonances
+    are -ln|z|/T wide.
 
-    low, high  (n,)  of the band [Hz]
+    low, high  (n,)    of the band [Hz]
+    roots      (n, k)  z; 0 for none
+    period     (n,)    T [s]
     Returns    (n, f)
     """
     share = np.linspace(0.0, 1.0, SPREAD)
@@ -35,8 +40,10 @@ def frequencies_in_band(low: Floats, high: Floats, modes: RenderedModes) -> Floa
     order = np.argsort(modes.frequency_squared, axis=1, kind="stable")
     h2 = np.take_along_axis(modes.handle**2, order, axis=1)
     wide = np.max(np.abs(modes.decay), axis=1, keepdims=True)
-    places = [np.sqrt(np.maximum(w2, 0.0)), *_zeros(w2, h2)]
-    centres = np.concatenate([place.reshape(len(low), -1) for place in places], axis=1)
+    places = np.concatenate([np.sqrt(np.maximum(w2, 0.0)), *_zeros(w2, h2)], axis=1)
+    size = np.clip(np.abs(roots), 1e-3, 1.0)
+    centres = np.concatenate([places, np.abs(np.angle(roots)) / period[:, None]], axis=1)
+    wide = np.concatenate([wide + 0.0 * places, -np.log(size) / period[:, None]], axis=1)
     beside = [centres + side * np.minimum(wide, 0.3 * centres) for side in (-2.0, -0.5, 0.0, 0.5, 2.0)]
     extra = np.concatenate(beside, axis=1) / (2.0 * np.pi)
     every = np.concatenate([grid, np.clip(extra, low[:, None], high[:, None])], axis=1)

@@ -92,7 +92,8 @@ class HandleMotion:
 
     def _some(self, rows: NDArray[np.int64], frequency: Floats) -> tuple[Complexes, ...]:
         """G_hh, G_ha G_sh, P, w and H of devices (n,) at frequencies (n, f)."""
-        T, s = self.period[rows][:, None], 2j * np.pi * frequency
+        T = self.period[rows][:, None]
+        s: Complexes = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
         G_hh, G_ha, G_sh = self._responses(rows, s)
         P, w = (np.empty(frequency.shape, dtype=complex) for _ in range(2))
         _sampled(self.table, rows, 2.0 * np.pi * frequency * T, factor_memory(self.table), P, w)

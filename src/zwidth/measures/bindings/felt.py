@@ -16,7 +16,8 @@ from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
 from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.chart.point_radii import radii_at_points
-from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, judge
+from zwidth.chart.table_radii import slowest_roots
+from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, eigenvalues, judge
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.unsupported_feedback import FeedbackError
@@ -31,6 +32,8 @@ Floats = NDArray[np.float64]
 Index = tuple[int, ...]
 
 HAND: Final = "a frequency at which the hand moves"
+HIGHEST: Final = 0.4999  # of the sampling frequency, up to which an impedance is taken
+ROOTS: Final = 4  # of the loop on its wall, the slowest, at whose resonances the impedance is looked at
 NO_WALL_DECAYS: Final = "no wall with K > 0 and B >= 0 has a spectral radius below the wanted one"
 
 
@@ -107,12 +110,11 @@ def impedance_ratio(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> 
 
     values = np.full(states.size, np.nan)
     if len(rows):
-        tried = frequencies_in_band(low.ravel()[rows], top, motion.modes.rows(rows))
+        roots = slowest_roots(motion.table, rows, K, B, ROOTS)
+        modes, period = motion.modes.rows(rows), motion.period[rows]
+        tried = frequencies_in_band(low.ravel()[rows], top, modes, roots, period)
         values[rows] = least_in_band(ratio, tried)
     return complete_charts(point, values, states, alone, NO_WALL_DECAYS)
-
-
-HIGHEST: Final = 0.4999  # of the sampling frequency, up to which an impedance is taken
 
 
 def _below_half(frequency: float, period: float) -> float:
@@ -121,7 +123,11 @@ def _below_half(frequency: float, period: float) -> float:
 
 def _ratio_alone(loop: Loop, K: float, B: float, low: float, high: float) -> float:
     """Of one loop, tried at many frequencies: its modes may have no real form."""
-    frequency = np.geomspace(low, high, 2000)[None]
+    roots = eigenvalues(loop, K, B).ravel()
+    centres, wide = np.abs(np.angle(roots)), -np.log(np.clip(np.abs(roots), 1e-3, 1.0))
+    beside = [centres + side * np.minimum(wide, 0.3 * centres) for side in (-2.0, -0.5, 0.0, 0.5, 2.0)]
+    extra = np.clip(np.concatenate(beside) / (2.0 * np.pi * loop.period), low, high)
+    frequency = np.sort(np.concatenate([np.geomspace(low, high, 2000), extra]))[None]
 
     def ratio(f: Floats) -> Floats:
         held, free = handle_impedance.felt_impedance(loop, K, B, f), handle_impedance.free_impedance(loop, f)
