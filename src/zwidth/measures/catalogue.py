@@ -313,6 +313,14 @@ _MEASURES: Final = (
     ),
     _measure(
         "felt",
+        "rate_hardness",
+        "Rate-hardness: rate of the force on contact over the velocity",
+        "N/m",
+        "higher",
+        "Lawrence, Pao and others 2000 (abstract read), steepest mean rate, docs/measures.md",
+    ),
+    _measure(
+        "felt",
         "impedance_ratio",
         "Least ratio of the impedances of a wall and of free motion in a band",
         "",

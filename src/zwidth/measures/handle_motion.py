@@ -121,7 +121,7 @@ class HandleMotion:
     def _hold(self, rows: NDArray[np.int64], s: Complexes) -> Complexes:
         """H (n, f), from commands to the part of the force at s itself."""
         T = self.period[rows][:, None]
-        delay, lag = (self._of_rows(number, rows) for number in (self.controller.delay, _lag(self.controller)))
+        delay, lag = self.delay[rows][:, None], self.lag[rows][:, None]
         low_pass, d = force_filter(self.controller), np.expm1(s * T)
         filtered = np.ones_like(d)
         for k in range(low_pass.numerator.shape[-2]):
@@ -132,20 +132,24 @@ class HandleMotion:
         stairs = -np.expm1(-s * T) / (s * T) * np.exp(-s * T * delay)
         return np.asarray(filtered * stairs / (1.0 + s * lag))
 
-    def _of_rows(self, number: float | Floats, rows: NDArray[np.int64]) -> Floats:
-        """A number of the computer for each device, (n, 1)."""
-        flat = np.ravel(np.asarray(number, dtype=np.float64))
-        return flat[rows][:, None] if len(flat) > 1 else flat[:, None]
+    @property
+    def delay(self) -> Floats:
+        """(N,) of the force [samples]."""
+        return self._of_each(self.controller.delay)
+
+    @property
+    def lag(self) -> Floats:
+        """(N,) of the actuator [s]."""
+        return self._of_each(self.controller.actuator_time_constant)
+
+    def _of_each(self, number: float | Floats) -> Floats:
+        return np.array(np.broadcast_to(np.ravel(np.asarray(number, dtype=np.float64)), self.period.shape))
 
     def _quadratic(self, c: Floats, rows: NDArray[np.int64], d: Complexes) -> Complexes:
         """c2 d^2 + c1 d + c0 for coefficients (3,) or those of each device (N, 3)."""
         c = c.reshape(-1, 3)
         c2, c1, c0 = (c[rows] if len(c) > 1 else c).T[..., None]
         return np.asarray((c2 * d + c1) * d + c0)
-
-
-def _lag(controller: Controller) -> float | Floats:
-    return controller.actuator_time_constant
 
 
 @compiled

@@ -22,17 +22,20 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.unsupported_feedback import FeedbackError
 from zwidth.measures import handle_impedance
+from zwidth.measures import rate_hardness as hardness
 from zwidth.measures.band import frequencies_in_band, least_in_band
 from zwidth.measures.bindings.preconditions import numbers_of, plant_with_handle
 from zwidth.measures.definition import OK, MeasureError, MeasureValues, NoValueError, WantedWall, WantedWalls
 from zwidth.measures.evaluate import complete_charts, complete_pointwise
 from zwidth.measures.handle_motion import HandleMotion
+from zwidth.model.plant_modes import plant_modes
 
 Floats = NDArray[np.float64]
 Index = tuple[int, ...]
 
 HAND: Final = "a frequency at which the hand moves"
 HIGHEST: Final = 0.4999  # of the sampling frequency, up to which an impedance is taken
+TIED: Final = "a spring ties the device to the ground, so that it does not move freely before the contact"
 ROOTS: Final = 4  # of the loop on its wall, the slowest, at whose resonances the impedance is looked at
 NO_WALL_DECAYS: Final = "no wall with K > 0 and B >= 0 has a spectral radius below the wanted one"
 
@@ -62,6 +65,40 @@ def felt_stiffness(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> M
     values, states = np.full(radii.size, np.nan), np.full(radii.size, DOUBTFUL, dtype=np.uint8)
     values[rows], states[rows] = (1.0 / x[:, 0]).real, FOUND
     states[motion.known & (radii > 1.0 + NEAR) & below] = NO_WALL
+    return complete_charts(point, values, states, alone, _not_felt(UNSTABLE))
+
+
+def rate_hardness(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Steepest mean rate of the force felt on contact with the wanted wall, over the velocity [N/m]."""
+    K, B = numbers_of(wanted, point.shape, "a wanted wall", "stiffness", "damping")
+
+    def alone(at: Index) -> float:
+        loop, verdicts = _free_loop(point[at]), judge(point[at].loop, [K[at]], [B[at]])
+        if verdicts.verdict[0] != STABLE:
+            raise NoValueError(_not_felt(int(verdicts.verdict[0])))
+        if loop.has_fixed_feedback:
+            raise NoValueError("is not known with feedback beside the wall law")
+        modes, computer = plant_modes(loop.plant, (1,)), loop.controller
+        if not np.isfinite(modes.input).all():
+            raise NoValueError("is not known with electrical damping or a loss factor")
+        timing = np.array([[computer.delay], [computer.actuator_time_constant]], dtype=np.float64)
+        wall = np.array([[K[at]], [B[at]]])
+        value = hardness.rate_hardness(loop.table, modes, np.zeros(1, dtype=np.int64), *timing, *wall)
+        if np.isnan(value[0]):
+            raise NoValueError(TIED)
+        return float(value[0])
+
+    motion = HandleMotion.of(point)
+    if motion is None:
+        return complete_pointwise(np.full(point.shape, np.nan), alone, point)
+    radii = radii_at_points(point, K, B).ravel()
+    rows = np.flatnonzero(motion.known & (radii < 1.0 - NEAR) & (point.status.ravel() == OK))
+    values, states = np.full(radii.size, np.nan), np.full(radii.size, DOUBTFUL, dtype=np.uint8)
+    values[rows] = hardness.rate_hardness(
+        motion.table, motion.modes, rows, motion.delay, motion.lag, K.ravel()[rows], B.ravel()[rows]
+    )
+    states[np.isfinite(values)] = FOUND
+    states[motion.known & (radii > 1.0 + NEAR)] = NO_WALL
     return complete_charts(point, values, states, alone, _not_felt(UNSTABLE))
 
 
