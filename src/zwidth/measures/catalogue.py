@@ -38,8 +38,9 @@ def _measure(
     each: bool = False,
     along: bool = True,
     wall: bool | None = None,
+    linear: bool | None = None,
 ) -> Measure:
-    linear = file not in _OF_THE_MECHANISM
+    linear = file not in _OF_THE_MECHANISM if linear is None else linear
     function = f"{_BINDINGS}.{file}:{name}"
     of_designs = file in _OF_DESIGNS and not each
     wall = file in _OF_A_WALL if wall is None else wall
@@ -326,6 +327,17 @@ _MEASURES: Final = (
         "",
         "higher",
         "dynamic range, Colgate and Brown 1994 (known from the abstract), by frequency",
+    ),
+    _measure(
+        "buzz",
+        "buzz",
+        "Amplitude of a remaining vibration over the least that is felt",
+        "",
+        "lower",
+        "limit cycles by harmonic balance; thresholds as in docs/measures.md (second-hand)",
+        each=True,
+        wall=True,
+        linear=False,
     ),
     # what a load does
     _measure(

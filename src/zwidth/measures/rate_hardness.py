@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.loop_table import LoopTable
 from zwidth.model.rendered_modes import RenderedModes
+from zwidth.threads import in_chunks
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -64,10 +65,12 @@ def rate_hardness(
         drag[some.coupled] = some.drag[some.coupled]
     out = np.empty(len(rows))
     lagging = int(np.any(lag > 0.0))
-    _several(
-        loops, rows, some.frequency_squared, drag, some.handle, some.input, some.output, delay[rows], lag[rows],
-        lagging, K, B, out,
-    )  # fmt: skip
+    of_modes = some.frequency_squared, drag, some.handle, some.input, some.output
+
+    def several(first: int, last: int) -> None:
+        _several(loops, rows, *of_modes, delay[rows], lag[rows], lagging, K, B, out, first, last)
+
+    in_chunks(several, len(rows))
     return np.maximum(out, _static(some, K))
 
 
@@ -100,8 +103,10 @@ def _several(
     K: Floats,
     B: Floats,
     out: Floats,
+    first: int,
+    last: int,
 ) -> None:
-    """One device after the other."""
+    """Devices first to last - 1, one after the other."""
     m = w2.shape[1]
     n = 2 * m + 2
     A, E, F = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
@@ -109,7 +114,7 @@ def _several(
     queue = np.empty(int(delay.max()) + 3)
     past = np.empty(loops.window.shape[1] + 1)
     memory = np.empty((loops.velocity.shape[1] + loops.force.shape[1] + 1, 2))
-    for k in range(len(rows)):
+    for k in range(first, last):
         c = loops.computer[rows[k]]
         own = w2[k], drag[k], h[k], a[k], s[k]
         out[k] = _steepest(
@@ -287,7 +292,7 @@ def _force(w2: Floats, drag: Floats, h: Floats, a: Floats, hh: float, state: Flo
         for j in range(m):
             own += drag[i, j] * state[m + j]
         force += h[i] * own
-    return force / hh
+    return float(force / hh)
 
 
 @compiled_lean
@@ -327,4 +332,4 @@ def _through(factor: Floats, value: float, memory: Floats) -> float:
     out = b0 * value + memory[0]
     memory[0] = b1 * value - a1 * out + memory[1]
     memory[1] = b2 * value - a2 * out
-    return out
+    return float(out)
