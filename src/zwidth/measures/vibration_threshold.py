@@ -11,7 +11,7 @@ So here
                      (f/250)^2       above, the slope that is the same there being our choice
 
 as the amplitude of a sine. An object held in the whole hand is felt at less: Brisben, Hsiao and Johnson (Journal
-of Neurophysiology 81, 1999; the abstract was read) found the least thresholds between 150 and 200 Hz, below 0.01 um
+of Neurophysiology 81, 1999; abstract read) found the least thresholds between 150 and 200 Hz, below 0.01 um
 in some subjects, and at 40 and 300 Hz 9.8 and 18.5 dB below those of a thin probe. Who asks that nobody feels
 anything in a full grasp asks for a tenth of this threshold.
 """
