@@ -12,8 +12,8 @@ from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
 from zwidth.chart.wall_margins import (
-    _with_chords,
     delays_within,
+    stiffness_with_chords,
     stiffness_with_margins,
     stiffness_with_margins_alone,
 )
@@ -114,7 +114,7 @@ def test_a_margin_in_stiffness_alone_at_an_upright_edge_divides_by_it():
 
 def test_chords_give_the_same_wall_as_the_curve():
     loops = delayed(published(), 0.5)
-    exact, chords = stiffness_with_margins_alone(loops, 0.2, 0.3), _with_chords(loops, 1.2, 1.3)
+    exact, chords = stiffness_with_margins_alone(loops, 0.2, 0.3), stiffness_with_chords(loops, 1.2, 1.3)
     np.testing.assert_allclose(chords, exact, rtol=1e-5)
 
 

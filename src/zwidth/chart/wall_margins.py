@@ -313,11 +313,11 @@ def stiffness_with_margins_alone(
     margins = np.array([stiffness_margin]), np.array([damping_margin])
     found, status = stiffness_with_margins(table, len(loops), *margins)
     if status[0] == DOUBTFUL:
-        return _with_chords(loops, 1.0 + stiffness_margin, 1.0 + damping_margin)
+        return stiffness_with_chords(loops, 1.0 + stiffness_margin, 1.0 + damping_margin)
     return (float(found[0, 0]), float(found[0, 1])) if status[0] == FOUND else None
 
 
-def _with_chords(loops: list[Loop], a: float, b: float) -> tuple[float, float] | None:
+def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float, float] | None:
     """`stiffness_with_margins_alone` with edges as chords (`arc_kernels.CHORD`), where compiled stages are in
     doubt."""
     tracers = [Tracer(loop) for loop in loops]
