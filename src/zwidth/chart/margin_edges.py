@@ -277,6 +277,52 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
     return False
 
 
+@compiled_apart
+def copy_pieces_near(
+    nodes: EdgeNodes, close: EdgeNodes, low: float, high: float, bottom: float, top: float
+) -> bool:
+    """Copy the pieces that may meet the walls between two stiffnesses and two dampings; False where memory is
+    full."""
+    close.used[0], open_end = 0, -1
+    for i in range(nodes.used[0] - 1):
+        if nodes.piece[i] == NO_PIECE:
+            continue
+        k0, k1, b0, b1 = nodes.K[i], nodes.K[i + 1], nodes.B[i], nodes.B[i + 1]
+        if max(k0, k1) < low or min(k0, k1) > high or max(b0, b1) < bottom or min(b0, b1) > top:
+            continue
+        if open_end == i:  # goes on from the piece before
+            close.piece[close.used[0] - 1] = nodes.piece[i]
+        elif not add_node(close, k0, b0, nodes.t[i], nodes.piece[i], nodes.loop[i], 0):
+            return False
+        if not add_node(close, k1, b1, nodes.t[i + 1], NO_PIECE, nodes.loop[i + 1], 0):
+            return False
+        open_end = i + 1
+    return True
+
+
+@compiled_apart
+def fits_about(close: EdgeNodes, K: float, factor: float, damping_factor: float, middle: float) -> bool:
+    """`fits` for the gap round a damping in the middle of it, which no edge of these pieces may reach."""
+    low, high, below, above = K / factor, K * factor, 0.0, np.inf
+    for i in range(close.used[0] - 1):
+        if close.piece[i] == NO_PIECE:
+            continue
+        k0, k1, b0, b1 = close.K[i], close.K[i + 1], close.B[i], close.B[i + 1]
+        if max(k0, k1) < low or min(k0, k1) > high:
+            continue
+        x0, x1 = min(max(k0, low), high), min(max(k1, low), high)
+        y0 = b0 if x0 == k0 else b0 + (b1 - b0) * ((x0 - k0) / (k1 - k0))
+        y1 = b1 if x1 == k1 else b0 + (b1 - b0) * ((x1 - k0) / (k1 - k0))
+        if min(y0, y1) <= middle <= max(y0, y1):
+            return False
+        if y0 < middle:
+            below = max(below, max(y0, y1))
+        else:
+            above = min(above, min(y0, y1))
+    close.gap[0], close.gap[1] = below, above
+    return above >= damping_factor * damping_factor * below
+
+
 @compiled_lean
 def _is_inside(nodes: EdgeNodes, count: int, K: float, B: float) -> bool:
     """Whether a wall lies inside the edges of all loops: a ray towards stiffer walls crosses each an odd number of

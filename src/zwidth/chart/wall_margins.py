@@ -37,8 +37,10 @@ from zwidth.chart.margin_edges import (
     add_edge,
     add_node,
     copy_nodes,
+    copy_pieces_near,
     edge_nodes,
     fits,
+    fits_about,
 )
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
@@ -56,6 +58,8 @@ STEPS: Final = 48  # of stiffness that are tried besides those at which an edge 
 # Relative tolerances: of the first wall, of the last, and of the change at which nothing is solved again.
 COARSE, FINEST, SETTLED = 1e-4, 1e-13, 1e-11
 ROUNDS: Final = 12
+NARROW: Final = 1.02  # factor of damping up to which a gap may close round its middle
+BESIDE: Final = 0.02  # share of the stiffness within which the wall is solved again
 BLOCK: Final = 16  # devices whose edges are computed one after the other at each delay
 POOL: Final = 131072  # nodes of their edges
 
@@ -94,7 +98,7 @@ class MarginMemory(NamedTuple):
     """Working memory for devices of one size.
 
     edge    for one edge
-    nodes   of the edges of one device at all delays
+    nodes   of the edges of one device at all delays;   close  of those close to its wall
     pool    of the edges of BLOCK devices
     ends    (delays * BLOCK + 1,)  where the nodes of each edge end in the pool
     tried   stiffnesses that are tried
@@ -103,6 +107,7 @@ class MarginMemory(NamedTuple):
     edge: EdgeMemory
     circle: CircleFactors
     nodes: EdgeNodes
+    close: EdgeNodes
     pool: EdgeNodes
     ends: NDArray[np.int64]
     tried: Floats
@@ -113,6 +118,7 @@ def _memory(loops: LoopTable, delays: int) -> MarginMemory:
         edge_memory(loops, MOST_DEGREE, MOST_SAMPLES),
         factor_memory(loops),
         edge_nodes(NODES_EACH * delays, PARTS_EACH * delays),
+        edge_nodes(NODES_EACH * delays),
         edge_nodes(max(POOL, NODES_EACH * delays)),
         np.zeros(delays * BLOCK + 1, np.int64),
         np.empty(2 * NODES_EACH * delays + STEPS),
@@ -152,7 +158,7 @@ def _several(
             stiffness, settled = _refined(loops, i, N, delays, memory, a, b, stiffness)
             status[i] = (FOUND if stiffness > 0.0 else NO_WALL) if settled else DOUBTFUL
             if status[i] == FOUND:
-                out[i, 0], out[i, 1] = stiffness, _damping_in_gap(memory.nodes, b)
+                out[i, 0], out[i, 1] = stiffness, _damping_in_gap(memory.close, b)
 
 
 @compiled_lean
@@ -225,13 +231,13 @@ def _stiffest(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floats) 
     for k in range(m - 1, -1, -1):
         for K in (0.5 * (above + tried[k]), tried[k]):
             if above > K and fits(nodes, delays, K, a, b):
-                return _halved(nodes, delays, a, b, K, above, COARSE)
+                return _halved(nodes, delays, a, b, 0.0, K, above, COARSE)
             above = min(above, K)
     # the least tried may be above the only ones that fit
     for _ in range(40):
         K = 0.5 * above
         if fits(nodes, delays, K, a, b):
-            return _halved(nodes, delays, a, b, K, above, COARSE)
+            return _halved(nodes, delays, a, b, 0.0, K, above, COARSE)
         above = K
     return 0.0
 
@@ -251,49 +257,81 @@ def _sort(values: Floats, n: int) -> None:
 
 
 @compiled_apart
-def _halved(nodes: EdgeNodes, delays: int, a: float, b: float, low: float, high: float, tolerance: float) -> float:
-    """The stiffness between one that fits and one that does not at which that changes, to a relative tolerance."""
+def _halved(
+    nodes: EdgeNodes, delays: int, a: float, b: float, middle: float, low: float, high: float, tolerance: float
+) -> float:
+    """The stiffness between one that fits and one that does not at which that changes, to a relative tolerance.
+
+    middle  damping in the middle of the gap that is looked at; 0: whichever gap
+    """
     while high - low > tolerance * high:
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
+        between = 0.5 * (low + high)
+        if not low < between < high:
             break
-        if fits(nodes, delays, middle, a, b):
-            low = middle
+        if _fits(nodes, delays, a, b, middle, between):
+            low = between
         else:
-            high = middle
-    fits(nodes, delays, low, a, b)  # its gap stands
+            high = between
+    _fits(nodes, delays, a, b, middle, low)  # its gap stands
     return low
+
+
+@compiled_lean
+def _fits(nodes: EdgeNodes, delays: int, a: float, b: float, middle: float, K: float) -> bool:
+    return fits_about(nodes, K, a, b, middle) if middle > 0.0 else fits(nodes, delays, K, a, b)
 
 
 @compiled_apart
 def _refined(
+    loops: LoopTable, i: int, N: int, delays: int, memory: MarginMemory, a: float, b: float, stiffness: float
+) -> tuple[float, bool]:
+    """The wall solved again with nodes where the strip's sides cross the curves, until it does not change; and
+    whether it settled. Where the gap is wide, only with the pieces close to it."""
+    if stiffness == 0.0:
+        return 0.0, True
+    low, high = memory.nodes.gap[0], memory.nodes.gap[1]
+    # a gap above B = 0 may close altogether, one between two dampings cannot
+    if b > NARROW and low > 0.0:
+        middle = _damping_in_gap(memory.nodes, b)
+        near = stiffness * (1.0 - BESIDE) / a, stiffness * (1.0 + BESIDE) * a
+        if copy_pieces_near(memory.nodes, memory.close, *near, low / b, high * b):
+            found, settled = _settled(loops, i, N, delays, memory.close, memory.circle, a, b, middle, stiffness)
+            if settled:
+                return found, True
+    found, settled = _settled(loops, i, N, delays, memory.nodes, memory.circle, a, b, 0.0, stiffness)
+    for c in range(2):
+        memory.close.gap[c] = memory.nodes.gap[c]
+    return found, settled
+
+
+@compiled_apart
+def _settled(
     loops: LoopTable,
     i: int,
     N: int,
     delays: int,
-    memory: MarginMemory,
+    nodes: EdgeNodes,
+    circle: CircleFactors,
     a: float,
     b: float,
+    middle: float,
     stiffness: float,
 ) -> tuple[float, bool]:
-    """The wall solved again with nodes where the strip's sides cross the curves, until it does not change; and
-    whether it settled."""
-    if stiffness == 0.0:
-        return 0.0, True
-    nodes, tolerance, half = memory.nodes, COARSE, 10.0 * COARSE
+    """`_refined` with one set of nodes."""
+    tolerance, half, widest = COARSE, 10.0 * COARSE, BESIDE if middle > 0.0 else 0.5
     for _ in range(ROUNDS):
-        if not add_crossings(nodes, loops, i, N, memory.circle, stiffness / a, stiffness * a):
+        if not add_crossings(nodes, loops, i, N, circle, stiffness / a, stiffness * a):
             return 0.0, False
         before = stiffness
-        while half < 0.5:
+        while half < widest:
             low, high = before * (1.0 - half), before * (1.0 + half)
-            if fits(nodes, delays, low, a, b) and not fits(nodes, delays, high, a, b):
+            if _fits(nodes, delays, a, b, middle, low) and not _fits(nodes, delays, a, b, middle, high):
                 break
             half *= 8.0
-        if not half < 0.5:
+        if not half < widest:
             return 0.0, False
         tolerance = max(FINEST, 1e-3 * tolerance)
-        stiffness = _halved(nodes, delays, a, b, low, high, tolerance)
+        stiffness = _halved(nodes, delays, a, b, middle, low, high, tolerance)
         change = abs(stiffness / before - 1.0)
         if tolerance == FINEST and change <= SETTLED:
             return stiffness, True
@@ -333,5 +371,5 @@ def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float,
     stiffness = _stiffest(nodes, len(loops), a, b, np.empty(2 * len(nodes.K) + STEPS))
     if not stiffness > 0.0:
         return None
-    stiffness = float(_halved(nodes, len(loops), a, b, stiffness, stiffness * (1.0 + 2.0 * COARSE), FINEST))
+    stiffness = float(_halved(nodes, len(loops), a, b, 0.0, stiffness, stiffness * (1.0 + 2.0 * COARSE), FINEST))
     return stiffness, float(_damping_in_gap(nodes, b))
