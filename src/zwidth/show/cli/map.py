@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.measures.catalogue import MEASURES
+from zwidth.measures.wanted import WANTED_NUMBERS, WantedNumber
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
@@ -72,6 +73,13 @@ def _axis_range(name: str) -> Callable[[Callback], Callback]:
         help=f"Range along the plane's {'first' if name == 'x' else 'second'} axis [m]. Default: the "
         "workspace of the device file, or the reachable range.",
     )
+
+
+def _wanted_number(number: WantedNumber) -> Callable[[Callback], Callback]:
+    unit = f" [{number.unit}]" if number.unit else ""
+    meaning = number.meaning[0].upper() + number.meaning[1:]
+    name = number.name.replace("_", "-")
+    return click.option(f"--{name}", type=Finite(), metavar="NUMBER", help=f"{meaning}{unit}.")
 
 
 class MapCommand(Command):
@@ -140,6 +148,13 @@ class MapCommand(Command):
             metavar="F",
             help="Frequency of the hand's motion, for measures that depend on it [Hz].",
         ),
+        *(_wanted_number(one) for one in WANTED_NUMBERS[3:]),
+        click.option(
+            "--colliding-links",
+            metavar="A:B",
+            multiple=True,
+            help="Links that can collide, for link_clearance; repeatable. Default: all that are no neighbours.",
+        ),
         processor_option,
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
@@ -165,7 +180,12 @@ class MapCommand(Command):
         frequency = case["frequency"]
         if frequency is not None and not (math.isfinite(frequency) and frequency > 0.0):
             raise BadInput(f"--frequency: must be positive, got {frequency:g}")
-        wall = WantedWall(case["stiffness"], case["damping"], frequency)
+        numbers = {one.name: case[one.name] for one in WANTED_NUMBERS}
+        for one in WANTED_NUMBERS[3:]:
+            value = numbers[one.name]
+            if value is not None and not one.allows(value):
+                raise BadInput(f"{as_option(one.name)}: must be {one.allowed}, got {value:g}")
+        wall = WantedWall(**numbers, colliding_links=case["colliding_links"] or None)
         return {"measures": measures, "requirements": required, "wall": wall}
 
     def repeated_options(self, case: CommandLine) -> dict[str, Any]:

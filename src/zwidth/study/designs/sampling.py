@@ -11,9 +11,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.measures.wanted import WANTED_BY_KEY
 from zwidth.study.designs.catalogue import Part
 
-WANTED: Final = ("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz")
+WANTED: Final = tuple(WANTED_BY_KEY)
 CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)
 
 

@@ -15,6 +15,7 @@ from zwidth.device.faults import DeviceError, KeyPath, nearest, plural
 from zwidth.device.toml_access import is_number, table, tables
 from zwidth.device.validation_messages import validation_messages
 from zwidth.measures.definition import Measure, Spelling, WantedWall
+from zwidth.measures.wanted import WANTED_NUMBERS
 from zwidth.memory_limit import check_memory
 from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
@@ -28,9 +29,7 @@ PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose value
 # Argument in Python -> what it is called as a key of a study file, or of its [workspace].
 KEYS: Final[dict[str, str]] = {
     "position": "at",
-    "stiffness": "stiffness_N_per_m",
-    "damping": "damping_Ns_per_m",
-    "frequency": "frequency_Hz",
+    **{one.name: one.key for one in WANTED_NUMBERS},
     "axes": "plane",
     "cells": "count",
 }
@@ -57,7 +56,7 @@ class Study:
     sampling   the designs
     columns    the measures, one column of the result each
     at, direction, assembly, model   circumstances that no axis sets; None: those of the device file
-    wall       stiffness, damping and frequency that some measures need, as far as no axis sets them
+    wall       the wanted wall and what else some measures need, as far as no axis sets it
     plane      grid over the workspace; None where no measure is over it
     task       where measures are taken instead; None without a [task]
     user_measures  measures of the user's own, by name
@@ -156,7 +155,10 @@ def check_study(
         direction=checked.direction,
         assembly=checked.assembly,
         model=checked.model,
-        wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
+        wall=WantedWall(
+            **{one.name: getattr(checked, one.key) for one in WANTED_NUMBERS},
+            colliding_links=checked.colliding_links,
+        ),
         plane=plane,
         task=task,
         user_measures=user_measures or {},

@@ -107,6 +107,15 @@ def sweep(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    spectral_radius: float | None = None,
+    stiffness_margin: float | None = None,
+    damping_margin: float | None = None,
+    delay_margin: float | None = None,
+    lowest_frequency: float | None = None,
+    highest_frequency: float | None = None,
+    force: float | None = None,
+    link_radius: float | None = None,
+    colliding_links: Sequence[str] | None = None,
     paired: bool = False,
     plane: PlaneGrid | None = None,
     user_measures: Mapping[str, Measure] | None = None,
@@ -121,12 +130,13 @@ def sweep(
 
     axes           path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly,
                    model, operator (names, files, "none"), and of the wanted wall stiffness_N_per_m,
-                   damping_Ns_per_m and frequency_Hz
+                   damping_Ns_per_m, frequency_Hz and the other numbers of `measures.wanted.WANTED_NUMBERS`
     measures       one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or
                    measures
     position, direction, assembly, model    of all designs, as for `Device.at`
     stiffness, damping, frequency           of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures
                                                 about them
+    spectral_radius ... colliding_links     what else some measures need, as in `measures.wanted.WantedWall`
     paired         True: not every combination, but as many designs as each axis has values: the n-th design has
                    the n-th value of every axis, such as numbers drawn at random
     plane          the workspace, for measures over it (`study.workspace.plane_grid`); left out: 15 by 15 points of
@@ -159,6 +169,15 @@ def sweep(
         stiffness=stiffness,
         damping=damping,
         frequency=frequency,
+        spectral_radius=spectral_radius,
+        stiffness_margin=stiffness_margin,
+        damping_margin=damping_margin,
+        delay_margin=delay_margin,
+        lowest_frequency=lowest_frequency,
+        highest_frequency=highest_frequency,
+        force=force,
+        link_radius=link_radius,
+        colliding_links=colliding_links,
         paired=paired,
         plane=plane,
         user_measures=user_measures,

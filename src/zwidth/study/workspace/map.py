@@ -16,6 +16,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import NO_POSTURE, STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
 from zwidth.measures.evaluate import evaluate
+from zwidth.measures.wanted import WANTED_NUMBERS
 from zwidth.model.argument_checks import require
 from zwidth.processors import Processor
 from zwidth.progress import Progress
@@ -305,11 +306,9 @@ def _attributes(job: MapJob) -> dict[str, Any]:
     device, plane, direction = job.device, job.plane, job.direction
     assert device.mechanism is not None
     rendered = direction if isinstance(direction, str) else device.direction(direction).tolist()
-    wanted = {
-        "wanted_stiffness_N_per_m": job.wall.stiffness,
-        "wanted_damping_Ns_per_m": job.wall.damping,
-        "wanted_frequency_Hz": job.wall.frequency,
-    }
+    wanted = {f"wanted_{one.key}": getattr(job.wall, one.name) for one in WANTED_NUMBERS}
+    if job.wall.colliding_links is not None:
+        wanted["wanted_colliding_links"] = ", ".join(job.wall.colliding_links)
     return {
         "name": device.name,
         "device": device.label,
