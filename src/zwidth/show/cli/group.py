@@ -26,6 +26,7 @@ COMMANDS: Final = {
     "load": ("load", "LoadCommand"),
     "map": ("map", "MapCommand"),
     "sweep": ("sweep", "SweepCommand"),
+    "export": ("export", "ExportCommand"),
     "report": ("report", "ReportCommand"),
     "sensitivity": ("sensitivity", "SensitivityCommand"),
     "felt": ("felt", "FeltCommand"),

@@ -269,6 +269,12 @@ def _identification(ax: Axes, result: Any) -> None:
     draw_identification(ax, result)
 
 
+def _safe_walls(ax: Axes, result: Any) -> None:
+    from zwidth.show.figures.safe_walls import draw_safe_walls
+
+    draw_safe_walls(ax, result)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "CommonChart": _robust,
@@ -296,4 +302,5 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Sweep": _sweep,
     "CommonArea": _common_area,
     "Identification": _identification,
+    "SafeWalls": _safe_walls,
 }

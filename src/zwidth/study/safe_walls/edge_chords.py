@@ -36,6 +36,7 @@ K0, B0, K1, B1, SAG_K, SAG_B = range(6)
 # A chord of four between two samples lies an eighth of a second difference beside its curve; twice that is allowed.
 SAG: Final = 0.25
 RING_SAG: Final = 1e-6  # of a ring's extent: its chords stay this close to the edge (`chart.arc_kernels.CHORD`)
+STRAIGHT: Final = 1e-12  # of a ring's extent: along chords that change less the edge does not
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,10 @@ def _charted_alone(point: OperatingPoint) -> Floats:
     chart = chart_at(point) if point.charted_by_response else stability_chart(point.loop, decay=False)
     each = []
     for ring in chart.regions:
-        sag = RING_SAG * np.ptp(ring, axis=0)
-        each.append(np.column_stack([ring[:-1], ring[1:], np.broadcast_to(sag, (len(ring) - 1, 2))]))
+        size = np.ptp(ring, axis=0)
+        # a chord along an axis is straight, above all the line of real roots at K = 0
+        sag = np.where(np.abs(np.diff(ring, axis=0)) > STRAIGHT * size, RING_SAG * size, 0.0)
+        each.append(np.column_stack([ring[:-1], ring[1:], sag]))
     return np.concatenate([np.empty((0, 6)), *each])
 
 

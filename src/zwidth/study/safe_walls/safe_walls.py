@@ -128,8 +128,8 @@ def safe_walls_job(
         )
     if device.load is not None:
         raise SafeWallsError(
-            "a table holds for a device without load, and its walls would hang on how hard the hand pushes; leave "
-            "out the load"
+            "a table holds for a device without load: its walls would hang on how hard the hand pushes",
+            Advice("leave the load out, with {}", "set", "load=unset"),
         )
     if device.mechanism is not None and device.renders_moments(None):
         raise SafeWallsError("the device renders moments about an axis, and a table is about forces; render a force")
@@ -145,7 +145,7 @@ def safe_walls_job(
     if size_limit is not None and (size := table_size(question)) > size_limit:
         raise SafeWallsError(
             f"the table takes {size} bytes, more than the {size_limit} of its limit",
-            Advice("take fewer {} or {}", "cells", None),
+            Advice("take fewer with {}, or fewer levels", "cells"),
         )
     _check_point(question)
     return SafeWallsJob(question)

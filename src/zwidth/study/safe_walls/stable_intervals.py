@@ -127,8 +127,10 @@ def _common(intervals: Floats, room: Floats) -> tuple[float, float]:
         left = 0
         for k in range(count):
             for g in range(GAPS):
+                if not intervals[i, g, 0] < intervals[i, g, 1]:  # nan, of which max and min say nothing
+                    break
                 low, high = max(room[now, k, 0], intervals[i, g, 0]), min(room[now, k, 1], intervals[i, g, 1])
-                if low < high and left < room.shape[1]:  # of nan neither is
+                if low < high and left < room.shape[1]:
                     room[1 - now, left, 0], room[1 - now, left, 1] = low, high
                     left += 1
         now, count = 1 - now, left
