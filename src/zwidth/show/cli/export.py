@@ -275,8 +275,10 @@ def _rows(table: SafeWalls) -> Iterator[tuple[str, str]]:
     if grid.dimensions:
         cells = " x ".join(map(str, grid.counts))
         yield "cells", f"{int((table.level > 0).sum())} of {cells} have safe walls"
-    spread = amount(float(K[0]), "N/m") if K.min() == K.max() else f"{amount(float(K.min()), 'N/m')} to " + amount(
-        float(K.max()), "N/m"
+    spread = (
+        amount(float(K[0]), "N/m")
+        if K.min() == K.max()
+        else f"{amount(float(K.min()), 'N/m')} to " + amount(float(K.max()), "N/m")
     )
     yield "largest stiffness", spread
     one = table.outside

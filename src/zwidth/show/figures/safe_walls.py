@@ -51,7 +51,9 @@ def _bands(ax: Axes, table: SafeWalls) -> None:
         low, high = table.ranges[0, 0, j]
         start, end = (table.stiffness_of_level(0, 0, level) for level in (j, j + 1))
         if low <= high:
-            ax.add_patch(Rectangle((start, low), end - start, high - low, facecolor=GREY, alpha=0.35, linewidth=0.0))
+            ax.add_patch(
+                Rectangle((start, low), end - start, high - low, facecolor=GREY, alpha=0.35, linewidth=0.0)
+            )
     one = table.rectangle(0)
     ax.add_patch(
         Rectangle((0.0, one.low), one.stiffness, one.high - one.low, fill=False, edgecolor=BLACK, linewidth=1.2)

@@ -132,9 +132,7 @@ def _direction(table: SafeWalls) -> str:
 def _too_large(size: int) -> str:
     if size <= AVR_REACH:
         return ""
-    return (
-        '#error "a table of more than 32767 bytes is beyond what 8-bit boards read; export fewer cells, or levels"\n'
-    )
+    return '#error "a table of more than 32767 bytes is beyond what 8-bit boards read; export fewer cells, or levels"\n'
 
 
 def _grid(table: SafeWalls) -> str:

@@ -5,7 +5,8 @@ The walls of a cell are a function of its postures and directions, known at samp
 1. the tightest over a lattice of postures and directions that holds the cell's corners;
 2. narrowed by what the lattice takes away from one with every second point only. A smooth limit loses an error that
    falls with the square of the spacing, so that a third of this is still to come; all of it is taken;
-3. attacked by further samples, half of them random and half beside those that were tightest. One that uses up more
+3. searched from its tightest sample, in ever smaller steps: limits have kinks over the direction, which no lattice hits;
+4. attacked by further samples, half of them random and half beside those that were tightest. One that uses up more
    than half of what a limit was narrowed by moves it, and doubles that. This ends after QUIET rounds without one.
 
 At each sample nothing is left to chance: all walls of the rectangle are stable there, by the exact edge.
@@ -30,12 +31,19 @@ Floats = NDArray[np.float64]
 
 POSTURES: Final = 3  # of the lattice, along each axis of a cell
 # Of the lattice, along each component of a direction: by dimensions, for one sector a face and for smaller ones
-DIRECTIONS: Final = {2: (9, 5), 3: (5, 3)}
+DIRECTIONS: Final = {2: (17, 9), 3: (7, 5)}
+# A lattice is halved until no limits are narrowed by more than this share of the widest range, or so often
+FINE: Final = 0.05
+HALVINGS: Final = 2
 SEARCHED: Final = 32  # bands in which the largest stiffness of a cell is looked for
-LEAST: Final = 0.002  # share of an interval by which its limits are narrowed at least
+LEAST: Final = 0.002  # share of the widest range of a cell's bands by which each limit is narrowed at least
 ROUND: Final = 64  # samples in a round of the attack, for each hand
 QUIET: Final = 4  # rounds without a finding that end the attack
 ROUNDS: Final = 40  # most rounds of it
+TURNS: Final = 9  # of the search
+EACH: Final = 4  # samples of each limit in a turn
+STEP: Final = 0.3  # share of a cell, and of a sector, by which they differ in the first turn
+SHRINK: Final = 0.55  # from turn to turn
 NEARBY: Final = 0.15  # share of a cell, or a sector, by which samples beside the tightest differ from it
 HALF: Final = 0.5  # share of a narrowing that a sample may use up
 # A band begins at this share of the largest stiffness instead of 0: a device that stands nowhere has a root at
@@ -121,9 +129,21 @@ class _Samples:
     def __getitem__(self, rows: NDArray[np.int64]) -> _Samples:
         return _Samples(self.posture[rows], self.sector[rows], self.direction[rows])
 
+    def __len__(self) -> int:
+        return len(self.sector)
+
+    def with_row(self, row: int, other: _Samples, its: int) -> _Samples:
+        """These samples with one of others in place of one."""
+        parts = [array.copy() for array in (self.posture, self.sector, self.direction)]
+        for part, array in zip(parts, (other.posture, other.sector, other.direction), strict=True):
+            part[row] = array[its]
+        return _Samples(*parts)
+
     def __add__(self, other: _Samples) -> _Samples:
         pairs = zip(
-            (self.posture, self.sector, self.direction), (other.posture, other.sector, other.direction), strict=True
+            (self.posture, self.sector, self.direction),
+            (other.posture, other.sector, other.direction),
+            strict=True,
         )
         return _Samples(*(np.concatenate(pair) for pair in pairs))
 
@@ -138,27 +158,35 @@ class _Slot:
     def walls(self) -> tuple[float, Floats]:
         """Largest stiffness, and ranges (levels, 2) of damping. Raises _Failed."""
         question = self.question
-        samples, coarse = self._lattice()
-        edges = self._edges(samples)
-        top = self._top(edges)
-        bands = self._bands(top)
-        intervals = stable_intervals(edges, bands)
-        limits = _Limits(intervals, np.tile(coarse, len(question.devices)), question.narrowing)
+        for halvings in range(HALVINGS + 1):
+            samples, coarse = self._lattice(halvings)
+            edges = self._edges(samples)
+            top = self._top(edges)
+            bands = self._bands(top)
+            intervals = stable_intervals(edges, bands)
+            limits = _Limits(intervals, np.tile(coarse, len(question.devices)), question.narrowing)
+            if limits.narrowed_share <= FINE or not question.grid.dimensions:
+                break
         if question.narrowing and question.grid.dimensions:
-            self._attack(samples, limits, bands)
+            tightest = _Tightest(samples, intervals, limits.centre)
+            self._search(tightest, limits, bands)
+            self._attack(tightest, limits, bands)
         ranges = np.array([_with_margin(*pair, question.margin) for pair in limits.ranges])
         if not (ranges[0, 0] < ranges[0, 1]):
             raise _Failed(NO_VALUE, "no range of damping is stable in all of the cell's postures and directions")
         return top / (1.0 + question.margin), ranges
 
-    def _lattice(self) -> tuple[_Samples, NDArray[np.bool_]]:
-        """Samples of the lattice, and which of them belong to that of every second point."""
+    def _lattice(self, halvings: int) -> tuple[_Samples, NDArray[np.bool_]]:
+        """Samples of the lattice, its spacing halved so often, and which of them belong to that of every second
+        point."""
         d = self.question.grid.dimensions
         if d == 0:
-            return _Samples(np.empty((1, 0)), np.zeros(1, dtype=np.int64), np.empty((1, 0))), np.ones(1, dtype=np.bool_)
-        postures = lattice(POSTURES, d)
-        per_side = DIRECTIONS[d][0 if self.question.sectors.parts == 1 else 1]
-        directions = lattice(per_side, d - 1)
+            return _Samples(np.empty((1, 0)), np.zeros(1, dtype=np.int64), np.empty((1, 0))), np.ones(
+                1, dtype=np.bool_
+            )
+        of_postures = ((POSTURES - 1) << halvings) + 1
+        of_directions = ((DIRECTIONS[d][0 if self.question.sectors.parts == 1 else 1] - 1) << halvings) + 1
+        postures, directions = lattice(of_postures, d), lattice(of_directions, d - 1)
         p, s, u = (
             index.ravel()
             for index in np.meshgrid(
@@ -167,7 +195,7 @@ class _Slot:
         )
         even = [
             (np.round(points * (side - 1)).astype(int) % 2 == 0).all(axis=1)
-            for points, side in ((postures, POSTURES), (directions, per_side))
+            for points, side in ((postures, of_postures), (directions, of_directions))
         ]
         return _Samples(postures[p], s, directions[u]), even[0][p] & even[1][u]
 
@@ -216,19 +244,27 @@ class _Slot:
         high = edge[1:] * (1.0 + question.margin) * (1.0 + BAND_OVERLAP)
         return np.column_stack([np.maximum(low, NOTHING * top), high])
 
-    def _attack(self, samples: _Samples, limits: _Limits, bands: Floats) -> None:
-        """Look for samples that the limits do not hold at. Raises _Failed where they are found without end."""
-        quiet, number = 0, len(samples.sector)
-        tightest = samples[limits.tightest % number]
-        for _ in range(ROUNDS):
-            tried = self._random(ROUND // 2) + self._beside(tightest, ROUND // 2)
+    def _search(self, tightest: _Tightest, limits: _Limits, bands: Floats) -> None:
+        """Go on from the tightest sample of each limit to tighter ones. Raises _Failed as `_edges` does."""
+        step = STEP
+        for _ in range(TURNS):
+            tried = self._around_each(tightest.samples, step)
             intervals = stable_intervals(self._edges(tried), bands)
-            moved = limits.meet(intervals)
-            quiet = 0 if len(moved) else quiet + 1
+            limits.tighten(intervals)
+            tightest.take(tried, intervals, limits.centre)
+            step *= SHRINK
+
+    def _attack(self, tightest: _Tightest, limits: _Limits, bands: Floats) -> None:
+        """Look for samples that the limits do not hold at. Raises _Failed where they are found without end."""
+        quiet = 0
+        for _ in range(ROUNDS):
+            chosen = tightest.samples[self.random.integers(len(tightest.samples), size=ROUND // 2)]
+            tried = self._random(ROUND // 2) + self._beside(chosen, NEARBY * self.random.random((ROUND // 2, 1)))
+            intervals = stable_intervals(self._edges(tried), bands)
+            quiet = 0 if limits.meet(intervals) else quiet + 1
+            tightest.take(tried, intervals, limits.centre)
             if quiet >= QUIET:
                 return
-            if len(moved):
-                tightest = tightest + tried[np.unique(moved % ROUND)]
         raise _Failed(UNDECIDED, "the walls differ too much within the cell; use smaller cells")
 
     def _random(self, count: int) -> _Samples:
@@ -236,13 +272,46 @@ class _Slot:
         sectors = np.array(self.sectors)[self.random.integers(len(self.sectors), size=count)]
         return _Samples(self.random.random((count, d)), sectors, self.random.random((count, d - 1)))
 
-    def _beside(self, samples: _Samples, count: int) -> _Samples:
-        """Random samples beside some of these."""
-        chosen = samples[self.random.integers(len(samples.sector), size=count)]
-        size = NEARBY * self.random.random((count, 1))
-        posture = chosen.posture + size * self.random.standard_normal(chosen.posture.shape)
-        direction = chosen.direction + size * self.random.standard_normal(chosen.direction.shape)
-        return _Samples(np.clip(posture, 0.0, 1.0), chosen.sector, np.clip(direction, 0.0, 1.0))
+    def _around_each(self, samples: _Samples, size: float) -> _Samples:
+        """EACH samples beside each of these: another posture, another direction, and twice both. Tight ones often lie
+        in a corner of their cell, which few steps in both keep."""
+        beside = [self._beside(samples, size) for _ in range(EACH)]
+        beside[0] = _Samples(beside[0].posture, samples.sector, samples.direction)
+        beside[1] = _Samples(samples.posture, samples.sector, beside[1].direction)
+        joined = beside[0]
+        for more in beside[1:]:
+            joined = joined + more
+        return joined
+
+    def _beside(self, samples: _Samples, size: float | Floats) -> _Samples:
+        """Random samples beside these, about so far away (n, 1)."""
+        posture = samples.posture + size * self.random.standard_normal(samples.posture.shape)
+        direction = samples.direction + size * self.random.standard_normal(samples.direction.shape)
+        return _Samples(np.clip(posture, 0.0, 1.0), samples.sector, np.clip(direction, 0.0, 1.0))
+
+
+class _Tightest:
+    """The tightest sample of each limit so far: of the lowest dampings of all bands, then of the highest."""
+
+    def __init__(self, samples: _Samples, intervals: Floats, centre: Floats) -> None:
+        first = np.zeros(2 * intervals.shape[1], dtype=np.int64)
+        self.samples, self.damping = samples[first], np.full(len(first), -np.inf)
+        self.take(samples, intervals, centre)
+
+    def take(self, samples: _Samples, intervals: Floats, centre: Floats) -> None:
+        """Keep those of n further samples that are tighter.
+
+        intervals  (h n, bands, GAPS, 2)  of the samples with each of h hands
+        centre     (bands,)  damping that the intervals hold; nan for a band that has none
+        """
+        bands = len(centre)
+        for j in np.flatnonzero(~np.isnan(centre)):
+            own = _around(intervals[:, j], centre[j])
+            for side, tightness in enumerate((own[:, 0], -own[:, 1])):
+                worst, k = int(np.argmax(np.nan_to_num(tightness, nan=-np.inf))), side * bands + j
+                if tightness[worst] > self.damping[k]:
+                    self.damping[k] = tightness[worst]
+                    self.samples = self.samples.with_row(k, samples, worst % len(samples))
 
 
 class _Limits:
@@ -254,8 +323,11 @@ class _Limits:
 
     def __init__(self, intervals: Floats, coarse: NDArray[np.bool_], narrowing: bool) -> None:
         count = intervals.shape[1]
-        self.centre, self.extreme, self.narrowing = np.full(count, np.nan), np.zeros((count, 2)), np.zeros((count, 2))
-        tightest = []
+        self.centre, self.extreme, self.narrowing = (
+            np.full(count, np.nan),
+            np.zeros((count, 2)),
+            np.zeros((count, 2)),
+        )
         for j in range(count):
             low, high = common_interval(intervals[:, j])
             if not low < high:
@@ -263,11 +335,18 @@ class _Limits:
             self.centre[j] = 0.5 * (low + high)
             own = _around(intervals[:, j], self.centre[j])
             self.extreme[j] = own[:, 0].max(), own[:, 1].min()
-            tightest += [int(own[:, 0].argmax()), int(own[:, 1].argmin())]
             lost = self.extreme[j] - (own[coarse, 0].max(), own[coarse, 1].min())
-            if narrowing:
-                self.narrowing[j] = np.maximum(np.abs(lost), LEAST * (high - low))
-        self.tightest = np.unique(np.array(tightest, dtype=np.int64))
+            self.narrowing[j] = np.abs(lost)
+        width = self.extreme[:, 1] - self.extreme[:, 0]
+        self.narrowing = np.maximum(self.narrowing, LEAST * width.max(initial=0.0)) if narrowing else self.narrowing * 0.0
+
+    @property
+    def narrowed_share(self) -> float:
+        """The most that limits are narrowed by in a band, as a share of the widest range: bands near the largest
+        stiffness are thin, and more samples make them little wider."""
+        known = ~np.isnan(self.centre)
+        width = (self.extreme[known, 1] - self.extreme[known, 0]).max(initial=0.0)
+        return float(self.narrowing.sum(axis=1)[known].max(initial=0.0)) / width if width > 0.0 else 0.0
 
     @property
     def ranges(self) -> Floats:
@@ -276,23 +355,24 @@ class _Limits:
         left = ~np.isnan(self.centre) & (low < high)
         return np.where(left[:, None], np.column_stack([low, high]), NONE)
 
-    def meet(self, intervals: Floats) -> NDArray[np.int64]:
-        """Move limits that further samples have used up; returns which samples (k,) have."""
-        used: list[int] = []
+    def tighten(self, intervals: Floats) -> None:
+        """Take the limits of further samples where they are tighter, what they are narrowed by as before."""
         for j in np.flatnonzero(~np.isnan(self.centre)):
             own = _around(intervals[:, j], self.centre[j])
             if np.isnan(own).any():  # no stable interval holds the middle: nothing is left of this band
                 self.centre[j] = np.nan
-                used += np.flatnonzero(np.isnan(own[:, 0])).tolist()
                 continue
-            beyond = np.column_stack([own[:, 0] - self.extreme[j, 0], self.extreme[j, 1] - own[:, 1]])
-            for side in range(2):
-                worst = int(beyond[:, side].argmax())
-                if beyond[worst, side] > HALF * self.narrowing[j, side]:
-                    self.extreme[j, side] = own[worst, side]
-                    self.narrowing[j, side] *= 2.0
-                    used.append(worst)
-        return np.array(used, dtype=np.int64)
+            self.extreme[j] = max(self.extreme[j, 0], own[:, 0].max()), min(self.extreme[j, 1], own[:, 1].min())
+
+    def meet(self, intervals: Floats) -> bool:
+        """Move the limits that further samples have used up, and double what they are narrowed by; returns whether
+        there are any."""
+        centre, before = self.centre.copy(), self.extreme.copy()
+        self.tighten(intervals)
+        moved = np.abs(self.extreme - before) > HALF * self.narrowing
+        self.extreme = np.where(moved, self.extreme, before)
+        self.narrowing = np.where(moved, 2.0 * self.narrowing, self.narrowing)
+        return bool(moved[~np.isnan(self.centre)].any() or (np.isnan(self.centre) != np.isnan(centre)).any())
 
 
 def _around(intervals: Floats, damping: float) -> Floats:

@@ -28,12 +28,12 @@ from zwidth.threads import in_chunks
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
-PIECES: Final = 4  # chords between two neighbouring samples of a curve
-MOST_CHORDS: Final = 1536  # of one loop; one with more is charted alone
-AT_ONCE: Final = 512  # loops whose chords are in memory at full length
+PIECES: Final = 8  # chords between two neighbouring samples of a curve
+MOST_CHORDS: Final = 3072  # of one loop; one with more is charted alone
+AT_ONCE: Final = 256  # loops whose chords are in memory at full length
 # Places in a chord: K and B of its first and its last wall, and how far the edge may lie beside it in K and in B.
 K0, B0, K1, B1, SAG_K, SAG_B = range(6)
-# A chord of four between two samples lies an eighth of a second difference beside its curve; twice that is allowed.
+# A chord of several between two samples lies an eighth of a second difference beside its curve; twice that is allowed.
 SAG: Final = 0.25
 RING_SAG: Final = 1e-6  # of a ring's extent: its chords stay this close to the edge (`chart.arc_kernels.CHORD`)
 STRAIGHT: Final = 1e-12  # of a ring's extent: along chords that change less the edge does not
@@ -210,9 +210,7 @@ def _add_curve(memory: EdgeMemory, k: int, out: Floats, n: int) -> int:
 
 
 @compiled_lean
-def _add_chord(
-    out: Floats, n: int, x: float, y: float, u: float, v: float, sag_K: float, sag_B: float
-) -> int:
+def _add_chord(out: Floats, n: int, x: float, y: float, u: float, v: float, sag_K: float, sag_B: float) -> int:
     """One more chord; the number of chords, -1 where memory is full or an end is not finite."""
     if n >= len(out) or not np.isfinite(x + y + u + v):
         return -1

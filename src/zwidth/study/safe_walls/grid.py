@@ -101,11 +101,15 @@ def cells_of(
     mechanism = device.mechanism
     if mechanism is None:
         if cells is not None or any(one is not None for one in ranges):
-            raise PlaneError("the device has no [mechanism], and so no workspace; its walls are the same everywhere")
+            raise PlaneError(
+                "the device has no [mechanism], and so no workspace; its walls are the same everywhere"
+            )
         none = np.empty(0)
         return CellGrid(np.empty((0, 3)), np.zeros(3), none, none, (), ())
     if mechanism.controls == ORIENTATION:
-        raise PlaneError("the drives control the orientation of the handle, and a table needs a handle that they move")
+        raise PlaneError(
+            "the drives control the orientation of the handle, and a table needs a handle that they move"
+        )
     drives = len(mechanism.drives.names)
     if drives < 2:
         raise PlaneError(
@@ -116,7 +120,9 @@ def cells_of(
     spread = np.linalg.svd(reach.positions - reach.positions.mean(axis=0), compute_uv=False)
     flat = not spread[2] > FLAT * spread[0]
     if not flat and drives < 3:
-        raise PlaneError("the handle has two drives and moves on a curved surface, and a table needs a plane or space")
+        raise PlaneError(
+            "the handle has two drives and moves on a curved surface, and a table needs a plane or space"
+        )
     _check_counts(cells, 2 if flat else 3)
     if flat:
         _refuse_third(ranges)
@@ -147,14 +153,18 @@ def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:
     if len(cells) != dimensions:
         text = ",".join(map(str, cells))
         advice = Advice("give {} as " + ("NX,NY" if dimensions == 2 else "NX,NY,NZ"), "cells")
-        raise PlaneError(f"the handle moves in {dimensions} dimensions, and {text} are {len(cells)} counts", advice)
+        raise PlaneError(
+            f"the handle moves in {dimensions} dimensions, and {text} are {len(cells)} counts", advice
+        )
     if min(cells) < 1:
         raise PlaneError(f"a table needs at least 1 cell along each axis, got {','.join(map(str, cells))}")
 
 
 def _refuse_third(ranges: Sequence[Sequence[float] | None]) -> None:
     if len(ranges) > 2 and ranges[2] is not None:
-        raise PlaneError("the handle moves in a plane, whose two axes have the ranges x and y", Advice("leave out {}", "z"))
+        raise PlaneError(
+            "the handle moves in a plane, whose two axes have the ranges x and y", Advice("leave out {}", "z")
+        )
 
 
 def _counts(lengths: Floats) -> tuple[int, ...]:

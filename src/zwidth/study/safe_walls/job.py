@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numba
 import numpy as np
 
 from zwidth.measures.definition import OK, STATUS, Note
@@ -61,11 +62,16 @@ class SafeWallsJob:
     def compute(self, first: int, last: int) -> CellValues:
         """Cells first to last - 1, each by itself. Raises what `OperatingPoint.loop` raises."""
         columns = len(self.measures)
+        threads = numba.get_num_threads()
+        numba.set_num_threads(1)  # kernels take a millisecond here, and handing out their chunks would take longer
+        try:
+            cells = [cell_walls(self.cell_question, cell) for cell in range(first, last)]
+        finally:
+            numba.set_num_threads(threads)
         values = np.full((last - first, columns), np.nan)
         status = np.zeros((last - first, columns), dtype=np.uint8)
         notes: dict[tuple[int, str], tuple[int, int]] = {}
-        for n in range(last - first):
-            cell = cell_walls(self.cell_question, first + n)
+        for n, cell in enumerate(cells):
             status[n] = cell.status
             if cell.status == OK:
                 assert cell.top is not None

@@ -132,7 +132,9 @@ def safe_walls_job(
             Advice("leave the load out, with {}", "set", "load=unset"),
         )
     if device.mechanism is not None and device.renders_moments(None):
-        raise SafeWallsError("the device renders moments about an axis, and a table is about forces; render a force")
+        raise SafeWallsError(
+            "the device renders moments about an axis, and a table is about forces; render a force"
+        )
     grid = cells_of(device, ranges, cells, assembly)
     if directions > 1 and not grid.dimensions:
         raise SafeWallsError(

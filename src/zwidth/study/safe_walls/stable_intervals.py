@@ -46,7 +46,11 @@ def _fill_intervals(chords: Floats, offsets: Whole, bands: Floats, room: Floats,
             n = _obstacles(chords, first, last, low, high, room)
             top, count = -np.inf, 0
             for k in range(n):
-                if room[k, 0] > top and k > 0 and _is_inside(chords, first, last, low, high, 0.5 * (top + room[k, 0])):
+                if (
+                    room[k, 0] > top
+                    and k > 0
+                    and _is_inside(chords, first, last, low, high, 0.5 * (top + room[k, 0]))
+                ):
                     count = _keep_longest(out[i, j], count, top, room[k, 0])
                 top = max(top, room[k, 1])
 

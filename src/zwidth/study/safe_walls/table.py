@@ -189,7 +189,9 @@ class SafeWalls(Result):
         within = np.arange(len(cell)) - np.repeat(np.cumsum(counts) - counts, counts)
         slot, band = np.divmod(within, self.levels)
         columns: dict[str, Any] = {}
-        places = np.array([self.grid.index(int(one)) for one in range(self.grid.count)]).reshape(self.grid.count, -1)
+        places = np.array([self.grid.index(int(one)) for one in range(self.grid.count)]).reshape(
+            self.grid.count, -1
+        )
         for k, name in enumerate(self.grid.names):
             lines = self.grid.lines(k)
             columns[f"{name}_m"] = (0.5 * (lines[:-1] + lines[1:]))[places[cell, k]]
