@@ -338,7 +338,9 @@ class _Limits:
             lost = self.extreme[j] - (own[coarse, 0].max(), own[coarse, 1].min())
             self.narrowing[j] = np.abs(lost)
         width = self.extreme[:, 1] - self.extreme[:, 0]
-        self.narrowing = np.maximum(self.narrowing, LEAST * width.max(initial=0.0)) if narrowing else self.narrowing * 0.0
+        self.narrowing = (
+            np.maximum(self.narrowing, LEAST * width.max(initial=0.0)) if narrowing else self.narrowing * 0.0
+        )
 
     @property
     def narrowed_share(self) -> float:

@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 
 LONG_SIDE: Final = {2: 20, 3: 6}  # cells along the longest side, by default, of a plane and of a space
 MOST: Final = 10**6  # cells
+LONGEST: Final = 1e30  # component of a direction, which fits into 32 bits
 OVERLAP: Final = 1e-4  # share of a cell's size, and of a sector's, by which it reaches into its neighbours
 
 
@@ -207,12 +208,13 @@ class Sectors:
         return out
 
     def sector_of(self, direction: Sequence[float]) -> int | None:
-        """The sector of a direction (d,), by the exported program's rule; None for one that is zero or not finite."""
+        """The sector of a direction (d,), by the exported program's rule; None for one that is zero, or has a
+        component that is no number or beyond LONGEST."""
         d = self.dimensions
         face, longest = 0, 0.0
         for k in range(d):
             size = abs(float(direction[k]))
-            if not size <= 1.0e300:
+            if not size <= LONGEST:
                 return None
             if size > longest:
                 face, longest = k, size
