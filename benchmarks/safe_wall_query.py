@@ -1,10 +1,10 @@
 """How long a haptic loop waits for its safe gains: nanoseconds per query of the exported C header.
 
-The bundled five-bar, 12 bands: 20 x 10 cells for all directions, and 10 x 5 with a table for each of 4 sectors. A C
-program compiled with -O2 asks a million random positions, half of them inside; what it asks is drawn before, and
-what it is told is added up, so that nothing is left out. The peer is what one would write without a table, a binary
-search for the cell's largest stiffness by eigenvalues in NumPy, one position: the computation that a loop at 1 kHz
-has no time for. Beside them, how long the whole table takes to compute.
+The bundled five-bar, 12 bands: 20 x 10 cells for all directions, and 10 x 5 with a table for each of 4 sectors. A
+C program compiled with -O2 asks a million random positions, half of them inside; what it asks is drawn before,
+and what it is told is added up, so that nothing is left out. The peer is what one would write without a table, a
+binary search for the cell's largest stiffness by eigenvalues in NumPy, one position: the computation that a loop
+at 1 kHz has no time for. Beside them, how long the whole table takes to compute.
 
 Run `python benchmarks/safe_wall_query.py`; it needs a C compiler.
 """

@@ -164,8 +164,8 @@ def test_8_bit_boards_read_the_tables_from_their_program_memory(tmp_path, compil
 
 
 def test_with_doubles_of_32_bits_nothing_that_was_unsafe_becomes_safe(tmp_path, compiler, table):
-    """As on 8-bit boards: positions and stiffness are rounded, and may fall into the neighbour, whose cells and bands
-    overlap; what is said is nowhere more than the larger of both."""
+    """As on 8-bit boards: positions and stiffness are rounded, and may fall into the neighbour, whose cells and
+    bands overlap; what is said is nowhere more than the larger of both."""
     (tmp_path / HEADER_NAME).write_text(header_text(table).replace("double", "float"))
     program = PROGRAM.replace("double", "float").replace("sizeof(float)", "4")
     options = ("-std=c99", "-Wno-conversion", "-Wno-float-conversion")
@@ -207,7 +207,7 @@ def test_two_files_may_include_it(tmp_path, compiler, table):
     (tmp_path / HEADER_NAME).write_text(header_text(table))
     (tmp_path / "other.c").write_text('#include "safe_walls.h"\nint other(void);\nint other(void) { return 1; }\n')
     (tmp_path / "main.c").write_text(
-        '#include "safe_walls.h"\n#include "safe_walls.h"\nint other(void);\nint main(void) { return other() - 1; }\n'
+        2 * '#include "safe_walls.h"\n' + "int other(void);\nint main(void) { return other() - 1; }\n"
     )
     files = [str(tmp_path / name) for name in ("main.c", "other.c")]
     done = subprocess.run(

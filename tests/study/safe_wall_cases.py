@@ -71,7 +71,7 @@ class Tried:
 
 
 def try_table(table, count, seed):
-    """Try walls by eigenvalues: of the rectangle, of a band along a direction; a third at the ends of their ranges."""
+    """Try walls by eigenvalues: of rectangles, and of bands along a direction; a third at the ends of a range."""
     rng = np.random.default_rng(seed)
     grid, d = table.grid, table.grid.dimensions
     places = grid.low + rng.random((count, d)) * (grid.high - grid.low)
@@ -97,7 +97,7 @@ def try_table(table, count, seed):
 
 
 def largest_radii(table, places, directions, K, B):
-    """Spectral radii (n,) of walls at positions and along directions by the table's axes, largest over its hands."""
+    """Spectral radii (n,) of walls at positions and directions by the table's axes, the largest over its hands."""
     grid, radius = table.grid, np.zeros(len(places))
     for device in table.question.devices:
         point = device.at(
@@ -116,7 +116,7 @@ def largest_radii(table, places, directions, K, B):
 
 @dataclass(frozen=True)
 class Worst:
-    """The worst wall of a search: its spectral radius, cell, stiffness and damping, place in the cell, direction."""
+    """The worst wall of a search: spectral radius, cell, stiffness and damping, place in the cell, direction."""
 
     radius: float
     cell: int
@@ -127,8 +127,11 @@ class Worst:
 
 
 def search_table(table, seed, each=12, rounds=12):
-    """The wall with the largest spectral radius that a search finds at the corners of the bands of all directions: it begins at
-    random postures and directions of the corner's cell, and goes on beside the worst with ever smaller steps."""
+    """The wall with the largest spectral radius that a search finds at the corners of the bands of all directions.
+
+    It begins at random postures and directions of the corner's cell, and goes on beside the worst with ever
+    smaller steps.
+    """
     rng = np.random.default_rng(seed)
     grid, d = table.grid, table.grid.dimensions
     corners = [

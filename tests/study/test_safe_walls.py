@@ -108,7 +108,7 @@ def test_outside_the_table_are_the_walls_that_all_cells_have(table):
     far = [(9.0, 9.0), (np.nan, 0.2), (0.0, np.inf), (0.0, -1e300), (-0.3, 0.35)]
     assert all(table.at(place) == (1, table.outside) for place in far)
     K, low, high = table.outside.stiffness, table.outside.low, table.outside.high
-    assert 0.0 < K
+    assert K > 0.0
     assert low < high
     for cell in np.flatnonzero(table.level):
         band = 0
@@ -266,7 +266,7 @@ def test_devices_that_have_no_table_are_refused_with_what_to_do():
         safe_walls(load(TWO_MASS), directions=2)
     with pytest.raises(PlaneError, match="no workspace; its walls are the same everywhere"):
         safe_walls(load(TWO_MASS), x=(0.0, 1.0))
-    with pytest.raises(SafeWallsError, match="a device without load.*leave the load out, with set='load=unset'"):
+    with pytest.raises(SafeWallsError, match=r"a device without load.*leave the load out, with set='load=unset'"):
         safe_walls(load(MECHANISM).under((0.0, -5.0)))
     with pytest.raises(PlaneError, match=r"one drive and moves along a curve.*as a \[plant\]"):
         safe_walls(load("hapkit"))

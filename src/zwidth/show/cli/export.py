@@ -56,8 +56,8 @@ def _axis_range(name: str) -> Any:
 class ExportCommand(Command):
     """Write the safe walls of DEVICE over its workspace, for a haptic loop to clamp its gains by.
 
-    A table of cells: in each the walls that are stable in every posture, in every direction and with every hand; as a
-    C header without dependencies (.h), or as data.
+    A table of cells: in each the walls that are stable in every posture, every direction and with every hand; as
+    a C header without dependencies (.h), or as data.
     """
 
     name = "export"
@@ -107,8 +107,8 @@ class ExportCommand(Command):
             "--span",
             type=float,
             metavar="B",
-            help="Damping range that every cell offers at least [Ns/m]: the stiffest walls that have it. Default: the "
-            "walls whose rectangle is the largest.",
+            help="Damping range that every cell offers at least [Ns/m]: the stiffest walls that have it. Default: "
+            "the walls whose rectangle is the largest.",
         ),
         click.option(
             "--size-limit",
@@ -133,8 +133,8 @@ class ExportCommand(Command):
     )
     outputs = (HEADER, *FIGURES, *DATA, ARRAY)
     output_help = (
-        "Write a header (.h), a figure (.png .svg .pdf) or the data (.csv .json .nc). Default: safe_walls.h in this "
-        "folder."
+        "Write a header (.h), a figure (.png .svg .pdf) or the data (.csv .json .nc). Default: safe_walls.h in "
+        "this folder."
     )
     keys = (
         "file",

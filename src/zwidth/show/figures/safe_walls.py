@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def draw_safe_walls(ax: Axes, table: SafeWalls) -> None:
-    """The largest stiffness of each cell's rectangle, white where there is none; of cells in space those of the middle
-    layer. Without a workspace: the bands of stiffness with their ranges of damping, and the rectangle."""
+    """The largest stiffness of each cell's rectangle, white where there is none; of cells in space those of the
+    middle layer. Without a workspace: the bands of stiffness with their ranges of damping, and the rectangle."""
     if not (table.level > 0).any():
         draw_empty(ax, "no cell has safe walls")
     elif table.grid.dimensions == 0:

@@ -1,9 +1,10 @@
 """A table of safe walls as a C99 header without dependencies, which is C++ as well, and an Arduino sketch.
 
-The program looks up a cell and reads numbers of 32 bits that are rounded to the safe side; it allocates nothing and
-calls no library. What it computes is what `SafeWalls.at` and `SafeWalls.damping_at` compute, bit for bit where a
-double has 64 bits. Where it has 32, as on 8-bit boards, a position beside a border may fall into the neighbouring
-cell, and a stiffness beside a level into the neighbouring band: cells and bands overlap by more than that.
+The program looks up a cell and reads numbers of 32 bits that are rounded to the safe side; it allocates nothing
+and calls no library. What it computes is what `SafeWalls.at` and `SafeWalls.damping_at` compute, bit for bit
+where a double has 64 bits. Where it has 32, as on 8-bit boards, a position beside a border may fall into the
+neighbouring cell, and a stiffness beside a level into the neighbouring band: cells and bands overlap by more than
+that.
 """
 
 from __future__ import annotations
@@ -123,16 +124,16 @@ def _direction(table: SafeWalls) -> str:
     if table.question.slots == 1:
         return "The direction is not read and may be a null pointer: the range holds along every direction."
     return (
-        f"The direction has {table.grid.dimensions} components along the axes of the position, any length but zero and "
-        f"no component beyond 1e30;\n   a null pointer: every direction. There are {table.sectors.count} sectors of "
-        "directions, each with its opposite."
+        f"The direction has {table.grid.dimensions} components along the axes of the position, "
+        f"any length but zero and no component beyond 1e30;\n   a null pointer: every direction. There are "
+        f"{table.sectors.count} sectors of directions, each with its opposite."
     )
 
 
 def _too_large(size: int) -> str:
     if size <= AVR_REACH:
         return ""
-    return '#error "a table of more than 32767 bytes is beyond what 8-bit boards read; export fewer cells, or levels"\n'
+    return '#error "a table of more than 32767 bytes is beyond what 8-bit boards read; export fewer cells"\n'
 
 
 def _grid(table: SafeWalls) -> str:

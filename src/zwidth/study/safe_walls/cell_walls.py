@@ -1,11 +1,13 @@
 """Safe walls of one cell: of all postures in it, all directions of a sector, and all hands.
 
-The walls of a cell are a function of its postures and directions, known at samples. So a cell's limit of damping is
+The walls of a cell are a function of its postures and directions, known at samples. So a cell's limit of damping
+is
 
 1. the tightest over a lattice of postures and directions that holds the cell's corners;
-2. narrowed by what the lattice takes away from one with every second point only. A smooth limit loses an error that
+2. narrowed by what the lattice takes away from one with every second point only. A smooth limit has an error that
    falls with the square of the spacing, so that a third of this is still to come; all of it is taken;
-3. searched from its tightest sample, in ever smaller steps: limits have kinks over the direction, which no lattice hits;
+3. searched from its tightest sample, in ever smaller steps: limits have kinks over the direction, which no lattice
+   hits;
 4. attacked by further samples, half of them random and half beside those that were tightest. One that uses up more
    than half of what a limit was narrowed by moves it, and doubles that. This ends after QUIET rounds without one.
 
@@ -134,18 +136,16 @@ class _Samples:
 
     def with_row(self, row: int, other: _Samples, its: int) -> _Samples:
         """These samples with one of others in place of one."""
-        parts = [array.copy() for array in (self.posture, self.sector, self.direction)]
-        for part, array in zip(parts, (other.posture, other.sector, other.direction), strict=True):
-            part[row] = array[its]
-        return _Samples(*parts)
+        posture, sector, direction = self.posture.copy(), self.sector.copy(), self.direction.copy()
+        posture[row], sector[row], direction[row] = other.posture[its], other.sector[its], other.direction[its]
+        return _Samples(posture, sector, direction)
 
     def __add__(self, other: _Samples) -> _Samples:
-        pairs = zip(
-            (self.posture, self.sector, self.direction),
-            (other.posture, other.sector, other.direction),
-            strict=True,
+        return _Samples(
+            np.concatenate([self.posture, other.posture]),
+            np.concatenate([self.sector, other.sector]),
+            np.concatenate([self.direction, other.direction]),
         )
-        return _Samples(*(np.concatenate(pair) for pair in pairs))
 
 
 class _Slot:
@@ -171,7 +171,7 @@ class _Slot:
             tightest = _Tightest(samples, intervals, limits.centre)
             self._search(tightest, limits, bands)
             self._attack(tightest, limits, bands)
-        ranges = np.array([_with_margin(*pair, question.margin) for pair in limits.ranges])
+        ranges = np.array([_with_margin(low, high, question.margin) for low, high in limits.ranges.tolist()])
         if not (ranges[0, 0] < ranges[0, 1]):
             raise _Failed(NO_VALUE, "no range of damping is stable in all of the cell's postures and directions")
         return top / (1.0 + question.margin), ranges
@@ -200,8 +200,8 @@ class _Slot:
         return _Samples(postures[p], s, directions[u]), even[0][p] & even[1][u]
 
     def _edges(self, samples: _Samples) -> EdgeChords:
-        """The edges at n samples with each hand, hand after hand. Raises _Failed where a posture cannot be had, or an
-        edge is undecided."""
+        """The edges at n samples with each hand, hand after hand. Raises _Failed where a posture cannot be had, or
+        an edge is undecided."""
         question, grid = self.question, self.question.grid
         if grid.dimensions == 0:
             edges = EdgeChords.joined([edges_of_points(one.at(model=question.model)) for one in question.devices])
@@ -273,8 +273,8 @@ class _Slot:
         return _Samples(self.random.random((count, d)), sectors, self.random.random((count, d - 1)))
 
     def _around_each(self, samples: _Samples, size: float) -> _Samples:
-        """EACH samples beside each of these: another posture, another direction, and twice both. Tight ones often lie
-        in a corner of their cell, which few steps in both keep."""
+        """EACH samples beside each of these: another posture, another direction, and twice both. Tight ones often
+        lie in a corner of their cell, which few steps in both keep."""
         beside = [self._beside(samples, size) for _ in range(EACH)]
         beside[0] = _Samples(beside[0].posture, samples.sector, samples.direction)
         beside[1] = _Samples(samples.posture, samples.sector, beside[1].direction)
@@ -311,7 +311,7 @@ class _Tightest:
                 worst, k = int(np.argmax(np.nan_to_num(tightness, nan=-np.inf))), side * bands + j
                 if tightness[worst] > self.damping[k]:
                     self.damping[k] = tightness[worst]
-                    self.samples = self.samples.with_row(k, samples, worst % len(samples))
+                    self.samples = self.samples.with_row(int(k), samples, worst % len(samples))
 
 
 class _Limits:

@@ -54,11 +54,11 @@ class CellGrid:
     @property
     def step(self) -> Floats:
         """Size (d,) of a cell [m]."""
-        return (self.high - self.low) / np.array(self.counts, dtype=np.float64)
+        return np.asarray((self.high - self.low) / np.array(self.counts, dtype=np.float64))
 
     def lines(self, axis: int) -> Floats:
         """Coordinates [m] of the cells' borders along an axis, one more than there are cells."""
-        return self.low[axis] + self.step[axis] * np.arange(self.counts[axis] + 1)
+        return np.asarray(self.low[axis] + self.step[axis] * np.arange(self.counts[axis] + 1))
 
     def index(self, cell: int) -> tuple[int, ...]:
         """Place of a cell along each axis; the first axis goes round fastest."""
@@ -114,8 +114,8 @@ def cells_of(
     drives = len(mechanism.drives.names)
     if drives < 2:
         raise PlaneError(
-            "the handle has one drive and moves along a curve, and a table needs two drives or three; describe what "
-            "is felt along the curve as a [plant]"
+            "the handle has one drive and moves along a curve, and a table needs two drives or three; describe "
+            "what is felt along the curve as a [plant]"
         )
     reach = reachable_set(mechanism, assembly or device.reference_assembly)
     spread = np.linalg.svd(reach.positions - reach.positions.mean(axis=0), compute_uv=False)
@@ -130,7 +130,8 @@ def cells_of(
         lines = None if cells is None else (cells[0] + 1, cells[1] + 1)
         plane = plane_of(device, None, None, ranges[0], ranges[1], lines or (2, 2), assembly)
         low, high = np.array([plane.x[0], plane.y[0]]), np.array([plane.x[-1], plane.y[-1]])
-        axes, through, names = np.stack([plane.first, plane.second]), plane.through, plane.names
+        axes, through = np.stack([plane.first, plane.second]), plane.through
+        names: tuple[str, ...] = plane.names
     else:
         ends = []
         for axis, given in enumerate(ranges):

@@ -74,8 +74,8 @@ def safe_walls(
     levels      bands of stiffness in each cell, at most 255
     directions  into how many pieces each face of a square (a cube) of directions is cut: 1 for a table of all
                 directions; n for further tables of 2 n (3 n^2) sectors, at most 16
-    margin      share by which stiffness and damping may both be off, at least 0 and below 1: the walls of the table
-                are stable with both times any factors from 1 - margin to 1 + margin
+    margin      share by which stiffness and damping may both be off, at least 0 and below 1: the walls of the
+                table are stable with both times any factors from 1 - margin to 1 + margin
     span        damping that every rectangle has at least [N s/m]; left out: the rectangles of the largest area
     size_limit  bytes that the numbers of the exported program may take
     assembly, model   as for `Device.at`
@@ -83,8 +83,8 @@ def safe_walls(
     store       a folder that keeps the cells that are done
     progress    is called with "cells", cells done, and cells of all
     workers     processes at most; left out: one for each core
-    Raises      SafeWallsError  for arguments that are not allowed, a table beyond the limit, a device under load, one
-                                that renders moments, a measured response
+    Raises      SafeWallsError  for arguments that are not allowed, a table beyond the limit, a device under load,
+                                one that renders moments, a measured response
                 PlaneError      as `grid.cells_of` does
                 DeviceError     for hands that cannot be read, and as `Device.at` does
                 what `OperatingPoint.loop`, `executor.run` and `Store` raise
@@ -124,7 +124,8 @@ def safe_walls_job(
     _check_numbers(levels, directions, margin)
     if device.response is not None:
         raise SafeWallsError(
-            "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth identify"
+            "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth "
+            "identify"
         )
     if device.load is not None:
         raise SafeWallsError(

@@ -1,9 +1,9 @@
 """Intervals of damping in which all walls of a band of stiffnesses are stable.
 
-A rectangle of walls [K_low, K_high] x (B_low, B_high) that no edge of the stable set enters is stable as a whole or
-not at all: the number of roots outside the circle changes at an edge only. So the edges that lie in the band, seen
-along B, leave gaps, and one wall in each gap tells whether the gap is stable. A wall lies in the set if a ray from
-it crosses the edge an odd number of times.
+A rectangle of walls [K_low, K_high] x (B_low, B_high) that no edge of the stable set enters is stable as a whole
+or not at all: the number of roots outside the circle changes at an edge only. So the edges that lie in the band,
+seen along B, leave gaps, and one wall in each gap tells whether the gap is stable. A wall lies in the set if a
+ray from it crosses the edge an odd number of times.
 """
 
 from __future__ import annotations

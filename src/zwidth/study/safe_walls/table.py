@@ -116,7 +116,7 @@ class SafeWalls(Result):
             slot = EVERYWHERE if sector is None else 1 + sector
         if K >= 0.0:
             for j in range(self.levels):
-                if K <= self.stiffness_of_level(cell, slot, j + 1):
+                if self.stiffness_of_level(cell, slot, j + 1) >= K:
                     low, high = self.ranges[cell, slot, j].tolist()
                     return INSIDE if low <= high else NO_RANGE, low, high
         return NO_RANGE, *NONE
@@ -141,7 +141,7 @@ class SafeWalls(Result):
 
     @cached_property
     def rectangles(self) -> Floats:
-        """(cells, 3) stiffness and damping of each cell's rectangle, lowest and highest; nan where there is none."""
+        """(cells, 3) stiffness, lowest and highest damping of each cell's rectangle; nan where there is none."""
         out = np.full((self.grid.count, 3), np.nan)
         for cell in np.flatnonzero(self.level):
             one = self.rectangle(int(cell))
@@ -180,7 +180,7 @@ class SafeWalls(Result):
         }
 
     def table(self) -> dict[str, Any]:
-        """The bands of all cells as columns, a row for each cell, direction and band; a cell without walls has one.
+        """The bands of all cells as columns, a row for each cell, sector and band; a cell without walls has one.
 
         `sector` counts from 1, 0 is every direction; coordinates are those of the cell's middle.
         """
@@ -331,7 +331,7 @@ def _level(top: float, ranges: Floats, span: float | None) -> int:
 
 
 def _common_rectangle(top: Floats, ranges: Floats, span: float | None) -> Rectangle:
-    """The rectangle that is safe in all cells, chosen as in a cell; no stiffness and no damping where there is none.
+    """The rectangle that is safe in all cells, chosen as in a cell; of zeros where there is none.
 
     top     (cells,)
     ranges  (cells, levels, 2)
