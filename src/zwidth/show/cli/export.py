@@ -218,9 +218,9 @@ class ExportCommand(Command):
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
-        if store is not None and case["resume"] is None:
-            store.remove()
         if not (table.level > 0).any():
+            if store is not None and case["resume"] is None:
+                store.remove()
             raise NoAnswer(f"no cell has safe walls: {'; '.join(table.reasons)}")
         return table
 
@@ -230,6 +230,8 @@ class ExportCommand(Command):
     def write(
         self, case: CommandLine, result: SafeWalls, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        from zwidth.study.safe_walls.job import SafeWallsJob
+
         assert case.path is not None
         if case.writes([HEADER]):
             from zwidth.show.safe_walls.header import header_text
@@ -240,8 +242,17 @@ class ExportCommand(Command):
 
             write_dataset(case.path, result.dataset())
         else:
-            return super().write(case, result, document, reason)
+            super().write(case, result, document, reason)
+        if case["resume"] is None:  # now that what it kept is written
+            store = open_store(SafeWallsJob(result.question), case.path, None)
+            if store is not None:
+                store.remove()
         return reason
+
+    def caption(self, case: CommandLine, document: Mapping[str, Any]) -> list[str]:
+        held = ", ".join("nobody" if hand == "none" else hand for hand in document["hands"])
+        margin = f", gains off by {100.0 * document['margin']:.3g} %" if document["margin"] else ""
+        return [*super().caption(case, document), f"stable in every direction, held by {held}{margin}"]
 
     def write_others(self, case: CommandLine, result: SafeWalls) -> dict[str, Path]:
         if case["arduino"] is None:

@@ -21,7 +21,7 @@ METHOD: Final = 1  # changes with the way in which cells are searched, so that n
 class SafeWallsJob:
     """The cells of a table of safe walls; columns are the numbers of its tables.
 
-    question  what is asked of every cell
+    cell_question  what is asked of every cell
     """
 
     cell_question: CellQuestion
