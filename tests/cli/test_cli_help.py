@@ -33,6 +33,7 @@ def test_the_commands_are_those_promised():
         "map",
         "sweep",
         "tolerance",
+        "export",
         "report",
         "sensitivity",
         "felt",

@@ -22,6 +22,9 @@ from .robust.family import Range as Range
 from .robust.robust_study import RobustError as RobustError
 from .robust.robust_study import RobustStudy as RobustStudy
 from .robust.robust_study import robust_study as robust_study
+from .safe_walls.safe_walls import SafeWallsError as SafeWallsError
+from .safe_walls.safe_walls import safe_walls as safe_walls
+from .safe_walls.table import SafeWalls as SafeWalls
 from .sensitivity.result import Sensitivities as Sensitivities
 from .sensitivity.sensitivities import sensitivities as sensitivities
 from .sensitivity.what_if import Variant as Variant

@@ -38,6 +38,7 @@ COMMANDS: Final = (
         "show linkage.toml",
         "chart linkage.toml --with-direction 1,0",
         "chart linkage.toml --model two-mass --operator thesis-arm",
+        "export linkage.toml --x -0.01,0.01 --y 0.17,0.19 --cells 1,1 --levels 2 --workers 1 --output walls.h",
         "show arm.toml --at upper=0.7,lower=1.4",
         "load linkage.toml --count 3",
         "chart arm.toml --set load.force_N=[0,-2] --set load.settle=true",
