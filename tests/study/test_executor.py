@@ -14,7 +14,6 @@ from tests.interruption import HANG_TIMEOUT_S, interruptible
 from tests.study.executor_cases import (
     LEFT_OUT,
     FailingJob,
-    KilledProcessJob,
     NotedJob,
     PrintingJob,
     ProcessNumbersJob,
@@ -94,18 +93,6 @@ def test_what_a_job_raises_in_a_process_is_raised(capfd):
     found = run(PrintingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
     assert same_cells(found, RootsJob(40).compute(0, 40)), "what they print does not get between their replies"
     assert capfd.readouterr().err.count("talkative") == 6
-
-
-def test_a_killed_process_is_one_clear_error_and_what_is_done_is_kept(tmp_path):
-    job, path = KilledProcessJob(40, first=os.getpid()), tmp_path / "cells"
-    with pytest.raises(WorkerLost, match=r"was killed .SIGKILL., perhaps for lack of memory; fewer workers"):
-        run(job, Store(path, job), workers=1 + 1, batch=5, patience=NO_PATIENCE)
-    again = RootsJob(40)
-    kept = [first for first, _ in Store(path, again).stored_batches()]
-    assert kept[:2] == [0, 5]
-    assert 10 not in kept
-    assert same_cells(run(again, Store(path, again), workers=1), RootsJob(40).compute(0, 40))
-    assert (0, 5) not in again.computed_ranges
 
 
 def test_what_another_process_would_not_understand_stays_here():

@@ -48,7 +48,7 @@ def worker_options(command: Callback) -> Callback:
             "--time-limit",
             type=Finite(),
             metavar="SECONDS",
-            help="Give up a design or cell that takes longer; it is marked 'out of time', the others keep their values.",
+            help="Give up a design or cell that takes longer: it is 'out of time', the others keep their values.",
         ),
     ]
     for option in reversed(options):
@@ -98,7 +98,7 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
     """Run inside this block; says where the work is if it is stopped.
 
     Raises  UnfinishedRun  where no process computes, or a cluster has ended
-            BadInput       where the disk refuses, another run computes into the store, or a cluster does not answer
+            BadInput       where the disk refuses, another run computes here, or a cluster does not answer
     """
     from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
     from zwidth.study.jobs.recovery import CannotStart, WorkerLost

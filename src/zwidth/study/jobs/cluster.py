@@ -11,6 +11,8 @@ import queue
 import secrets
 from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
+from threading import Thread
+from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -58,6 +60,7 @@ class Cluster:
         self._run = secrets.token_hex(8)
         self._versions = versions()
         self._workers: dict[str, int] = {}  # address -> threads
+        self._silenced: dict[str, int] = {}  # dask's own messages: name -> level before
 
     def __enter__(self) -> Cluster:
         self._connect()
@@ -77,6 +80,9 @@ class Cluster:
             with suppress(Exception):
                 self._local.close(timeout=5)
             self._local = None
+        for name, level in self._silenced.items():
+            logging.getLogger(name).setLevel(level)
+        self._silenced = {}
 
     @property
     def slots(self) -> int:
@@ -111,8 +117,10 @@ class Cluster:
             return self._client
         from distributed import Client, LocalCluster
 
-        for name in ("distributed", "tornado.application"):  # their messages are not for users
-            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._silence()
+        if self.address != LOCAL and (fault := _no_answer(self.address)):
+            self.__exit__(None, None, None)
+            raise ClusterError(fault)
         where: Any = self.address
         if self.address == LOCAL:
             # one worker in this process: its threads wait for processes that compute, and nothing of the caller's
@@ -125,19 +133,25 @@ class Cluster:
                 protocol="inproc://",
                 silence_logs=logging.CRITICAL,
             )
-        client = Client.__new__(Client)
         try:
-            client.__init__(where, timeout=ANSWER, set_as_default=False)
-        except (OSError, ValueError, TypeError, KeyError) as error:
-            client.status = "closed"  # or it would try to say good-bye to a scheduler that does not answer
-            raise ClusterError(_no_answer(self.address, error)) from None
-        self._client = client
+            self._client = Client(where, timeout=ANSWER, set_as_default=False)
+        except (OSError, ValueError) as error:
+            self.__exit__(None, None, None)
+            raise ClusterError(f"{self.address}: is not the address of a scheduler: {error}") from None
         try:
             self._check_workers(self._client)
         except BaseException:
             self.__exit__(None, None, None)
             raise
         return self._client
+
+    def _silence(self) -> None:
+        """Let dask be silent here: what it has to say of a lost connection, an error says in one line."""
+        for name in [*logging.root.manager.loggerDict, "distributed"]:
+            logger = logging.getLogger(name)
+            if name.startswith(("distributed", "tornado", "asyncio")) and logger.level < logging.CRITICAL:
+                self._silenced.setdefault(name, logger.level)
+                logger.setLevel(logging.CRITICAL + 1)
 
     def _check_workers(self, client: Client) -> None:
         """Raise ClusterError where there is no worker, or one that would compute other numbers."""
@@ -173,6 +187,7 @@ class _Tasks:
         self.replies: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self.running: dict[Future, tuple[CellRange, int]] = {}  # future -> range, and how often it was lost
         self.events: list[str] = []
+        self._looked = monotonic()
 
     def finished(self, ranges: Iterable[CellRange]) -> Generator[tuple[CellRange, Batch], None, None]:
         """The ranges with their cells, as they are finished."""
@@ -218,15 +233,18 @@ class _Tasks:
         future.add_done_callback(self.replies.put)
 
     def _next(self) -> Future:
-        """A future that is finished, one way or other. Raises ClusterError where the scheduler has ended."""
+        """A future that is finished, one way or other. Raises ClusterEnded where the scheduler has ended."""
         while True:
+            if monotonic() - self._looked > LOOK:
+                self._look()
             with suppress(queue.Empty):
                 return self.replies.get(timeout=LOOK)
-            if not _is_connected(self.client):
-                raise ClusterEnded(f"the scheduler at {self.cluster.address} has ended")
-            self._look()
 
     def _look(self) -> None:
+        """See whether the scheduler is there, and all its workers."""
+        self._looked = monotonic()
+        if not _is_connected(self.client):
+            raise ClusterEnded(f"the scheduler at {self.cluster.address} has ended")
         for address in self.cluster.lost_workers():
             self.events.append(f"the worker at {address} left the cluster; what it computed is computed again")
 
@@ -234,7 +252,6 @@ class _Tasks:
         """The cells of a finished future; None where its range was sent once more."""
         from distributed import KilledWorker
 
-        self._look()
         if future.cancelled():
             raise ClusterEnded(f"the scheduler at {self.cluster.address} has ended, or was restarted")
         try:
@@ -257,8 +274,7 @@ def _is_connected(client: Client) -> bool:
 
 
 def _workers_of(client: Client) -> dict[str, int]:
-    workers = client.scheduler_info(n_workers=-1)["workers"]
-    return {str(address): int(facts["nthreads"]) for address, facts in workers.items()}
+    return {str(address): int(threads) for address, threads in client.nthreads().items()}
 
 
 def _versions_there() -> Callable[[], dict[str, str]]:
@@ -278,8 +294,39 @@ def _versions_there() -> Callable[[], dict[str, str]]:
     return ask
 
 
-def _no_answer(address: str, error: Exception) -> str:
-    why = f"no scheduler answers within {ANSWER:g} s" if isinstance(error, OSError) else f"is no address ({error})"
+def _no_answer(address: str) -> str:
+    """Why nobody can talk to a scheduler at this address; "" where it answers.
+
+    Asked beforehand, and by a thread that is left alone after a while: a client would wait for ever for a program
+    that takes the call and says nothing.
+    """
+    import asyncio
+
+    from distributed import Security
+    from distributed.comm import connect
+
+    found: list[str] = []
+
+    async def call() -> None:
+        connection = await connect(address, timeout=ANSWER, **Security().get_connection_args("client"))
+        connection.abort()
+
+    def ask() -> None:
+        try:
+            asyncio.run(call())
+        except (ValueError, TypeError, KeyError, RuntimeError) as error:
+            found.append(f"is no address ({error})")
+        except OSError:
+            return
+        else:
+            found.append("")
+
+    thread = Thread(target=ask, daemon=True)
+    thread.start()
+    thread.join(ANSWER + 1.0)
+    why = found[0] if found else f"no scheduler answers within {ANSWER:g} s"
+    if not why:
+        return ""
     return (
         f"{address}: {why}; start one with `dask scheduler`, and give the address that it prints, such as "
         "tcp://192.168.1.5:8786"

@@ -71,10 +71,10 @@ def end_processes(run: str) -> None:
 
 
 def different(own: dict[str, str], expected: dict[str, str]) -> str:
-    """The releases that differ, in words.
+    """The releases that are known and differ, in words.
 
     >>> different({"zwidth": "0.1", "numpy": "2.1"}, {"zwidth": "0.2", "numpy": "2.1"})
     'zwidth 0.1 instead of 0.2'
     """
-    wrong = (name for name, release in expected.items() if own.get(name) != release)
-    return ", ".join(f"{name} {own.get(name)} instead of {expected[name]}" for name in wrong)
+    wrong = (name for name, release in own.items() if expected.get(name) != release)
+    return ", ".join(f"{name} {own[name]} instead of {expected.get(name)}" for name in wrong)

@@ -317,7 +317,7 @@ def _compute_here_first(
         yield (first, last), batch
         left -= last - first
         # the first range may include compiling
-        slow = n > 0 and seconds / (last - first) * left > patience
+        slow = n > 0 and left > 0 and seconds / (last - first) * left > patience
         if slow and workers > 1 and (packed := pack_job(job)) is not None:
             rest = -(-left // plan.size)
             with open_executor(min(workers, rest)) as executor:
