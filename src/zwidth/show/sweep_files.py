@@ -24,7 +24,7 @@ from zwidth.study.designs.sweep_data import (
 if TYPE_CHECKING:
     from zwidth.study.designs.sweep import Sweep
 
-CHUNK: Final = 1 << 18  # designs in each chunk of a zarr folder, at most
+CHUNK: Final = 1 << 16  # designs in each chunk of a zarr folder, at most
 Columns = Mapping[str, Sequence[Any]]
 
 
@@ -148,7 +148,7 @@ def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
     """Chunks of consecutive designs: the last axes whole, a part of one, and single places of those before.
 
     >>> _chunks((3, 1000, 1000))
-    (1, 262, 1000)
+    (1, 65, 1000)
     """
     chunks, size = [1] * len(shape), 1
     for n in reversed(range(len(shape))):

@@ -8,6 +8,7 @@ from typing import Final
 
 BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
 TRIAL: Final = 0.05  # s of computation from which the time per cell is estimated
+MOST: Final = 32768  # cells in a batch, so that memory does not grow with the job
 SHARES: Final = 16  # least number of batches, so that no process waits long for the last one
 FAILED_TRIALS: Final = 3  # after which the size is no longer looked for
 GOLDEN: Final = 0.6180339887498949
@@ -25,7 +26,7 @@ def batch_size(compute: Callable[[int, int], object], count: int, slots: int) ->
     count    number of all cells
     slots    how many batches are computed at once
     """
-    most = max(1, count // max(SHARES, 4 * slots))
+    most = max(1, min(MOST, count // max(SHARES, 4 * slots)))
     size, place, failed = 2, 0.0, 0
     while size <= most and most > 1 and failed < FAILED_TRIALS:
         first = int(place * (count - size))
