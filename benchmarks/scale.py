@@ -93,9 +93,8 @@ def speed() -> None:
     ):
         ratios = sorted(a / b for a, b in zip(ours, other, strict=True))
         ratio = statistics.median(ratios)
-        print(
-            f"{name}: {ratio:.3f} ({ratios[0]:.3f} to {ratios[-1]:.3f}); target {target:.3f} {verdict(ratio, target)}"
-        )
+        span = f"{ratio:.3f} ({ratios[0]:.3f} to {ratios[-1]:.3f})"
+        print(f"{name}: {span}; target {target:.3f} {verdict(ratio, target)}")
 
 
 def cells_of_a_batch(executor: Executor, packed: object) -> int:
@@ -120,9 +119,7 @@ def memory(counts: tuple[int, ...]) -> None:
         rows.append((f"{count:.0e}", *used, seconds(taken), f"{count / taken:.0f}"))
     print_table(("designs", "command", "largest worker", "time", "designs/s"), rows)
     grown = peaks[-1] / peaks[0]
-    print(
-        f"the last over the first: {grown:.2f}; target {MEMORY_TARGET} {verdict(grown, MEMORY_TARGET)}"
-    )
+    print(f"the last over the first: {grown:.2f}; target {MEMORY_TARGET} {verdict(grown, MEMORY_TARGET)}")
 
 
 def sweep_in_a_process(count: int) -> tuple[float, float, float]:

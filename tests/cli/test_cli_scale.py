@@ -1,4 +1,4 @@
-"""`zwidth sweep` and `map` that lose processes, time, disk and clusters: what the command line says, and its files."""
+"""`zwidth sweep` and `map` that lose processes, time, disk and clusters: what is said, and what is kept."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from time import sleep
 
 import pytest
 
@@ -79,6 +80,7 @@ def test_a_killed_command_goes_on_where_it_was_and_a_second_one_waits(folder):
     running = started(*words)
     while not (chunks.is_dir() and len(list(chunks.iterdir())) > 1):
         assert running.poll() is None
+        sleep(0.05)
     (line,) = refusal_lines(*words)
     assert line.startswith(f"designs.csv.progress: process {running.pid} on ")
     assert line.endswith(" is computing into it; wait until that has ended, or name another folder")
@@ -136,6 +138,7 @@ def test_a_scheduler_that_is_killed_leaves_the_finished_work(folder):
         chunks = folder / "cells" / "status" / "c"
         while not (chunks.is_dir() and len(list(chunks.iterdir())) > 1):
             assert running.poll() is None
+            sleep(0.05)
         os.killpg(cluster.scheduler.pid, signal.SIGKILL)
         _, err = running.communicate(timeout=HANG_TIMEOUT_S)
     assert running.returncode == 70
@@ -158,8 +161,8 @@ def test_a_full_disk_is_one_line_and_what_is_done_is_kept(folder, monkeypatch):
     monkeypatch.setattr(Store, "write_batch", until_full)
     (line,) = refusal_lines("sweep", "study.toml", "--resume", "cells", "--workers", "1")
     assert line == (
-        "cells: cannot be written: no space left on device; name another folder; cells keeps the finished work; the "
-        "same command continues from it"
+        "cells: cannot be written: no space left on device; name another folder; "
+        "cells keeps the finished work; the same command continues from it"
     )
     monkeypatch.undo()
     os.chdir(folder)

@@ -130,7 +130,7 @@ class Cluster:
                 n_workers=1,
                 threads_per_worker=self._count,
                 processes=False,
-                dashboard_address=None,
+                dashboard_address=":0",  # any port: nobody looks at it
                 protocol="inproc://",
                 silence_logs=logging.CRITICAL,
             )

@@ -6,7 +6,7 @@ thread for each range.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from threading import Lock
 from typing import Final
 
@@ -20,6 +20,7 @@ _busy: dict[str, list[WorkerProcess]] = {}
 _ended: list[str] = []
 
 
+@cache
 def versions() -> dict[str, str]:
     """Releases of what results depend on; they are to be the same on all computers of a cluster."""
     import sys
