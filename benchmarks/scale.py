@@ -3,7 +3,8 @@
 Speed. The designs of a five-bar, in batches of about 100 ms: by one process, by two, by a dask cluster in this
 process with two threads, and by one whose scheduler and two workers are processes of their own, as on several
 computers. All are started before and warm; they take turns, and ratios are of neighbours, so that what else the
-computer does meets all alike. Each hands its batches to the same kind of process.
+computer does meets all alike. Each hands its batches to the same kind of process. Beside the times stands what all
+other programs take for a batch, in processor time: on a computer that is busy with other things it says more.
 
 Memory. `zwidth sweep` of a one-mass device with a store and a zarr folder as output, 1e5, 1e6 and 1e7 designs of a
 Latin hypercube: the largest resident memory of the command's process, and of its workers, and designs per second.
@@ -29,7 +30,7 @@ from tests.study.cluster_cases import running_cluster
 from zwidth.study.designs.study_file import study_of
 from zwidth.study.designs.sweep_job import sweep_job
 from zwidth.study.jobs.executor_interface import Executor, open_executor
-from zwidth.study.jobs.workers import pack_job
+from zwidth.study.jobs.workers import PackedJob, pack_job
 
 BATCH, BATCHES, REPEATS = 0.1, 40, 7
 DASK_TARGET, TWO_TARGET, MEMORY_TARGET = 1.10, 1 / 1.7, 1.3
@@ -77,14 +78,20 @@ def speed() -> None:
         size = cells_of_a_batch(executors["one process"], packed)
         ranges = [(1000 + n * size, 1000 + (n + 1) * size) for n in range(BATCHES)]
         times: dict[str, list[float]] = {name: [] for name in executors}
+        busy = dict.fromkeys(executors, 0.0)
+        around = [os.getpid(), cluster.scheduler.pid, *(worker.pid for worker in cluster.workers)]
         for _ in range(REPEATS):
             for name, executor in executors.items():
-                began = perf_counter()
+                before, began = processor_time(around), perf_counter()
                 list(executor.compute(packed, ranges))
                 times[name].append(perf_counter() - began)
+                busy[name] += processor_time(around) - before
     print(f"{BATCHES} batches of {size} designs, about {seconds(BATCH)} each; medians of {REPEATS}")
-    rows = [(name, seconds(statistics.median(each))) for name, each in times.items()]
-    print_table(("by", "time"), rows)
+    rows = [
+        (name, seconds(statistics.median(each)), seconds(busy[name] / (REPEATS * BATCHES)))
+        for name, each in times.items()
+    ]
+    print_table(("by", "time", "of processors, around each batch"), rows)
     one, two, here, there = times.values()
     for name, ours, other, target in (
         ("two processes over one", two, one, TWO_TARGET),
@@ -97,16 +104,34 @@ def speed() -> None:
         print(f"{name}: {span}; target {target:.3f} {verdict(ratio, target)}")
 
 
-def cells_of_a_batch(executor: Executor, packed: object) -> int:
-    """How many designs take about 100 ms."""
-    size = 50
-    while True:
-        began = perf_counter()
-        list(executor.compute(packed, [(0, size)]))  # type: ignore[arg-type]
-        taken = perf_counter() - began
-        if taken > BATCH / 2:
-            return max(1, int(size * BATCH / taken))
+def cells_of_a_batch(executor: Executor, packed: PackedJob) -> int:
+    """How many designs take about 100 ms, by the fastest of several times."""
+    size, taken = 100, 0.0
+    while taken < BATCH / 2:
         size *= 2
+        times = []
+        for _ in range(5):
+            began = perf_counter()
+            list(executor.compute(packed, [(0, size)]))
+            times.append(perf_counter() - began)
+        taken = min(times)
+    return int(size * BATCH / taken)
+
+
+def processor_time(roots: list[int]) -> float:
+    """Processor time [s] of programs and of those they have started, but for the processes that compute."""
+    total = 0.0
+    for process in roots:
+        try:
+            words = Path(f"/proc/{process}/cmdline").read_bytes()
+            fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if b"zwidth.study.jobs.workers" not in words:
+            total += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+            own = [child for child in children(process) if child not in roots]
+            total += processor_time(own)
+    return total
 
 
 def memory(counts: tuple[int, ...]) -> None:

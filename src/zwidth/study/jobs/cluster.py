@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import queue
 import secrets
-from collections import Counter
 from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from threading import Thread
@@ -186,7 +185,7 @@ class _Tasks:
         # sent once, and from worker to worker; the scheduler can have it made again where a worker has ended
         self.job = client.submit(_itself, job, key=f"zwidth-job-{job.key}-{secrets.token_hex(4)}")
         self.replies: queue.SimpleQueue[Future] = queue.SimpleQueue()
-        self.running: dict[Future, tuple[CellRange, int, str]] = {}  # range, how often it was lost, its worker
+        self.running: dict[Future, tuple[CellRange, int]] = {}  # future -> range, and how often it was lost
         self.events: list[str] = []
         self._looked = monotonic()
 
@@ -196,7 +195,7 @@ class _Tasks:
         self._fill(coming)
         while self.running:
             future = self._next()
-            task, lost, _ = self.running.pop(future, ((0, 0), -1, ""))
+            task, lost = self.running.pop(future, ((0, 0), -1))
             if lost < 0:
                 continue
             batch = self._result(future, task, lost)
@@ -219,7 +218,7 @@ class _Tasks:
             self._send(task, 0)
 
     def _send(self, task: CellRange, lost: int) -> None:
-        cluster, worker = self.cluster, self._least_busy()
+        cluster = self.cluster
         future = self.client.submit(
             compute_on_worker,
             self.job,
@@ -227,22 +226,11 @@ class _Tasks:
             cluster._run,
             cluster.time_limit,
             cluster._versions,
-            workers=[worker],
-            allow_other_workers=True,
             pure=False,
             key=f"zwidth-{cluster._run}-{task[0]}-{secrets.token_hex(4)}",
         )
-        self.running[future] = task, lost, worker
+        self.running[future] = task, lost
         future.add_done_callback(self.replies.put)
-
-    def _least_busy(self) -> str:
-        """The worker that waits soonest for more.
-
-        The scheduler would keep ranges back until a worker is free, which then waits until its next one comes.
-        """
-        threads = self.cluster._workers
-        sent = Counter(worker for _, _, worker in self.running.values())
-        return min(threads, key=lambda worker: sent[worker] / threads[worker])
 
     def _next(self) -> Future:
         """A future that is finished, one way or other. Raises ClusterEnded where the scheduler has ended."""
