@@ -15,10 +15,13 @@ from tests.study.cluster_cases import running_cluster
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
 from zwidth.measures.definition import FAILED, OUT_OF_TIME
 from zwidth.study.jobs import cluster as clusters
+from zwidth.study.jobs import cluster_worker
 from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
 from zwidth.study.jobs.executor import RecoveredWarning, run
 from zwidth.study.jobs.executor_interface import open_executor
+from zwidth.study.jobs.recovery import CannotStart
 from zwidth.study.jobs.store import Store
+from zwidth.study.jobs.workers import pack_job
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 
@@ -133,3 +136,20 @@ def test_dask_is_silent_here_and_its_levels_are_given_back(tmp_path: Path):
         warnings.simplefilter("ignore")
         assert logging.getLogger("distributed.client").level > logging.CRITICAL
     assert logging.getLogger("distributed.client").level == before
+
+
+def test_processes_of_a_run_that_was_killed_end_when_another_comes(monkeypatch):
+    monkeypatch.setattr(cluster_worker, "FORGOTTEN", 0.0)
+    packed = pack_job(ProcessNumbersJob(2))
+    assert packed is not None
+    expected = cluster_worker.versions()
+    (gone,) = {*cluster_worker.compute_on_worker(packed, 0, 1, "first", None, expected).cells.values[:, 0]}
+    os.kill(int(gone), 0)
+    cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(gone), 0)
+    cluster_worker.end_processes("second")
+    with pytest.raises(CannotStart, match="the run was ended"):
+        cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
+    with pytest.raises(CannotStart, match=r"a worker that joined the cluster has zwidth \S+ instead of 7"):
+        cluster_worker.compute_on_worker(packed, 0, 1, "third", None, expected | {"zwidth": "7"})

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from functools import cache, partial
 from threading import Lock
+from time import monotonic
 from typing import Final
 
 from zwidth.study.jobs.recovery import Batch, CannotStart, compute_range
 from zwidth.study.jobs.workers import PackedJob, WorkerProcess
 
 MOST_ENDED: Final = 1000  # runs that are remembered as ended
+FORGOTTEN: Final = 60.0  # s; the processes of a run that was killed are ended when another comes, after this time
 _lock = Lock()
 _idle: dict[str, list[WorkerProcess]] = {}  # by run
 _busy: dict[str, list[WorkerProcess]] = {}
+_used: dict[str, float] = {}  # when a process of the run was last taken or given back
 _ended: list[str] = []
 
 
@@ -43,9 +46,12 @@ def compute_on_worker(
     """
     if (own := versions()) != expected:
         raise CannotStart(f"a worker that joined the cluster has {different(own, expected)}")
+    if run not in _used:
+        _end_forgotten()
     with _lock:
         if run in _ended:
             raise CannotStart("the run was ended")
+        _used[run] = monotonic()
         idle = _idle.setdefault(run, [])
         worker = idle.pop() if idle else WorkerProcess(time_limit)
         _busy.setdefault(run, []).append(worker)
@@ -57,6 +63,7 @@ def compute_on_worker(
             if not ended:
                 _busy[run].remove(worker)
                 _idle[run].append(worker)
+                _used[run] = monotonic()
         if ended:
             worker.end()
 
@@ -66,9 +73,19 @@ def end_processes(run: str) -> None:
     with _lock:
         _ended.append(run)
         del _ended[:-MOST_ENDED]
+        _used.pop(run, None)
         workers = [*_idle.pop(run, []), *_busy.pop(run, [])]
     for worker in workers:
         worker.end()
+
+
+def _end_forgotten() -> None:
+    """End the processes of runs that have gone without a word: they were killed, or their connection was lost."""
+    with _lock:
+        since = monotonic() - FORGOTTEN
+        forgotten = [run for run, used in _used.items() if used < since and not _busy.get(run)]
+    for run in forgotten:
+        end_processes(run)
 
 
 def different(own: dict[str, str], expected: dict[str, str]) -> str:

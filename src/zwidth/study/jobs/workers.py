@@ -33,6 +33,7 @@ START: Final = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from zwidth.study.jobs.workers import work; work()"
 )
 GRACE: Final = 2.0  # s; a process that has not ended by then is killed
+TOGETHER: Final = 1.0  # s that several cells may take beyond the time limit of one, before they are cut apart
 LOADING: Final = 10.0  # s that a process may load code in until its first cells are there
 MOST_JOBS: Final = 8  # that a process holds
 STARTS: Final = 3  # tries to start a process
@@ -81,7 +82,8 @@ def pack_job(job: Job) -> PackedJob | None:
 class WorkerProcess:
     """One process, started when it is needed, and a new one after it was lost.
 
-    time_limit  s that a range may take before its process is ended; None: no limit. Compiling is not counted
+    time_limit  s that a cell may take before its process is ended; None: no limit. Compiling is not counted. Cells
+                together may take a second more: they are computed apart if they take longer
     """
 
     def __init__(self, time_limit: float | None = None) -> None:
@@ -101,6 +103,8 @@ class WorkerProcess:
         """
         fresh = self._prepare(job)
         limit = self.time_limit
+        if limit is not None and last - first > 1:
+            limit += TOGETHER
         if limit is not None and fresh and job.key in self._computed:
             known = self._computed[job.key]
             self._ask(("compute", job.key, known, known + 1), limit + LOADING)  # loads what all cells need
