@@ -153,3 +153,29 @@ def test_processes_of_a_run_that_was_killed_end_when_another_comes(monkeypatch):
         cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
     with pytest.raises(CannotStart, match=r"a worker that joined the cluster has zwidth \S+ instead of 7"):
         cluster_worker.compute_on_worker(packed, 0, 1, "third", None, expected | {"zwidth": "7"})
+
+
+def test_a_scheduler_that_falls_silent_ends_the_run(monkeypatch):
+    """It is there, and does nothing: the system has stopped it."""
+    monkeypatch.setattr(clusters, "SILENT", 1.0)
+    monkeypatch.setattr(clusters, "LEAVE", 1.0)
+    with running_cluster(1) as cluster:
+
+        def progress(stage, done, of):
+            if done == 30:
+                os.killpg(cluster.scheduler.pid, signal.SIGSTOP)
+
+        with pytest.raises(ClusterEnded, match=r"^the scheduler at tcp://127\S+ has not answered for 1 s$"):
+            run(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)
+
+
+def test_a_cluster_that_loses_all_its_workers_ends_the_run(monkeypatch):
+    monkeypatch.setattr(clusters, "SILENT", 1.5)
+    with running_cluster(1, "--no-nanny") as cluster:
+
+        def progress(stage, done, of):
+            if done == 30:
+                os.killpg(cluster.workers[0].pid, signal.SIGKILL)
+
+        with pytest.raises(ClusterEnded, match=r"^the scheduler at tcp://127\S+ has had no worker for 1\.5 s$"):
+            run(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)

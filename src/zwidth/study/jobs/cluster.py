@@ -11,6 +11,7 @@ import queue
 import secrets
 from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
+from functools import partial
 from threading import Thread
 from time import monotonic
 from types import TracebackType
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 LOCAL: Final = "local"
 INSTALL: Final = "pip install 'zwidth[cluster]'"
 ANSWER: Final = 10.0  # s in which a scheduler must answer, and have a worker
+SILENT: Final = 30.0  # s without an answer after which a scheduler that answered before is given up
+LEAVE: Final = 5.0  # s that saying good-bye may take
 LOOK: Final = 1.0  # s between two looks at whether the scheduler and its workers are there
 AHEAD: Final = 3  # ranges sent to each worker's thread beforehand, so that none waits for the next
 LOST: Final = 3  # times that the workers of a range may end, one after the other
@@ -60,6 +63,8 @@ class Cluster:
         self._run = secrets.token_hex(8)
         self._versions = versions()
         self._workers: dict[str, int] = {}  # address -> threads
+        self._last_seen = monotonic()  # when there was a worker
+        self._silent = False  # whether the scheduler no longer answers
         self._silenced: dict[str, int] = {}  # dask's own messages: name -> level before
 
     def __enter__(self) -> Cluster:
@@ -72,13 +77,13 @@ class Cluster:
         client, self._client = self._client, None
         if client is not None:
             with suppress(Exception):
-                if _is_connected(client):
-                    client.run(end_processes, self._run, on_error="ignore")
+                if _is_connected(client) and not self._silent:
+                    _within(LEAVE, lambda: client.run(end_processes, self._run, on_error="ignore"))
             with suppress(Exception):
-                client.close(timeout=2)
+                _within(LEAVE, lambda: client.close(timeout=2))
         if self._local is not None:
             with suppress(Exception):
-                self._local.close(timeout=5)
+                self._local.close(timeout=LEAVE)
             self._local = None
         for name, level in self._silenced.items():
             logging.getLogger(name).setLevel(level)
@@ -105,11 +110,21 @@ class Cluster:
             tasks.cancel()
 
     def lost_workers(self) -> list[str]:
-        """Addresses of workers that have left since this was called last; new ones are noted."""
+        """Addresses of workers that have left since this was called last; new ones are noted.
+
+        Raises  ClusterEnded  where the scheduler no longer answers, or has had no worker for a while
+        """
         assert self._client is not None
-        now = _workers_of(self._client)
+        now = _within(SILENT, partial(_workers_of, self._client))
+        if now is None:
+            self._silent = True
+            raise ClusterEnded(f"the scheduler at {self.address} has not answered for {SILENT:g} s")
         lost = [address for address in self._workers if address not in now]
-        self._workers = now or self._workers
+        self._workers = now
+        if now:
+            self._last_seen = monotonic()
+        elif monotonic() - self._last_seen > SILENT:
+            raise ClusterEnded(f"the scheduler at {self.address} has had no worker for {SILENT:g} s")
         return lost
 
     def _connect(self) -> Client:
@@ -206,9 +221,9 @@ class _Tasks:
 
     def cancel(self) -> None:
         """Take back what is not finished."""
-        if self.running and _is_connected(self.client):
+        if self.running and _is_connected(self.client) and not self.cluster._silent:
             with suppress(Exception):
-                self.client.cancel(list(self.running), force=True)
+                _within(LEAVE, lambda: self.client.cancel(list(self.running), force=True))
         self.running = {}
 
     def _fill(self, coming: Iterable[CellRange]) -> None:
@@ -266,6 +281,23 @@ class _Tasks:
 
 def _itself(job: PackedJob) -> PackedJob:
     return job
+
+
+def _within(seconds: float, call: Callable[[], Any]) -> Any:
+    """What a call returns; None where it does not return in time, or raises.
+
+    A call of dask waits for ever for a scheduler that is there and does nothing; a thread of its own does.
+    """
+    found: list[Any] = []
+
+    def run() -> None:
+        with suppress(Exception):
+            found.append(call())
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    return found[0] if found else None
 
 
 def _is_connected(client: Client) -> bool:
