@@ -26,6 +26,11 @@ from zwidth import measure
 @measure(unit="s")
 def slow(place):
     time.sleep(0.01)
+    with open("asked", "ab") as file:
+        file.write(b".")
+    here = os.environ["STARTER"] == str(os.getpid())
+    while not here and os.path.exists("hold") and os.path.getsize("asked") > 60:
+        time.sleep(0.05)
     return place.controller.sampling_period
 
 @measure(unit="s")
@@ -77,6 +82,7 @@ def started(*words: str) -> subprocess.Popen[str]:
 def test_a_killed_command_goes_on_where_it_was_and_a_second_one_waits(folder):
     words = ["sweep", "study.toml", "--output", "designs.csv", "--workers", "1"]
     chunks = folder / "designs.csv.progress" / "status" / "c"
+    (folder / "hold").write_text("in the middle of the study")
     running = started(*words)
     while not (chunks.is_dir() and len(list(chunks.iterdir())) > 1):
         assert running.poll() is None
@@ -86,6 +92,7 @@ def test_a_killed_command_goes_on_where_it_was_and_a_second_one_waits(folder):
     assert line.endswith(" is computing into it; wait until that has ended, or name another folder")
     running.send_signal(signal.SIGKILL)
     running.communicate(timeout=HANG_TIMEOUT_S)
+    (folder / "hold").unlink()
     assert run_command(*words).code == 0
     text = (folder / "designs.csv").read_text()
     assert not (folder / "designs.csv.progress").exists()
@@ -133,6 +140,7 @@ def test_a_cluster_that_does_not_answer_is_one_line(folder, monkeypatch):
 
 def test_a_scheduler_that_is_killed_leaves_the_finished_work(folder):
     words = ["sweep", "study.toml", "--resume", "cells"]
+    (folder / "hold").write_text("in the middle of the study")
     with running_cluster(1) as cluster:
         running = started(*words, "--cluster", cluster.address)
         chunks = folder / "cells" / "status" / "c"
@@ -142,6 +150,7 @@ def test_a_scheduler_that_is_killed_leaves_the_finished_work(folder):
         os.killpg(cluster.scheduler.pid, signal.SIGKILL)
         _, err = running.communicate(timeout=HANG_TIMEOUT_S)
     assert running.returncode == 70
+    (folder / "hold").unlink()
     said = [line for line in err.splitlines() if "Hosting" not in line]
     assert said[-1].startswith(f"zwidth: the scheduler at {cluster.address} has ended")
     assert said[-1].endswith("cells keeps the finished work; the same command continues from it")

@@ -103,6 +103,7 @@ class Cluster:
         Raises  ClusterError  where the scheduler ends, or the workers of a range again and again
         """
         client = self._connect()
+        self._last_seen = monotonic()
         tasks = _Tasks(self, client, job)
         try:
             yield from tasks.finished(iter(ranges))
