@@ -55,6 +55,7 @@ UNDECIDED: Final = 4
 FAILED: Final = 5
 BEYOND_LIMIT: Final = 6
 NO_EQUILIBRIUM: Final = 7
+OUT_OF_TIME: Final = 8  # of a design or cell that a run with a time limit gave up
 MISSING: Final = 255
 NO_POSTURE: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT)
 UNREACHED: Final = (*NO_POSTURE, NO_EQUILIBRIUM)
@@ -67,6 +68,7 @@ STATUS: Final = {
     FAILED: "failed",
     BEYOND_LIMIT: "beyond a joint limit",
     NO_EQUILIBRIUM: "no equilibrium",
+    OUT_OF_TIME: "out of time",
     MISSING: "not computed",
 }
 

@@ -10,6 +10,7 @@ from .designs.study_file import read_study as read_study
 from .designs.sweep import Sweep as Sweep
 from .designs.sweep import run_study as run_study
 from .designs.sweep import sweep as sweep
+from .jobs.executor_interface import open_executor as open_executor
 from .jobs.store import Store as Store
 from .load.bending import Bending as Bending
 from .load.bending import bending as bending

@@ -15,6 +15,7 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, processor_option, refuse_empty
+from zwidth.show.cli.resumable import check_workers, report_kept_work, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES
 
 if TYPE_CHECKING:
@@ -155,6 +156,7 @@ class MapCommand(Command):
             multiple=True,
             help="Links that can collide, for link_clearance; repeatable. Default: all that are no neighbours.",
         ),
+        worker_options,
         processor_option,
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
@@ -172,6 +174,9 @@ class MapCommand(Command):
             for name, one in MEASURES.items()
         ]
         return "\b\nMeasures:\n" + "\n".join(lines) + "\n\n" + super().epilog()
+
+    def check(self, case: CommandLine) -> None:
+        check_workers(case.options)
 
     def parse(self, case: CommandLine) -> dict[str, Any]:
         from zwidth.measures.definition import WantedWall
@@ -212,17 +217,21 @@ class MapCommand(Command):
             raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; use zwidth chart")
         try:
             plane = _plane(case)
-            dataset = workspace_map(
-                device,
-                case["measures"],
-                plane,
-                case["extreme"] or question.direction,
-                question.assembly,
-                question.model,
-                case["wall"],
-                progress=case.progress,
-                processor=case["processor"],
-            )
+            with report_kept_work(None):
+                dataset = workspace_map(
+                    device,
+                    case["measures"],
+                    plane,
+                    case["extreme"] or question.direction,
+                    question.assembly,
+                    question.model,
+                    case["wall"],
+                    progress=case.progress,
+                    workers=case["workers"],
+                    processor=case["processor"],
+                    time_limit=case["time_limit"],
+                    cluster=case["cluster"],
+                )
         except MeasureError as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except PlaneError as error:

@@ -16,16 +16,15 @@ from zwidth.device.toml_access import is_number, table, tables
 from zwidth.device.validation_messages import validation_messages
 from zwidth.measures.definition import Measure, Spelling, WantedWall
 from zwidth.measures.wanted import WANTED_NUMBERS
-from zwidth.memory_limit import check_memory
+from zwidth.memory_limit import TooLarge
 from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
-from zwidth.study.designs.study_schema import StudyFile, description, unknown
+from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
 from zwidth.study.designs.task import DEMANDS, Task, task_of
 from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of
 
-PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
-PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose values are kept as they are written
+MOST_ALONG: Final = 10**6  # values of one axis that has a range and a count
 # Argument in Python -> what it is called as a key of a study file, or of its [workspace].
 KEYS: Final[dict[str, str]] = {
     "position": "at",
@@ -295,13 +294,18 @@ def _task(
 
 
 def _check_size(checked: StudyFile, hypercube: bool) -> None:
-    """Raises TooLarge where the designs would not fit into memory, before any of them is made."""
+    """Raise TooLarge for more designs than any computer takes, before any of them is made.
+
+    Whether fewer fit into memory, or on the disk, depends on where they are kept: `executor.run` and `Store` see.
+    """
     each = [len(axis.values) if axis.values is not None else axis.count or 1 for axis in checked.axis]
     designs = (checked.count or 0) if hypercube else each[0] if checked.sampling == "paired" else prod(each)
-    ties = sum(len(axis.tie) for axis in checked.axis)
-    numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
-    check_memory(
-        float(numbers),
-        f"{plural(designs, 'design')} of {plural(len(checked.measures), 'measure')}",
-        "lower a count",
-    )
+    many = f"{plural(designs, 'design')} of {plural(len(checked.measures), 'measure')}"
+    if designs > MOST:
+        raise TooLarge(f"{many} are more than zwidth computes, {MOST} at most; lower a count")
+    for axis in checked.axis:
+        if axis.values is None and (axis.count or 1) > MOST_ALONG:
+            raise TooLarge(
+                f"{many}: the axis {axis.key} has {axis.count} values, and {MOST_ALONG} at most are listed; lower "
+                "its count, or use a Latin hypercube"
+            )
