@@ -73,7 +73,7 @@ def test_clearance_is_that_of_capsules_in_mujoco(name):
     device = zwidth.load(name)
     point = device.at()
     mechanism, posture = point.mechanism, point.posture
-    rods, beside = rods_of(mechanism, posture), neighbours(mechanism, posture)
+    rods, beside = rods_of(mechanism, posture), neighbours(mechanism)
     radius = 0.003
     least = np.inf
     for i in range(len(rods.link)):
@@ -149,7 +149,7 @@ def test_every_bundled_device_has_rods_that_join_its_joints_and_end_at_the_handl
     origins = link_points(mechanism, point.posture).origin[mechanism.links.parent >= 0]
     for place in (point.posture.position, *origins):
         assert np.linalg.norm(ends - place, axis=1).min() < 1e-6
-    assert all(i < j for i, j in neighbours(mechanism, point.posture))
+    assert all(i < j for i, j in neighbours(mechanism))
     assert link_distance(mechanism, point.posture, []) == np.inf
 
 
@@ -307,6 +307,18 @@ def test_designs_together_are_the_designs_alone():
         for name in names:
             alone = float(point.measure(name, **wanted).values)
             np.testing.assert_allclose(found[name].values[i], alone, rtol=1e-9)
+
+
+def test_a_design_whose_base_joints_meet_is_judged_alike_among_others():
+    device = zwidth.load("five-bar")
+    shifts = [0.0, 0.02]
+    found = zwidth.sweep(device, {"links.upper-left.origin_m.0": shifts}, ["link_clearance"], link_radius=0.001)
+    for i, shift in enumerate(shifts):
+        alone = (
+            device.with_({"links.upper-left.origin_m.0": shift}).at().measure("link_clearance", link_radius=0.001)
+        )
+        assert found["link_clearance"].values[i] == pytest.approx(float(alone.values), rel=1e-9)
+    assert found["link_clearance"].values[0] > 0.05  # the two upper links share a joint there
 
 
 def test_a_given_plant_has_a_first_mode_and_no_geometry():

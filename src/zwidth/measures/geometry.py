@@ -19,7 +19,7 @@ from zwidth.model.posture import Posture, link_points
 
 Bools = NDArray[np.bool_]
 
-SAME_POINT: Final = 1e-9  # share of the mechanism's size within which two points are one
+SAME_POINT: Final = 1e-9  # m, within which two points are one
 SHORT: Final = 1e-30  # squared length [m^2] below which a rod is a point
 
 
@@ -136,9 +136,9 @@ def _apart(one: Floats, other: Floats) -> bool:
         return bool(np.any(np.linalg.norm(one - other, axis=-1) > SAME_POINT))
 
 
-def neighbours(mechanism: Mechanism, posture: Posture) -> set[tuple[int, int]]:
-    """Pairs of bodies that share a joint, smaller index first: a link and what carries it, two that a closure
-    holds together, and two on the base whose joints are at one place."""
+def neighbours(mechanism: Mechanism) -> set[tuple[int, int]]:
+    """Pairs of bodies that share a joint, smaller index first: a link and what carries it, and two that a closure
+    holds together."""
     links, closures, body = mechanism.links, mechanism.closures, bodies(mechanism)
     virtual = {i for i, name in enumerate(links.names) if "/" in name and i in set(links.parent.tolist())}
     pairs = set[tuple[int, int]]()
@@ -153,13 +153,18 @@ def neighbours(mechanism: Mechanism, posture: Posture) -> set[tuple[int, int]]:
         add(int(body[i]), -1 if parent < 0 else int(body[parent]))
     for a, b in zip(closures.a.tolist(), closures.b.tolist(), strict=True):
         add(-1 if a < 0 else int(body[a]), -1 if b < 0 else int(body[b]))
-    origin = link_points(mechanism, posture).origin
-    based = [i for i in np.flatnonzero(links.parent < 0).tolist() if body[i] >= 0]
-    for n, i in enumerate(based):
-        for j in based[:n]:
-            if not _apart(origin[..., i, :], origin[..., j, :]):
-                add(int(body[i]), int(body[j]))
     return pairs
+
+
+def _joints_apart(mechanism: Mechanism, posture: Posture, i: int, j: int) -> Bools:
+    """Whether two bodies are not both on the base with their joints at one place, at each posture."""
+    parent = mechanism.links.parent
+    if parent[i] >= 0 or parent[j] >= 0:
+        return np.ones(posture.status.shape, dtype=np.bool_)
+    origin = link_points(mechanism, posture).origin
+    with np.errstate(invalid="ignore"):
+        away = np.linalg.norm(origin[..., i, :] - origin[..., j, :], axis=-1) > SAME_POINT
+    return np.asarray(np.broadcast_to(away, posture.status.shape))
 
 
 def link_distance(
@@ -173,19 +178,26 @@ def link_distance(
     Raises   NoRodsError  as `rods_of`
     """
     rods, body = rods_of(mechanism, posture), bodies(mechanism)
+    own = sorted(set(rods.link.tolist()))
     if pairs is None:
-        beside = neighbours(mechanism, posture)
-        own = sorted(set(rods.link.tolist()))
+        beside = neighbours(mechanism)
         chosen = [(i, j) for n, i in enumerate(own) for j in own[n + 1 :] if (i, j) not in beside]
     else:
         chosen = [(int(body[i]), int(body[j])) for i, j in pairs]
     least = np.where(np.isnan(posture.position[..., 0]) | (posture.status != 0), np.nan, np.inf)
+    length = np.linalg.norm(rods.last - rods.first, axis=-1)
     for i, j in chosen:
+        apart = (
+            np.ones(least.shape, dtype=np.bool_) if pairs is not None else _joints_apart(mechanism, posture, i, j)
+        )
         for one in np.flatnonzero(rods.link == i):
             for other in np.flatnonzero(rods.link == j):
                 ends = rods.first[..., one, :], rods.last[..., one, :]
                 others = rods.first[..., other, :], rods.last[..., other, :]
-                least = np.minimum(least, segment_distance(*ends, *others))
+                # a rod that is one in other designs only
+                are_rods = apart & (length[..., one] > SAME_POINT) & (length[..., other] > SAME_POINT)
+                distance = segment_distance(*ends, *others)
+                least = np.where(np.isnan(least), np.nan, np.minimum(least, np.where(are_rods, distance, np.inf)))
     return np.asarray(least)
 
 
