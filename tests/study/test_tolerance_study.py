@@ -10,11 +10,12 @@ import pytest
 import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least_mass, radius, uniform
 from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.series import JobSeries
 from zwidth.study.tolerances.draws import UNSEEN, shares_of
 from zwidth.study.tolerances.edge_job import EdgeJob
 from zwidth.study.tolerances.intervals import count_bounds
 from zwidth.study.tolerances.tighten import tightened
-from zwidth.study.tolerances.tolerance_study import answer, computing, run_tolerances, tolerance
+from zwidth.study.tolerances.tolerance_study import answer, run_tolerances, tolerance
 
 MASSES = {"plant.mass_kg": uniform(20.0)}
 BOTH = {"plant.mass_kg": uniform(20.0), "loop.sampling_period_s": uniform(5.0)}
@@ -238,7 +239,7 @@ class Finished:
 def test_the_same_question_has_the_same_answer_bit_for_bit_whoever_computes_and_from_where(tmp_path):
     question = tolerance(free_mass(), BOTH, **WALL, samples=72, index_samples=16).question
     whole = json.dumps(run_tolerances(question).document())
-    compute = computing(tmp_path / "kept")
+    compute = JobSeries(tmp_path / "kept").compute
 
     def until_edges(name, job, stage):
         if name == "edges-1":

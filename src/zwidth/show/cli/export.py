@@ -13,7 +13,13 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
-from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.cli.resumable import (
+    check_workers,
+    open_store,
+    report_kept_work,
+    resume_option,
+    worker_options,
+)
 from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import amount
 
@@ -129,7 +135,8 @@ class ExportCommand(Command):
             metavar="N",
             help="Seed of the random postures that cells are tried by (default 1).",
         ),
-        resume_options,
+        resume_option,
+        worker_options,
     )
     outputs = (HEADER, *FIGURES, *DATA, ARRAY)
     output_help = (
@@ -165,6 +172,7 @@ class ExportCommand(Command):
         return "safe_walls.h"
 
     def check(self, case: CommandLine) -> None:
+        check_workers(case.options)
         if case["hands"] is not None and case.question.operator is not None:
             raise BadInput("--operator and --hands exclude each other; leave out --operator")
         folder = None if case["arduino"] is None else Path(case["arduino"])
@@ -213,7 +221,16 @@ class ExportCommand(Command):
             )
             store = open_store(job, case.path, case["resume"])
             with report_kept_work(store):
-                table = compute_table(device, job, case["span"], store, case.progress, case["workers"])
+                table = compute_table(
+                    device,
+                    job,
+                    case["span"],
+                    store,
+                    case.progress,
+                    case["workers"],
+                    cluster=case["cluster"],
+                    time_limit=case["time_limit"],
+                )
         except (SafeWallsError, PlaneError) as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except TooLarge as error:

@@ -12,7 +12,7 @@ from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback, refuse_empty
-from zwidth.show.cli.resumable import resume_options
+from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
 from zwidth.show.output import DATA, FIGURES, OutputError, printable, write_text
 from zwidth.show.units import number, typed
@@ -50,7 +50,7 @@ class OptimiseCommand(Command):
         "zwidth optimise my-study.toml --output before-and-after.html --designs better",
         "zwidth optimise my-study.toml --resume my-study.search --output front.svg",
     )
-    options = (_designs_option, resume_options)
+    options = (_designs_option, resume_option, worker_options)
     outputs = (*FIGURES, *DATA, *PAGES)
     output_help = "Write a report (.html), a figure of the front (.png .svg .pdf) or the data (.csv .json)."
     keys = ("designs", "values", "status", "knee", "baseline")
@@ -58,20 +58,23 @@ class OptimiseCommand(Command):
     def about(self, command: Callback) -> Callback:
         return about_a_study(command, bounds=True)
 
+    def check(self, case: CommandLine) -> None:
+        check_workers(case.options)
+
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return circumstances_of_study(case)
 
     def compute(self, case: CommandLine) -> Optimisation:
         from zwidth.measures.definition import MeasureError
         from zwidth.memory_limit import TooLarge
-        from zwidth.study.jobs.store import StoreError
-        from zwidth.study.optimise.optimise import optimise
+        from zwidth.study.optimise.optimise import optimise_by
 
         question = case.question
         assert isinstance(question, StudyQuestion)
         try:
-            return optimise(question.study, case["resume"], case.progress, case["workers"])
-        except (TooLarge, StoreError) as error:
+            with series_of(case) as series:
+                return optimise_by(question.study, series)
+        except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:
             raise BadInput(*(f"{question.name}: optimise: {line}" for line in str(error).splitlines())) from None
@@ -101,8 +104,10 @@ class OptimiseCommand(Command):
             from zwidth.show.report.optimisation import optimisation_page
 
             write_text(case.path, optimisation_page(result))
-            return reason
-        return super().write(case, result, document, reason)
+        else:
+            reason = super().write(case, result, document, reason)
+        remove_series(case)
+        return reason
 
     def write_others(self, case: CommandLine, result: Optimisation) -> dict[str, Path]:
         if case["designs"] is None or not len(result.front):

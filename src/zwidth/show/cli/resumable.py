@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +17,9 @@ from zwidth.show.cli.process import say, stopped_in_a_kernel
 from zwidth.show.output import printable
 
 if TYPE_CHECKING:
+    from zwidth.show.cli.command import CommandLine
     from zwidth.study.jobs.job import Job
+    from zwidth.study.jobs.series import JobSeries
     from zwidth.study.jobs.store import Store
 
 
@@ -66,7 +69,7 @@ def check_workers(options: Mapping[str, Any]) -> None:
             f"--workers: is for processes of this computer; the cluster at {printable(cluster)} has its own"
         )
     for name in ("cluster", "time_limit"):
-        if options[name] is not None and options["processor"] == "cuda":
+        if options[name] is not None and options.get("processor") == "cuda":
             raise BadInput(f"{as_option(name)}: needs processes, and --processor cuda computes in this one alone")
 
 
@@ -100,20 +103,67 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
     Raises  UnfinishedRun  where no process computes, or a cluster has ended
             BadInput       where the disk refuses, another run computes here, or a cluster does not answer
     """
+    with _kept_work_reported(
+        None if store is None else store.path, lambda: store is not None and store.batch is not None
+    ):
+        yield
+
+
+@contextmanager
+def series_of(case: CommandLine) -> Iterator[JobSeries]:
+    """Computes the jobs of a command that asks several, one after another, as its options say; what is done is
+    kept in a folder of the user's, or beside the file that is written.
+
+    Raises  as `report_kept_work`
+    """
+    from zwidth.study.jobs.series import JobSeries
+    from zwidth.study.jobs.store import StoreError
+
+    folder = series_folder(case)
+    try:
+        series = JobSeries(folder, case.progress, case["workers"], case["cluster"], case["time_limit"])
+    except StoreError as error:
+        raise BadInput(str(error)) from None
+    with _kept_work_reported(folder, lambda: folder is not None and folder.is_dir()), series:
+        yield series
+
+
+def series_folder(case: CommandLine) -> Path | None:
+    """The folder of `series_of`; None where nothing is kept."""
+    if case["resume"] is not None:
+        return Path(case["resume"])
+    return None if case.path is None else _default_folder(case.path)
+
+
+def remove_series(case: CommandLine) -> None:
+    """Remove the stores of a series that lie beside the file, now that what they kept is written; what else is in
+    the folder stays."""
+    folder = series_folder(case)
+    if folder is None or case["resume"] is not None or not folder.is_dir():
+        return
+    for inside in folder.iterdir():
+        if (inside / "zarr.json").exists():
+            shutil.rmtree(inside, ignore_errors=True)
+    with suppress(OSError):  # not empty
+        folder.rmdir()
+
+
+@contextmanager
+def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Iterator[None]:
     from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
     from zwidth.study.jobs.recovery import CannotStart, WorkerLost
     from zwidth.study.jobs.store import StoreError
 
     goes_on = (
         ""
-        if store is None
-        else f"{printable(str(store.path))} keeps the finished work; the same command continues from it"
+        if folder is None
+        else f"{printable(str(folder))} keeps the finished work; the same command continues from it"
     )
     try:
         yield
     except (KeyboardInterrupt, SystemError) as error:
         stopped = isinstance(error, KeyboardInterrupt) or stopped_in_a_kernel(error)
-        if stopped and store is not None and store.batch is not None:
+        if stopped and begun():
             say(f"zwidth: {goes_on}")
         raise
     except (ClusterEnded, CannotStart, WorkerLost) as error:
@@ -123,10 +173,10 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
     except StoreError as error:
         raise BadInput(str(error)) from None
     except OSError as error:
-        if store is None:
+        if folder is None:
             raise
-        kept = "" if store.batch is None else f"; {goes_on}"
-        raise BadInput(_unwritable(store.path, error) + kept) from None
+        kept = f"; {goes_on}" if begun() else ""
+        raise BadInput(_unwritable(folder, error) + kept) from None
 
 
 def _unwritable(path: Path, error: OSError) -> str:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, wraps
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -17,7 +14,7 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, refuse_empty
-from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.tolerance_text import (
     advice_sentence,
@@ -35,8 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.device.device import Device
-    from zwidth.study.jobs.job import CellValues, Job
-    from zwidth.study.jobs.store import Store
     from zwidth.study.tolerances.outcomes import MeasureQuantiles
     from zwidth.study.tolerances.question import ToleranceQuestion
     from zwidth.study.tolerances.result import ToleranceStudy
@@ -99,7 +94,8 @@ class ToleranceCommand(Command):
         click.option(
             "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the draws, in place of the file's."
         ),
-        resume_options,
+        resume_option,
+        worker_options,
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .nc .mat: drawn devices, .json: all)."
@@ -123,6 +119,9 @@ class ToleranceCommand(Command):
             "left_out": list(device.linear_omissions),
         }
 
+    def check(self, case: CommandLine) -> None:
+        check_workers(case.options)
+
     def compute(self, case: CommandLine) -> ToleranceStudy:
         from zwidth.measures.definition import MeasureError
         from zwidth.memory_limit import TooLarge
@@ -131,7 +130,8 @@ class ToleranceCommand(Command):
         question = case.question
         assert isinstance(question, ToleranceFile)
         try:
-            return answer(question.asked, _computing(case))
+            with series_of(case) as series:
+                return answer(question.asked, series.compute)
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:
@@ -183,8 +183,7 @@ class ToleranceCommand(Command):
             write_dataset(case.path, result.dataset())
         else:
             super().write(case, result, document, reason)
-        if case["resume"] is None:
-            _remove_kept_work(_folder(case))
+        remove_series(case)
         return reason
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
@@ -198,44 +197,6 @@ class ToleranceCommand(Command):
         from zwidth.show.figures.tolerance import tolerance_figure
 
         return tolerance_figure(result)
-
-
-def _computing(case: CommandLine) -> Callable[[str, Job, str], CellValues]:
-    """Computes jobs, each with a store of its own in the folder of this run."""
-    from zwidth.study.jobs.executor import run
-
-    folder = _folder(case)
-    if folder is not None and (folder / "zarr.json").exists():
-        raise BadInput(f"{printable(str(folder))}: holds the store of another study; name another folder")
-
-    def compute(name: str, job: Job, stage: str) -> CellValues:
-        store: Store | None = None
-        if folder is not None:
-            store = open_store(job, None, str(folder / name))
-        with report_kept_work(store):
-            return run(job, store, case.progress, case["workers"], stage=stage)
-
-    return compute
-
-
-def _folder(case: CommandLine) -> Path | None:
-    """The folder that keeps finished work: the user's, or one beside the file that is written; None: none."""
-    if case["resume"] is not None:
-        return Path(case["resume"])
-    return None if case.path is None else case.path.with_name(case.path.name + PROGRESS)
-
-
-def _remove_kept_work(folder: Path | None) -> None:
-    """Remove the stores of this run, now that what they kept is written; what else is in the folder stays."""
-    if folder is None or not folder.is_dir():
-        return
-    from zwidth.study.tolerances.tolerance_study import is_store_name
-
-    for inside in folder.iterdir():
-        if is_store_name(inside.name):
-            shutil.rmtree(inside, ignore_errors=True)
-    with suppress(OSError):
-        folder.rmdir()
 
 
 def _quantile_tables(result: ToleranceStudy) -> Iterator[Any]:

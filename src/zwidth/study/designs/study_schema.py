@@ -182,6 +182,22 @@ class TaskSection(Section):
     friction_N: Number | None = documented_key("largest dry friction felt", "N", gt=0, default=None)
     apparent_mass_kg: Number | None = documented_key("largest mass felt", "kg", gt=0, default=None)
     resolution_m: Number | None = documented_key("largest step of the position", "m", gt=0, default=None)
+    motor_heat_W: Number | None = documented_key(
+        "largest heat of all windings while force_N, or else continuous_force_N, is held", "W", gt=0, default=None
+    )
+    first_mode_Hz: Number | None = documented_key("least first flexible mode", "Hz", gt=0, default=None)
+    distance_to_singularity: Number | None = documented_key(
+        "least reciprocal condition number of the homogeneous Jacobian", gt=0, le=1, default=None
+    )
+    joint_margin: Number | None = documented_key(
+        "least distance of the joints from their limits, in half ranges", gt=0, le=1, default=None
+    )
+    clearance_m: Number | None = documented_key(
+        "least clearance between links, see link_radius_m and colliding_links", "m", ge=0, default=None
+    )
+    footprint_radius_m: Number | None = documented_key(
+        "radius about the middle of the base that no link leaves", "m", gt=0, default=None
+    )
 
 
 class OptimiseSection(Section):

@@ -27,9 +27,15 @@ Fault = tuple[tuple[str | int, ...], str]
 DEMANDS: Final[dict[str, tuple[str, bool]]] = {
     "peak_force_N": ("peak_force", True),
     "continuous_force_N": ("continuous_force", True),
+    "motor_heat_W": ("motor_heat", False),
     "friction_N": ("friction_force", False),
     "apparent_mass_kg": ("rigid_mass", False),
     "resolution_m": ("position_resolution", False),
+    "first_mode_Hz": ("first_mode", True),
+    "distance_to_singularity": ("distance_to_singularity", True),
+    "joint_margin": ("joint_margin", True),
+    "clearance_m": ("link_clearance", True),
+    "footprint_radius_m": ("reach", False),
 }
 SHAPES: Final = ("box_m", "radius_m", "points_m")
 PER_AXIS: Final = 5  # points of a box along each axis

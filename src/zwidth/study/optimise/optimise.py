@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -19,10 +18,9 @@ from zwidth.measures.definition import Note
 from zwidth.progress import Progress
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_file import read_study
-from zwidth.study.jobs.executor import merge_notes, run
 from zwidth.study.jobs.job import CellValues
-from zwidth.study.jobs.store import Store
-from zwidth.study.jobs.workers import cores
+from zwidth.study.jobs.notes import merge_notes
+from zwidth.study.jobs.series import JobSeries
 from zwidth.study.optimise.evaluation import EvaluationJob, Judge, Judgement
 from zwidth.study.optimise.front import ranges, spread_out, undominated
 from zwidth.study.optimise.optimisation import Optimisation
@@ -46,6 +44,8 @@ def optimise(
     store: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    cluster: str | None = None,
+    time_limit: float | None = None,
 ) -> Optimisation:
     """Find the designs of a study that are best in its objectives and keep its demands.
 
@@ -53,14 +53,22 @@ def optimise(
     store     a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress  is called with the stage, the number of designs done, and of all designs
     workers   processes at most; left out: one for each core
+    cluster   address of a dask scheduler, or "local"
+    time_limit  s that a design may take; one that takes longer has no values
     Returns   the front, the baseline and how they were found; equal for equal studies, however it was divided
     Raises    DeviceError   with all faults of the study
               MeasureError  for measures that do not exist for this device
               what `executor.run` and `Store` raise
     """
     read = study if isinstance(study, Study) else read_study(study, bounds=True)
-    problem = problem_of(read)
-    archive = _Archive(problem, None if store is None else Path(store), progress, workers)
+    with JobSeries(store, progress, workers, cluster, time_limit) as series:
+        return optimise_by(read, series)
+
+
+def optimise_by(study: Study, series: JobSeries) -> Optimisation:
+    """The same, computed by a series of jobs."""
+    problem = problem_of(study)
+    archive = _Archive(problem, series)
     baseline = archive.baseline()
     start = _start(problem)
     alone = len(problem.objectives) == 1
@@ -98,10 +106,8 @@ class _Archive:
     judgement  of them
     """
 
-    def __init__(
-        self, problem: Problem, folder: Path | None, progress: Progress | None, workers: int | None
-    ) -> None:
-        self.problem, self.folder, self.progress, self.workers = problem, folder, progress, workers
+    def __init__(self, problem: Problem, series: JobSeries) -> None:
+        self.problem, self.series, self.progress = problem, series, series.progress
         self.judging = Judge(problem)
         self._shares: list[Floats] = []
         self._judged: list[Judgement] = []
@@ -156,15 +162,9 @@ class _Archive:
         return self._compute(self.judging.job(designs), stage, done, of)
 
     def _compute(self, job: EvaluationJob, stage: str, done: int, of: int) -> CellValues:
+        """Compute a job; progress is told in designs of the whole."""
         self._jobs += 1
-        store = None if self.folder is None else Store(self.folder / f"{self._jobs:05d}", job)
-
-        def told(_: str, now: int, __: int) -> None:
-            if self.progress is not None:
-                self.progress(stage, min(done + now, of), of)
-
-        batch = -(-job.count // (2 * (self.workers or cores())))
-        return run(job, store, told, self.workers, batch=batch)
+        return self.series.compute(f"{self._jobs:05d}", job, stage, done, of)
 
     def baseline(self) -> Judgement | None:
         """The device as it is; None where it has not all of the numbers that vary."""

@@ -104,6 +104,12 @@ def problem_of(study: Study) -> Problem:
     """
     given = table(study.document, "optimise")
     faults: Faults = []
+    if (
+        study.task is not None
+        and study.wall.force is None
+        and (held := study.task.demands.get("continuous_force_N"))
+    ):
+        study = replace(study, wall=replace(study.wall, force=held))
     columns: list[Column] = []
     overall = study.task is not None
 

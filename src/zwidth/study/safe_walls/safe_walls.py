@@ -161,11 +161,14 @@ def compute_table(
     store: Store | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    *,
+    cluster: str | None = None,
+    time_limit: float | None = None,
 ) -> SafeWalls:
     """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
     if span is not None and not (isfinite(span) and span > 0.0):
         raise SafeWallsError(f"the span of damping must be positive, got {span:g}")
-    cells = run(job, store, progress, workers, batch=BATCH, stage="cells")
+    cells = run(job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit)
     asked = job.cell_question
     return table_of_cells(device, hand_names(asked), asked, cells, span)
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.device.device import Device
 from zwidth.measures.definition import NO_VALUE, OK, STATUS
 from zwidth.result import Result
-from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.job import Cells
 from zwidth.study.safe_walls.cell_walls import NONE, CellQuestion
 from zwidth.study.safe_walls.grid import CellGrid, Sectors
 
@@ -264,7 +264,7 @@ def table_size(question: CellQuestion) -> int:
 
 
 def table_of_cells(
-    device: Device, hands: Sequence[str], question: CellQuestion, cells: CellValues, span: float | None
+    device: Device, hands: Sequence[str], question: CellQuestion, cells: Cells, span: float | None
 ) -> SafeWalls:
     """The table from the values of its cells.
 

@@ -13,7 +13,7 @@ from zwidth.memory_limit import check_memory
 from zwidth.study.designs.axis_tables import Faults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
-from zwidth.study.designs.study import PER_AXIS, PER_VALUE, Study
+from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_file import read_document, study_of
 from zwidth.study.tolerances.intervals import draws_needed
 from zwidth.study.tolerances.tolerance import Tolerance
@@ -24,6 +24,10 @@ SAMPLES: Final = 1000
 INDEX_SAMPLES: Final = 512
 QUANTILES: Final = (5.0, 50.0, 95.0)
 SEED: Final = 1
+PER_VALUE: Final = (
+    3  # numbers of memory for each value: the value, its status, and a copy while it is put together
+)
+PER_NUMBER: Final = 12  # numbers of memory for each number of a device that differs
 PER_CHART: Final = 6000  # numbers of memory for the edge of each drawn device on the lines of the bands
 STIFFEST: Final = "stiffness_max"  # is asked of every device, whether the study names it or not
 OF_A_SWEEP: Final = ("axis", "sampling", "count", "optimise")  # what a study of tolerances leaves aside
@@ -171,7 +175,7 @@ def check_size(question: ToleranceQuestion) -> None:
     numbers = sum(1 + len(one.ties) for one in question.tolerances)
     devices = question.samples * (1.0 + count) + question.index_samples * (count + 2.0)
     check_memory(
-        devices * (PER_VALUE * len(question.columns) + PER_AXIS * numbers) + PER_CHART * question.samples,
+        devices * (PER_VALUE * len(question.columns) + PER_NUMBER * numbers) + PER_CHART * question.samples,
         f"{devices:.0f} devices, {question.samples} drawn and the others for indices and narrower tolerances,",
         "lower samples or index_samples",
     )

@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
@@ -22,9 +21,8 @@ from zwidth.measures.definition import OK, Measure
 from zwidth.progress import Progress
 from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
-from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.job import CellValues, Job
-from zwidth.study.jobs.store import Store
+from zwidth.study.jobs.series import JobSeries
 from zwidth.study.tolerances.band import Band, Coverage, refined_dampings
 from zwidth.study.tolerances.draws import UNSEEN, drawn_values
 from zwidth.study.tolerances.edge_job import MOST_INTERVALS, EdgeJob, highest_damping
@@ -71,6 +69,8 @@ def tolerance(
     store: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    cluster: str | None = None,
+    time_limit: float | None = None,
 ) -> ToleranceStudy:
     """What is certain of a device whose numbers differ from one produced device to the next.
 
@@ -87,6 +87,8 @@ def tolerance(
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with the stage, the number of devices done, and of all of them
     workers        processes at most; left out: one for each core
+    cluster        address of a dask scheduler, or "local"
+    time_limit     s that a device may take; one that takes longer is out of time
     Raises         DeviceError   with all faults of the arguments
                    MeasureError  for measures that do not exist for this device
                    TooLarge      where the devices would not fit into memory
@@ -101,7 +103,8 @@ def tolerance(
         | {"stiffness_N_per_m": stiffness, "damping_Ns_per_m": damping, "frequency_Hz": frequency},
         {"samples": samples, "index_samples": index_samples, "quantiles_percent": quantiles_percent, "seed": seed},
     )
-    return answer(question, computing(store, progress, workers))
+    with JobSeries(store, progress, workers, cluster, time_limit) as series:
+        return answer(question, series.compute)
 
 
 def run_tolerances(
@@ -109,25 +112,16 @@ def run_tolerances(
     store: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     workers: int | None = None,
+    cluster: str | None = None,
+    time_limit: float | None = None,
 ) -> ToleranceStudy:
     """Answer what a study file asks of produced devices; see `tolerance` for the rest.
 
     question  read by `read_question`, or the path of its file
     """
     asked = question if isinstance(question, ToleranceQuestion) else read_question(question)
-    return answer(asked, computing(store, progress, workers))
-
-
-def computing(
-    store: str | os.PathLike[str] | None, progress: Progress | None = None, workers: int | None = None
-) -> Compute:
-    """A function that computes jobs, each with a store of its own inside a folder; None: none is kept."""
-
-    def compute(name: str, job: Job, stage: str) -> CellValues:
-        kept = None if store is None else Store(Path(store) / name, job)
-        return run(job, kept, progress, workers, stage=stage)
-
-    return compute
+    with JobSeries(store, progress, workers, cluster, time_limit) as series:
+        return answer(asked, series.compute)
 
 
 def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
@@ -140,11 +134,6 @@ def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
     bands, uncharted = _bands(question, values, compute)
     narrower = _tightened(question, values, cells, compute)
     return replace(found, bands=bands, uncharted=uncharted, tightened=narrower)
-
-
-def is_store_name(name: str) -> bool:
-    """Whether a folder of this name, inside the folder of a run, is the store of one of its jobs."""
-    return name in ("devices", "narrower", "unseen") or name.removeprefix("edges-").isdigit()
 
 
 def _axes(question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]]) -> list[Axis]:
