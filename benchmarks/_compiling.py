@@ -46,6 +46,7 @@ OTHERS = {
     "felt": "felt five-bar --stiffness 1000 --damping 5",
     "bounds": "bounds five-bar",
     "guarantees": "guarantees hapkit-course",
+    "export": "export five-bar --x -0.01,0.01 --y 0.2,0.22 --cells 1,1 --output walls.h",
     "robust": "robust published-two-mass --range loop.delay_samples=0,1",
     "experiment": "experiment hapkit-course --trials 2",
     "limit-cycles": "limit-cycles hapkit-course --stiffness 2600 --damping 0 --set loop.saturation.force_N=5",

@@ -6,6 +6,7 @@ here imports the function of the same task when it is called, calls it, and does
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -220,13 +221,11 @@ def describe(point: OperatingPoint) -> Description:
 def measure(
     point: OperatingPoint,
     measure: str | Measure,
-    stiffness: float | None,
-    damping: float | None,
-    frequency: float | None,
+    wanted: Mapping[str, Any],
 ) -> MeasureValues:
     from zwidth.measures.evaluate import measure_at
 
-    return measure_at(point, measure, stiffness, damping, frequency)
+    return measure_at(point, measure, **wanted)
 
 
 def environment_named(source: str) -> Environment:

@@ -34,6 +34,7 @@ def test_the_commands_are_those_promised():
         "sweep",
         "optimise",
         "tolerance",
+        "export",
         "report",
         "sensitivity",
         "felt",

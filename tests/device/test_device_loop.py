@@ -309,7 +309,7 @@ FAULTS = [
         "plant.electrical_damping.0",
         "more than any device",
     ),
-    (arm(winding_resistance_ohm=2.0), "mechanism.drives.shoulder.winding_resistance_ohm", "current amplifier"),
+    (arm(winding_inductance_H=2e-3), "mechanism.drives.shoulder.winding_inductance_H", "current amplifier"),
     (
         arm(damping_resistance_ohm=2.0, torque_constant_Nm_per_A=0.1),
         "mechanism.drives.shoulder.winding_resi",

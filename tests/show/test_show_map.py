@@ -15,6 +15,7 @@ from zwidth.measures.definition import (
     NO_VALUE,
     OK,
     OUT_OF_REACH,
+    OUT_OF_TIME,
     SINGULAR,
     UNDECIDED,
     Measure,
@@ -87,8 +88,9 @@ def test_each_kind_without_a_value_has_its_own_hatch(device):
     assert {NO_VALUE, FAILED, OK} <= set(np.unique(status).tolist())
     ax = map_figure(found, "m", device).axes[0]
     assert legend(ax) == ["no value", "failed"]
-    status[:, 3], status[:, 4], status[:, 5], status[:, 6] = SINGULAR, UNDECIDED, BEYOND_LIMIT, NO_EQUILIBRIUM
-    found["m"].values[:, 3:7] = np.nan
+    others = SINGULAR, UNDECIDED, BEYOND_LIMIT, NO_EQUILIBRIUM, OUT_OF_TIME
+    status[:, 3:8] = others
+    found["m"].values[:, 3:8] = np.nan
     ax = map_figure(found, "m", device).axes[0]
     assert legend(ax) == [
         "singular",
@@ -97,9 +99,10 @@ def test_each_kind_without_a_value_has_its_own_hatch(device):
         "no value",
         "undecided",
         "failed",
+        "out of time",
     ]
     hatches = {patch.get_hatch() for patch in ax.get_legend().get_patches()}
-    assert len(hatches) == 6 == len(MARKS)
+    assert len(hatches) == 7 == len(MARKS)
     status[:] = OUT_OF_REACH
     found["m"].values[:] = np.nan
     assert legend(map_figure(found, "m", device).axes[0]) == []

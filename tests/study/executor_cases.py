@@ -52,18 +52,6 @@ class ProcessNumbersJob(RootsJob):
 
 
 @dataclass
-class KilledProcessJob(RootsJob):
-    """One whose cell 12 kills the process that computes it, if it is not the first."""
-
-    first: int = 0
-
-    def compute(self, first, last):
-        if first <= 12 < last and os.getpid() != self.first:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().compute(first, last)
-
-
-@dataclass
 class PrintingJob(RootsJob):
     def compute(self, first, last):
         print("talkative", flush=True)
@@ -94,4 +82,43 @@ def same_cells(one: CellValues, other: CellValues) -> bool:
         one.values.tobytes() == other.values.tobytes()
         and one.status.tobytes() == other.status.tobytes()
         and one.notes == other.notes
+    )
+
+
+@dataclass
+class FaultyJob(RootsJob):
+    """Cells of which some cannot be computed.
+
+    raising   cells that raise an error of their own
+    killing   cells that kill the process that computes them, if it is not `starter`
+    endless   cells that never end, nor let go of the interpreter
+    once      a file; what kills, kills only while it is not there
+    """
+
+    raising: tuple[int, ...] = ()
+    killing: tuple[int, ...] = ()
+    endless: tuple[int, ...] = ()
+    starter: int = 0
+    once: str = ""
+
+    def compute(self, first, last):
+        for n in range(first, last):
+            if n in self.raising:
+                raise ZeroDivisionError(f"number {n}\nin two lines")
+            if n in self.killing and os.getpid() != self.starter and not (self.once and os.path.exists(self.once)):
+                if self.once:
+                    open(self.once, "w").close()
+                os.kill(os.getpid(), signal.SIGKILL)
+            if n in self.endless:
+                assert os.getpid() != self.starter
+                sum(iter(int, 1))  # in C: no signal handler and no other thread of Python gets a turn
+        return super().compute(first, last)
+
+
+def same_but_for(one: CellValues, other: CellValues, cells: list[int]) -> bool:
+    """The same bits of all cells but these."""
+    kept = np.setdiff1d(np.arange(len(one.values)), cells)
+    return (
+        one.values[kept].tobytes() == other.values[kept].tobytes()
+        and one.status[kept].tobytes() == other.status[kept].tobytes()
     )

@@ -14,7 +14,6 @@ from tests.interruption import HANG_TIMEOUT_S, interruptible
 from tests.study.executor_cases import (
     LEFT_OUT,
     FailingJob,
-    KilledProcessJob,
     NotedJob,
     PrintingJob,
     ProcessNumbersJob,
@@ -23,10 +22,12 @@ from tests.study.executor_cases import (
 )
 from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, MeasureError, Note
 from zwidth.memory_limit import TooLarge
-from zwidth.study.jobs import executor
-from zwidth.study.jobs.executor import MORE, merge_notes, run
+from zwidth.study.jobs import batch_size as batches
+from zwidth.study.jobs.batch_size import batch_size
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.notes import MORE, merge_notes
 from zwidth.study.jobs.store import Store
-from zwidth.study.jobs.workers import WorkerLost, cores, pack_job
+from zwidth.study.jobs.workers import cores, pack_job
 
 NO_PATIENCE = -1.0  # patience that is over at once
 
@@ -54,9 +55,9 @@ def test_a_batch_takes_a_quarter_of_a_second_whatever_the_first_cells_load(secon
             now[0] += 0.005 + seconds * (last - first) + loads.pop(last - first, 0.0)
             return super().compute(first, last)
 
-    monkeypatch.setattr(executor, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(batches, "perf_counter", lambda: now[0])
     job = Job(250_000)
-    found = executor._batch(job, 1)
+    found = batch_size(job.compute, job.count, 1)
     assert found == pytest.approx(expected, rel=0.2)
     assert sum(last - first for first, last in job.computed_ranges) <= max(4, 4 * found)
 
@@ -92,18 +93,6 @@ def test_what_a_job_raises_in_a_process_is_raised(capfd):
     found = run(PrintingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
     assert same_cells(found, RootsJob(40).compute(0, 40)), "what they print does not get between their replies"
     assert capfd.readouterr().err.count("talkative") == 6
-
-
-def test_a_killed_process_is_one_clear_error_and_what_is_done_is_kept(tmp_path):
-    job, path = KilledProcessJob(40, first=os.getpid()), tmp_path / "cells"
-    with pytest.raises(WorkerLost, match=r"was killed .SIGKILL., perhaps for lack of memory; fewer workers"):
-        run(job, Store(path, job), workers=1 + 1, batch=5, patience=NO_PATIENCE)
-    again = RootsJob(40)
-    kept = [first for first, _ in Store(path, again).stored_batches()]
-    assert kept[:2] == [0, 5]
-    assert 10 not in kept
-    assert same_cells(run(again, Store(path, again), workers=1), RootsJob(40).compute(0, 40))
-    assert (0, 5) not in again.computed_ranges
 
 
 def test_what_another_process_would_not_understand_stays_here():

@@ -38,20 +38,26 @@ def test_only_what_is_missing_is_computed(tmp_path, kind):
     assert again.computed_ranges == []
 
 
-def test_another_question_begins_anew(tmp_path):
+def test_another_question_is_refused_and_nothing_is_lost(tmp_path):
     path = tmp_path / "cells"
     partial_store(path, RootsJob(33), [0])
     for other in (RootsJob(34), RootsJob(33, question="else"), RootsJob(33, measures=("root", "other"))):
-        store = Store(path, other)
-        assert store.batch is None
-        assert [first for first, _ in Store(path, RootsJob(33)).stored_batches()] == [0], (
-            "nothing is lost before it is begun"
-        )
-    store.begin(4)
-    assert Store(path, other).batch == 4
-    assert list(store.stored_batches()) == []
-    assert Store(path, RootsJob(33)).batch is None
+        with pytest.raises(StoreError, match=r"^cells: keeps the finished work of another study; name"):
+            Store(path, other)
+        assert [first for first, _ in Store(path, RootsJob(33)).stored_batches()] == [0]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["cells"]
+
+
+def test_another_release_is_refused_by_its_number(tmp_path, monkeypatch):
+    path = tmp_path / "cells"
+    partial_store(path, RootsJob(33), [0])
+    monkeypatch.setattr("zwidth.study.jobs.store.__version__", "9.8")
+    with pytest.raises(
+        StoreError, match=r"^cells: keeps this study as computed by zwidth \d\S+, and this is 9\.8;"
+    ):
+        Store(path, RootsJob(33))
+    with pytest.raises(StoreError, match=r"^cells: keeps a study as computed by zwidth \d\S+, and this is 9\.8;"):
+        Store(path, RootsJob(34))
 
 
 def test_others_can_read_it(tmp_path):

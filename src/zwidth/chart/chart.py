@@ -121,13 +121,14 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     )
 
 
-def largest_stiffness(loop: Loop) -> Peak | None:
+def largest_stiffness(loop: Loop, radius: float = 1.0) -> Peak | None:
     """The stiffest stable wall with K > 0, B >= 0, without the rest of the chart; None if there is none.
 
+    radius  as for `stability_chart`
     Raises  ChartError  as `stability_chart`
     """
     require("loop", loop, Loop)
-    return LoopEdge.of(tracer_of(loop)).peak
+    return LoopEdge.of(tracer_of(loop, radius)).peak
 
 
 def boundary_points(

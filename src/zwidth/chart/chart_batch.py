@@ -65,17 +65,19 @@ class ChartNumbers(NamedTuple):
         return self.fastest[:, 2].copy()
 
 
-def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS) -> ChartNumbers:
+def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS, radius: Floats | None = None) -> ChartNumbers:
     """The numbers of each loop; one whose sections are none, or whose degree is too high, is DOUBTFUL.
 
-    what  mask of STIFFEST, WHOLE_EDGE and DECAY
+    what    mask of STIFFEST, WHOLE_EDGE and DECAY
+    radius  (N,) of the circle of each loop's chart; None: 1, that of stability
     """
     out, own = empty_numbers(len(loops.rows)), local()
+    radii = np.ones(len(loops.rows)) if radius is None else radius
 
     def several(first: int, last: int) -> None:
         if not hasattr(own, "memory"):
             own.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
-        _several(loops, own.memory, what, 1.0, out, first, last)
+        _several(loops, own.memory, what, radii, out, first, last)
 
     in_chunks(several, len(loops.rows))
     return out
@@ -87,10 +89,11 @@ def read_first(loops: LoopTable, memory: EdgeMemory, what: int, radius: float) -
     What is not DOUBTFUL is left in `memory`: its edge, if the mask has WHOLE_EDGE and not DECAY, and `fastest`.
     """
     if not hasattr(_OWN, "numbers"):
-        _OWN.numbers = empty_numbers(1)
+        _OWN.numbers, _OWN.radius = empty_numbers(1), np.ones(1)
     out: ChartNumbers = _OWN.numbers
     out.status[0] = out.decay_status[0] = DOUBTFUL
-    _several(loops, memory, what, radius, out, 0, 1)
+    _OWN.radius[0] = radius
+    _several(loops, memory, what, _OWN.radius, out, 0, 1)
     return int(out.status[0]), int(out.decay_status[0])
 
 
@@ -114,12 +117,12 @@ def empty_numbers(count: int) -> ChartNumbers:
 
 @compiled
 def _several(
-    loops: LoopTable, memory: EdgeMemory, what: int, radius: float, out: ChartNumbers, first: int, last: int
+    loops: LoopTable, memory: EdgeMemory, what: int, radii: Floats, out: ChartNumbers, first: int, last: int
 ) -> None:
-    """Loops first to last - 1, one after the other, on the circle |z| = radius."""
+    """Loops first to last - 1, one after the other, each on the circle |z| = its radius."""
     memory.circle.sizes[COMPUTER] = -1
     for i in range(first, last):
-        fill_numbers(loops, i, memory, what, radius, out)
+        fill_numbers(loops, i, memory, what, radii[i], out)
 
 
 @compiled_lean

@@ -44,6 +44,33 @@ def radii_and_leverages(
     return _radii(loops, which, wall_stiffness, wall_damping, True)
 
 
+def slowest_roots(
+    loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_damping: Floats, count: int
+) -> NDArray[np.complex128]:
+    """The `count` largest roots z (p, count) in the upper half plane, or on the real axis, of each of p walls for
+    one loop each; 0 where there are fewer, nan for a loop without sections.
+
+    Raises  ValueError  for chained sections, see `state_spaces`
+    """
+    found = np.full((len(which), count), np.nan, dtype=np.complex128)
+    for first in range(0, len(which), BATCH_SIZE):
+        batch = np.arange(first, min(first + BATCH_SIZE, len(which)))
+        alike, place = np.unique(which[batch], return_inverse=True)
+        for of_one_structure, space in state_spaces(loops, alike):
+            row = np.full(len(alike), -1)
+            row[of_one_structure] = np.arange(len(of_one_structure))
+            walls = batch[row[place] >= 0]
+            matrices = space[row[place[row[place] >= 0]]].transition_matrix(
+                wall_stiffness[walls], wall_damping[walls]
+            )
+            z = np.linalg.eigvals(matrices).astype(np.complex128)
+            upper = np.where(z.imag >= 0.0, z, 0.0)
+            order = np.argsort(-np.abs(upper), axis=1, kind="stable")[:, :count]
+            largest = np.take_along_axis(upper, order, axis=1)
+            found[walls, : largest.shape[1]], found[walls, largest.shape[1] :] = largest, 0.0
+    return found
+
+
 def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
     """Radii (p,), and leverages (p,) if these are wanted, else nan."""
     radii, leverages = np.full((2, len(which)), np.nan)

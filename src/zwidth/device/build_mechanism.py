@@ -368,6 +368,7 @@ def _drives(
         torque_limit=column("torque_limit_Nm", math.inf),
         encoder_counts=column("encoder_counts_per_rev", math.nan),
         continuous_torque=column("continuous_torque_Nm", math.nan),
+        winding_resistance=column("winding_resistance_ohm", math.nan),
         winding_damping=stack_numbers([damping for damping, _ in windings]),
         winding_time_constant=stack_numbers([lag for _, lag in windings]),
         nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),

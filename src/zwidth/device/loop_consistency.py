@@ -165,13 +165,12 @@ def electrical_inconsistencies(document: dict[str, Any]) -> KeyMessages:
 
 def _drive(place: KeyPath, drive: dict[str, Any], T: float) -> KeyMessages:
     closed = "damping_resistance_ohm" in drive
-    for key in ("winding_resistance_ohm", "winding_inductance_H"):
-        if key in drive and not closed:
-            yield (
-                (*place, key),
-                "is used only with damping_resistance_ohm, through which the winding is closed to brake; give it "
-                "(0: shorted) or remove this: a motor on a current amplifier has no electrical damping",
-            )
+    if "winding_inductance_H" in drive and not closed:
+        yield (
+            (*place, "winding_inductance_H"),
+            "is used only with damping_resistance_ohm, through which the winding is closed to brake; give it "
+            "(0: shorted) or remove this: a motor on a current amplifier has no electrical damping",
+        )
     if not closed:
         return
     for key in ("torque_constant_Nm_per_A", "winding_resistance_ohm"):

@@ -71,6 +71,17 @@ def loop_table(rows: Floats, section_count: Whole, controller: Controller) -> Lo
     return _table(rows, section_count, computer, [columns])
 
 
+def joined_tables(tables: Sequence[LoopTable]) -> LoopTable:
+    """The loops of several tables, one table after the other."""
+    rows, count = _joined([table.rows for table in tables]), _joined([table.section_count for table in tables])
+    columns = [
+        ComputerColumns(**{name: getattr(table, name) for name in ComputerColumns._fields}) for table in tables
+    ]
+    before = np.cumsum([0, *(len(table.period) for table in tables)])
+    computer = [table.computer + first for table, first in zip(tables, before, strict=False)]
+    return _table(rows, count, _joined(computer), columns)
+
+
 class ComputerColumns(NamedTuple):
     """The computers of a controller, one or one for each of its designs: columns of a `LoopTable`."""
 

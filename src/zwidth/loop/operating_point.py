@@ -307,13 +307,24 @@ class OperatingPoint(PosedDevice):
         stiffness: float | None = None,
         damping: float | None = None,
         frequency: float | None = None,
+        spectral_radius: float | None = None,
+        stiffness_margin: float | None = None,
+        damping_margin: float | None = None,
+        delay_margin: float | None = None,
+        lowest_frequency: float | None = None,
+        highest_frequency: float | None = None,
+        force: float | None = None,
+        link_radius: float | None = None,
+        colliding_links: Sequence[str] | None = None,
     ) -> MeasureValues:
         """A measure of the catalogue by its name, or one of your own, at all points; see `measures.evaluate`.
 
         stiffness, damping  of the wanted wall, for measures about one [N/m], [N s/m]
         frequency           at which the hand moves [Hz]
+        spectral_radius ... colliding_links  what else some measures need, as in `measures.wanted.WantedWall`
         """
-        return _verbs.measure(self, measure, stiffness, damping, frequency).about(self)
+        wanted = {name: value for name, value in locals().items() if name not in ("self", "measure")}
+        return _verbs.measure(self, measure, wanted).about(self)
 
     def bounds(self, damping: float | None = None) -> BoundsComparison:
         """Every published condition beside the exact limit; see `conditions.comparison.compare_bounds`.

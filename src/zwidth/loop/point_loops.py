@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from zwidth.loop.controller import Controller
 from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sections_batch import section_rows
@@ -47,6 +48,14 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
              that is reduced, encoders on the links in a reduced model, a computer with fixed feedback, a load,
              flexible links, a mechanism that is not plain (`drive_side.is_plain`) in a reduced model
     """
+    found = tables_of_points(point, [point.controller], coupled)
+    return None if found is None else found[0]
+
+
+def tables_of_points(
+    point: OperatingPoint, controllers: Sequence[Controller], coupled: bool = True
+) -> list[LoopTable] | None:
+    """`table_of_points` with each of several computers of one sampling period in place of the points' own."""
     point.require("dynamics", "sampling")
     model = point.model or "full"
     if point.response is not None or point.controller.fixed_feedback or point.load is not None or _alone(point):
@@ -62,7 +71,29 @@ def table_of_points(point: OperatingPoint, coupled: bool = True) -> LoopTable | 
     if _is_held(point, model) and not coupled:
         return None
     pairs = pole_pairs_of_points(point.flat if point.shape else point, model, coupled)
-    return loop_table(*section_rows(pairs, point.controller), point.controller)
+    return [loop_table(*section_rows(pairs, controller), controller) for controller in controllers]
+
+
+def modes_of_points(point: OperatingPoint) -> RenderedModes | None:
+    """Modes of all points' plants, flat, without operator; None where each point is to be asked alone: a measured
+    response, a reduced given plant or one of a single design, encoders on the links in a reduced model, a load,
+    flexible links, a mechanism that is not plain in a reduced model.
+
+    Their `input` is nan where dampers couple the modes; frequencies and shapes are those without damping.
+    """
+    point.require("dynamics")
+    model = point.model or "full"
+    if point.response is not None or point.load is not None:
+        return None
+    if point.mechanism is None and (model != "full" or not point.shape):
+        return None
+    if point.mechanism is not None and (
+        point.mechanism.flexible
+        or (point.encoders != "motor" and model != "full")
+        or not _known_together(point.mechanism, model)
+    ):
+        return None
+    return _modes(point.flat if point.shape else point, model)
 
 
 def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = True) -> PolePairs:

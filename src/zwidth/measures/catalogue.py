@@ -10,9 +10,21 @@ from zwidth.measures.definition import Better, Measure
 from zwidth.model.argument_checks import wrong_type
 
 _BINDINGS: Final = "zwidth.measures.bindings"
-_OF_THE_MECHANISM: Final = ("dexterity", "forces")  # files whose measures need no loop
-_OF_A_WALL: Final = ("wanted_wall", "wall_decay")  # files whose measures are all about a wanted wall
-_OF_DESIGNS: Final = (*_OF_THE_MECHANISM, "impedance", "wall_decay")  # files whose measures take many designs
+_OF_THE_MECHANISM: Final = ("dexterity", "forces", "geometry")  # files whose measures need no loop
+_OF_A_WALL: Final = (
+    "wanted_wall",
+    "wall_decay",
+    "margins",
+    "felt",
+)  # files whose measures are all about a wanted wall
+_OF_DESIGNS: Final = (
+    *_OF_THE_MECHANISM,
+    "impedance",
+    "wall_decay",
+    "margins",
+    "modes",
+    "felt",
+)  # files that take designs at once
 
 
 def _measure(
@@ -25,11 +37,13 @@ def _measure(
     *,
     each: bool = False,
     along: bool = True,
+    wall: bool | None = None,
+    linear: bool | None = None,
 ) -> Measure:
-    linear = file not in _OF_THE_MECHANISM
+    linear = file not in _OF_THE_MECHANISM if linear is None else linear
     function = f"{_BINDINGS}.{file}:{name}"
     of_designs = file in _OF_DESIGNS and not each
-    wall = file in _OF_A_WALL
+    wall = file in _OF_A_WALL if wall is None else wall
     return Measure(
         name, title, unit, better, source, function, each, along, linear, of_wall=wall, of_designs=of_designs
     )
@@ -98,9 +112,99 @@ _MEASURES: Final = (
         "dexterity", "rigid_mass", "Rigid mass of links and rotors", "kg", None, "Khatib 1987; thesis eq. 2.18"
     ),
     _measure("dexterity", "stiffness", "Structural stiffness", "N/m", "higher", "thesis eq. 2.34"),
+    # room that it needs and leaves, and its first vibration
+    _measure(
+        "modes",
+        "first_mode",
+        "Frequency of the first flexible mode",
+        "Hz",
+        "higher",
+        "least natural frequency above 0 of the plant without wall and hand",
+    ),
+    _measure(
+        "geometry",
+        "distance_to_singularity",
+        "Reciprocal condition number of the homogeneous Jacobian",
+        "",
+        "higher",
+        "Salisbury and Craig 1982; both kinds of singularity, Gosselin and Angeles 1990",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "joint_margin",
+        "Distance of the joints from their limits, in half ranges",
+        "",
+        "higher",
+        "1 in the middle of the range, 0 at a limit, inf without limits",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "link_clearance",
+        "Clearance between links that share no joint",
+        "m",
+        "higher",
+        "distance of rods with round ends, Ericson 2005 (known at second hand)",
+        along=False,
+        wall=True,
+    ),
+    _measure(
+        "geometry",
+        "reach",
+        "Largest distance of a link from the middle of the base",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "reach_x",
+        "Largest distance of a link from the middle of the base along x",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "reach_y",
+        "Largest distance of a link from the middle of the base along y",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
+    _measure(
+        "geometry",
+        "reach_z",
+        "Largest distance of a link from the middle of the base along z",
+        "m",
+        "lower",
+        "of the ends of all links",
+        along=False,
+    ),
     # walls that it can render
     _measure(
         "impedance", "stiffness_max", "Largest virtual stiffness", "N/m", "higher", "exact, by D-decomposition"
+    ),
+    _measure(
+        "impedance",
+        "stiffness_max_decaying",
+        "Largest virtual stiffness with a wanted decay",
+        "N/m",
+        "higher",
+        "exact, by D-decomposition on the circle of the wanted spectral radius",
+        wall=True,
+    ),
+    _measure(
+        "margins",
+        "stiffness_max_with_margins",
+        "Largest virtual stiffness with margins",
+        "N/m",
+        "higher",
+        "exact edges by D-decomposition, delays sampled, docs/measures.md",
     ),
     _measure(
         "impedance",
@@ -193,22 +297,47 @@ _MEASURES: Final = (
         each=True,
     ),
     _measure(
-        "wanted_wall",
+        "felt",
         "felt_stiffness",
         "Stiffness felt at the wanted wall",
         "N/m",
         "higher",
         "real part of force per displacement at the handle, docs/felt.md",
-        each=True,
     ),
     _measure(
-        "wanted_wall",
+        "felt",
         "free_motion_force",
         "Force per velocity felt in free motion",
         "N s/m",
         "lower",
         "size of the impedance without a wall, docs/felt.md",
+    ),
+    _measure(
+        "felt",
+        "rate_hardness",
+        "Rate-hardness: rate of the force on contact over the velocity",
+        "N/m",
+        "higher",
+        "Lawrence, Pao and others 2000 (abstract read), steepest mean rate, docs/measures.md",
+    ),
+    _measure(
+        "felt",
+        "impedance_ratio",
+        "Least ratio of the impedances of a wall and of free motion in a band",
+        "",
+        "higher",
+        "dynamic range, Colgate and Brown 1994 (known from the abstract), by frequency",
+    ),
+    _measure(
+        "buzz",
+        "buzz",
+        "Amplitude of a remaining vibration over the least that is felt",
+        "",
+        "lower",
+        "limit cycles by harmonic balance; thresholds as in docs/measures.md (second-hand)",
         each=True,
+        wall=True,
+        linear=False,
     ),
     # what a load does
     _measure(
@@ -271,6 +400,15 @@ _MEASURES: Final = (
         "N",
         "lower",
         "work of all drives' friction per metre",
+    ),
+    _measure(
+        "forces",
+        "motor_heat",
+        "Heat of all windings while a force is held",
+        "W",
+        "lower",
+        "sum of (torque/motor constant)^2",
+        wall=True,
     ),
 )
 

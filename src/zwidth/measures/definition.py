@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from zwidth.measures.moment_units import unit_of_moments
+from zwidth.measures.wanted import WantedWall, WantedWalls
 from zwidth.result import Result
 
 if TYPE_CHECKING:
@@ -16,6 +17,31 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from zwidth.loop.operating_point import OperatingPoint
+
+__all__ = [
+    "BEYOND_LIMIT",
+    "FAILED",
+    "MISSING",
+    "NO_EQUILIBRIUM",
+    "NO_POSTURE",
+    "NO_VALUE",
+    "OK",
+    "OUT_OF_REACH",
+    "SINGULAR",
+    "STATUS",
+    "UNDECIDED",
+    "UNREACHED",
+    "Better",
+    "Measure",
+    "MeasureError",
+    "MeasureValues",
+    "NoValueError",
+    "Note",
+    "Spelling",
+    "WantedWall",
+    "WantedWalls",
+    "as_argument",
+]
 
 Better = Literal["higher", "lower"]
 
@@ -29,6 +55,7 @@ UNDECIDED: Final = 4
 FAILED: Final = 5
 BEYOND_LIMIT: Final = 6
 NO_EQUILIBRIUM: Final = 7
+OUT_OF_TIME: Final = 8  # of a design or cell that a run with a time limit gave up
 MISSING: Final = 255
 NO_POSTURE: Final = (OUT_OF_REACH, SINGULAR, BEYOND_LIMIT)
 UNREACHED: Final = (*NO_POSTURE, NO_EQUILIBRIUM)
@@ -41,6 +68,7 @@ STATUS: Final = {
     FAILED: "failed",
     BEYOND_LIMIT: "beyond a joint limit",
     NO_EQUILIBRIUM: "no equilibrium",
+    OUT_OF_TIME: "out of time",
     MISSING: "not computed",
 }
 
@@ -153,30 +181,6 @@ class MeasureValues(Result):
 
 
 @dataclass(frozen=True)
-class WantedWall:
-    """The wall to be rendered, which some measures need; None where a number is not given.
-
-    stiffness, damping  [N/m], [N s/m]
-    frequency           at which the hand moves on it [Hz]
-    """
-
-    stiffness: float | None = None
-    damping: float | None = None
-    frequency: float | None = None
-
-
-@dataclass(frozen=True)
-class WantedWalls:
-    """The wall to be rendered by each of many designs, for measures that take designs all at once.
-
-    stiffness, damping  (...) [N/m], [N s/m]; they broadcast with the points
-    """
-
-    stiffness: NDArray[np.float64]
-    damping: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
 class Measure:
     """One number for a device at an operating point.
 
@@ -204,7 +208,7 @@ class Measure:
     along: bool = True
     linear: bool = True
     of_wall: bool = False
-    wall: WantedWall | WantedWalls = WantedWall()
+    wall: WantedWall | WantedWalls = WantedWall()  # noqa: RUF009  frozen
     of_designs: bool = False
 
     @property

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import MissingNumbersError, NoMechanismError
@@ -87,10 +88,21 @@ def measure_at(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    *,
+    spectral_radius: float | None = None,
+    stiffness_margin: float | None = None,
+    damping_margin: float | None = None,
+    delay_margin: float | None = None,
+    lowest_frequency: float | None = None,
+    highest_frequency: float | None = None,
+    force: float | None = None,
+    link_radius: float | None = None,
+    colliding_links: Sequence[str] | None = None,
 ) -> MeasureValues:
     """Evaluate a measure, of the catalogue by its name or a user's own, at operating points.
 
     stiffness, damping, frequency  of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures about it
+    spectral_radius ... colliding_links  what else some measures need, as in `measures.wanted.WantedWall`
     Raises  ValueError    for an unknown name
             MeasureError  where this device does not have the measure, or an argument that it needs is missing; the
                           text begins with its name
@@ -98,7 +110,21 @@ def measure_at(
     resolved = find_measure(measure) if isinstance(measure, str) else measure
     require("measure", resolved, Measure)
     try:
-        return evaluate(resolved.at_wall(WantedWall(stiffness, damping, frequency)), point)
+        wanted = WantedWall(
+            stiffness,
+            damping,
+            frequency,
+            spectral_radius,
+            stiffness_margin,
+            damping_margin,
+            delay_margin,
+            lowest_frequency,
+            highest_frequency,
+            force,
+            link_radius,
+            None if colliding_links is None else tuple(colliding_links),
+        )
+        return evaluate(resolved.at_wall(wanted), point)
     except MeasureError as error:
         raise error.with_name(resolved.name) from None
 
@@ -143,6 +169,33 @@ def complete_pointwise(
         if reason:
             why[index] = (int(status[index]), reason)
     return MeasureValues(values, status, notes_of_points(why))
+
+
+def complete_charts(
+    point: OperatingPoint,
+    flat: NDArray[np.float64],
+    states: NDArray[np.uint8],
+    alone: Callable[[tuple[int, ...]], float],
+    none_stable: str = "",
+) -> MeasureValues:
+    """Values at all points from those of their charts (N,), those in doubt by a function of an index.
+
+    states       (N,)   FOUND, NO_WALL or DOUBTFUL
+    none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
+    """
+    values, found = flat.reshape(point.shape), states.reshape(point.shape)
+    status, why = point.status.copy(), dict[tuple[int, ...], tuple[int, str]]()
+    without = (status == OK) & (found == NO_WALL) & bool(none_stable)
+    status[without] = NO_VALUE
+    why |= {tuple(int(i) for i in at): (NO_VALUE, none_stable) for at in np.argwhere(without)}
+    for index in np.argwhere((status == OK) & (found == DOUBTFUL)):
+        at = tuple(int(i) for i in index)
+        values[at], status[at], reason = evaluate_safely(lambda: alone(at))  # noqa: B023
+        if reason:
+            why[at] = (int(status[at]), reason)
+    return MeasureValues(
+        np.where(status == OK, values, np.nan), status, notes_of_points(dict(sorted(why.items())))
+    )
 
 
 def notes_of_points(why: dict[tuple[int, ...], tuple[int, str]]) -> tuple[Note, ...]:

@@ -145,6 +145,30 @@ def friction_along(jacobian: ArrayLike, direction: ArrayLike, frictions: ArrayLi
     return np.asarray(np.where(moves, _total(np.asarray(frictions, dtype=np.float64), q), np.nan))
 
 
+def heat_along(jacobian: ArrayLike, direction: ArrayLike, force: ArrayLike, motor_constants: ArrayLike) -> Floats:
+    """Heat in the windings while the drives hold a force exactly along a direction, at rest.
+
+        P = sum_i (F h_i / c_i)^2,    h = J^T u,   c_i = n_i k_i / sqrt(R_i)
+
+    With c the motor constant at the joint: a torque t takes the current t/(n k), which heats by R times its
+    square. R is that of the winding as warm as it then is.
+
+    jacobian   (..., 3, d)  J [m/rad]
+    direction  (..., 3)     u, unit vectors
+    force      (...)        F [N]
+    motor_constants  (..., d)  c [N m/sqrt(W)], of each drive at its joint
+    Returns    (...)        [W]; 0 across a mechanism's plane, where bearings hold the force; nan where J is nan
+    Raises     ValueError   if a direction is not of unit length
+
+    >>> J, c = [[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [0.1, 0.2]
+    >>> round(float(heat_along(J, [0.0, 1.0, 0.0], 2.0, c)), 9)
+    64.0
+    """
+    h = _torques_per_force(jacobian, direction)
+    torques = np.asarray(force, dtype=np.float64)[..., None] * h
+    return np.asarray(np.sum((torques / np.asarray(motor_constants, dtype=np.float64)) ** 2, axis=-1))
+
+
 def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
     """Rates q = J^+ u of the drives when the handle moves along u with unit speed, and whether it can.
 

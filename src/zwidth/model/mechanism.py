@@ -156,6 +156,7 @@ class Drives:
     torque_limit     (..., d)  at the motor [N m], inf if none
     encoder_counts   (..., d)  per motor revolution after quadrature, nan if not known
     continuous_torque (..., d)  what a motor bears without end, at the motor [N m], nan if not known; None: of none
+    winding_resistance (..., d)  of the motor's winding [ohm], nan if not known; None: of none
     winding_damping  (..., d)  k_t^2/R of a winding closed through a resistor, at the motor [N m s/rad]; None: none
     winding_time_constant  (..., d)  its L/R [s]
     nonlinearity     friction, springs that are not straight, brakes; None: none
@@ -180,6 +181,7 @@ class Drives:
     torque_limit: Array1
     encoder_counts: Array1
     continuous_torque: Array1 | None = None
+    winding_resistance: Array1 | None = None
     winding_damping: Array1 | None = None
     winding_time_constant: Array1 | None = None
     nonlinearity: DriveNonlinearity | None = None

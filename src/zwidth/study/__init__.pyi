@@ -10,6 +10,7 @@ from .designs.study_file import read_study as read_study
 from .designs.sweep import Sweep as Sweep
 from .designs.sweep import run_study as run_study
 from .designs.sweep import sweep as sweep
+from .jobs.executor_interface import open_executor as open_executor
 from .jobs.store import Store as Store
 from .load.bending import Bending as Bending
 from .load.bending import bending as bending
@@ -22,6 +23,9 @@ from .robust.family import Range as Range
 from .robust.robust_study import RobustError as RobustError
 from .robust.robust_study import RobustStudy as RobustStudy
 from .robust.robust_study import robust_study as robust_study
+from .safe_walls.safe_walls import SafeWallsError as SafeWallsError
+from .safe_walls.safe_walls import safe_walls as safe_walls
+from .safe_walls.table import SafeWalls as SafeWalls
 from .sensitivity.result import Sensitivities as Sensitivities
 from .sensitivity.sensitivities import sensitivities as sensitivities
 from .sensitivity.what_if import Variant as Variant

@@ -307,7 +307,10 @@ class DriveSection(Section):
         "torque constant of the motor; omitted: not known", "N m/A", gt=0, default=None
     )
     winding_resistance_ohm: Resistance | None = documented_key(
-        "resistance of the motor's winding; with damping_resistance_ohm", "ohm", gt=0, default=None
+        "resistance of the motor's winding, for its heat and for damping_resistance_ohm; omitted: not known",
+        "ohm",
+        gt=0,
+        default=None,
     )
     winding_inductance_H: Inductance | None = documented_key(
         "inductance of the motor's winding; with damping_resistance_ohm; omitted: none", "H", ge=0, default=None

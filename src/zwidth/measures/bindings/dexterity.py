@@ -15,22 +15,22 @@ from zwidth.model.mechanism import ORIENTATION, Floats
 
 def manipulability(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.1."""
-    return dexterity.manipulability(_by_drives(point), _freedoms(point))
+    return dexterity.manipulability(jacobian_by_drives(point), _freedoms(point))
 
 
 def isotropy(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.2, 2-norm."""
-    return dexterity.isotropy(_by_drives(point), _freedoms(point))
+    return dexterity.isotropy(jacobian_by_drives(point), _freedoms(point))
 
 
 def isotropy_frobenius(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.2, Frobenius norm, 1 where isotropic."""
-    return dexterity.isotropy_frobenius(_by_drives(point), _freedoms(point))
+    return dexterity.isotropy_frobenius(jacobian_by_drives(point), _freedoms(point))
 
 
 def dynamic_manipulability(point: OperatingPoint) -> Floats:
     """Thesis eq. 5.3, links and rotors."""
-    return dexterity.dynamic_manipulability(_by_drives(point), _driven_mass(point), _freedoms(point))
+    return dexterity.dynamic_manipulability(jacobian_by_drives(point), _driven_mass(point), _freedoms(point))
 
 
 def dynamic_isotropy(point: OperatingPoint) -> Floats:
@@ -40,7 +40,7 @@ def dynamic_isotropy(point: OperatingPoint) -> Floats:
 
 def handle_mass_isotropy(point: OperatingPoint) -> Floats:
     """Largest over smallest mass of links and rotors felt at the handle."""
-    return dexterity.handle_mass_isotropy(_by_drives(point), _driven_mass(point), _freedoms(point))
+    return dexterity.handle_mass_isotropy(jacobian_by_drives(point), _driven_mass(point), _freedoms(point))
 
 
 def link_side_mass(point: OperatingPoint) -> Floats:
@@ -63,7 +63,7 @@ def stiffness(point: OperatingPoint) -> Floats:
     return point.effective.stiffness
 
 
-def _by_drives(point: OperatingPoint) -> Floats:
+def jacobian_by_drives(point: OperatingPoint) -> Floats:
     """Jacobian (..., 3, d) of what the drives move, free joints at rest; of the orientation where they control
     that alone."""
     turns = point.mechanism is not None and point.mechanism.controls == ORIENTATION

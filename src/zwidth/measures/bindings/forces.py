@@ -10,7 +10,8 @@ import numpy as np
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures import forces
-from zwidth.measures.definition import MeasureError
+from zwidth.measures.bindings.preconditions import numbers_of
+from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
 from zwidth.model.mechanism import Floats
 
 
@@ -53,6 +54,19 @@ def friction_force(point: OperatingPoint) -> Floats:
     if dry is None or not np.any(dry.coulomb > 0.0):
         raise MeasureError(f"needs dry friction; give {_key(point, 0, 'coulomb_Nm')}, or that of another drive")
     return forces.friction_along(_jacobian(point), point.direction, point.drives.transmission * dry.coulomb)
+
+
+def motor_heat(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Floats:
+    """Heat in all windings while the drives hold the wanted force along the rendered direction [W]."""
+    jacobian, drives = _jacobian(point), point.drives
+    (force,) = numbers_of(wanted, point.shape, "a force to be held", "force")
+    constant = _require_finite(point, "torque_constant_Nm_per_A", drives.torque_constant)
+    known = drives.winding_resistance
+    missing = np.full(len(drives.names), np.nan)
+    resistance = _require_finite(point, "winding_resistance_ohm", missing if known is None else known)
+    return forces.heat_along(
+        jacobian, point.direction, force, drives.transmission * constant / np.sqrt(resistance)
+    )
 
 
 def _jacobian(point: OperatingPoint) -> Floats:

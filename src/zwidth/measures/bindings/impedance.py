@@ -10,20 +10,39 @@ from numpy.typing import NDArray
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
-from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, NoValueError
-from zwidth.measures.evaluate import evaluate_pointwise, evaluate_safely, notes_of_points
+from zwidth.measures.bindings.preconditions import numbers_of
+from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.evaluate import complete_charts, complete_pointwise, evaluate_pointwise
 
 Floats = NDArray[np.float64]
+Index = tuple[int, ...]
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
+NONE_DECAYS: Final = "no wall with K > 0 and B >= 0 has a spectral radius below the wanted one"
 
 
 def stiffness_max(point: OperatingPoint) -> MeasureValues:
     """Supremum of K over the stable walls with K > 0, B >= 0, of the points' models and loops [N/m]."""
     return _computed(point, STIFFEST, "stiffness", _stiffness_max_at, NONE_STABLE)
+
+
+def stiffness_max_decaying(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Supremum of K over the walls with K > 0, B >= 0 whose spectral radius is below the wanted one [N/m]."""
+    what = "the spectral radius that the wall must not exceed"
+    (radius,) = numbers_of(wanted, point.shape, what, "spectral_radius")
+
+    def alone(at: Index) -> float:
+        peak = largest_stiffness(point[at].loop, float(radius[at]))
+        if peak is None:
+            raise NoValueError(NONE_DECAYS)
+        return peak.stiffness
+
+    numbers = numbers_of_points(point, STIFFEST, radius)
+    if numbers is None:
+        return complete_pointwise(np.full(point.shape, np.nan), alone, point)
+    return complete_charts(point, numbers.stiffness, numbers.status, alone, NONE_DECAYS)
 
 
 def damping_max(point: OperatingPoint) -> MeasureValues:
@@ -58,19 +77,7 @@ def _computed(
     if numbers is None:
         return evaluate_pointwise(alone, point)
     states = numbers.decay_status if what == DECAY else numbers.status
-    values, found = getattr(numbers, number).reshape(point.shape), states.reshape(point.shape)
-    status, why = point.status.copy(), dict[tuple[int, ...], tuple[int, str]]()
-    without = (status == OK) & (found == NO_WALL) & bool(none_stable)
-    status[without] = NO_VALUE
-    why |= {tuple(int(i) for i in at): (NO_VALUE, none_stable) for at in np.argwhere(without)}
-    for index in np.argwhere((status == OK) & (found == DOUBTFUL)):
-        at = tuple(int(i) for i in index)
-        values[at], status[at], reason = evaluate_safely(lambda: alone(point[at]))  # noqa: B023
-        if reason:
-            why[at] = (int(status[at]), reason)
-    return MeasureValues(
-        np.where(status == OK, values, np.nan), status, notes_of_points(dict(sorted(why.items())))
-    )
+    return complete_charts(point, getattr(numbers, number), states, lambda at: alone(point[at]), none_stable)
 
 
 def _stiffness_max_at(point: OperatingPoint) -> float:

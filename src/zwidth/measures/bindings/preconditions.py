@@ -14,6 +14,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
 from zwidth.measures.handle_impedance import HandleError, handle_of
+from zwidth.measures.wanted import WANTED_BY_NAME
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 
@@ -33,8 +34,28 @@ def wall_of(wanted: WantedWall) -> tuple[float, float]:
 
 def walls_of(wanted: WantedWall | WantedWalls, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     """Stiffness and damping of the wall at each of many points. Raises MeasureError where they are not given."""
-    K, B = (wanted.stiffness, wanted.damping) if isinstance(wanted, WantedWalls) else wall_of(wanted)
-    return np.broadcast_to(K, shape), np.broadcast_to(B, shape)
+    K, B = numbers_of(wanted, shape, "a wanted wall", "stiffness", "damping")
+    return K, B
+
+
+def numbers_of(
+    wanted: WantedWall | WantedWalls, shape: tuple[int, ...], what: str, *names: str
+) -> tuple[Floats, ...]:
+    """Numbers by their names, each at every one of many points (...).
+
+    what    what the measure needs them for, such as "a wanted wall"
+    Raises  MeasureError  where one is not given, or not allowed
+    """
+    values = [getattr(wanted, name) for name in names]
+    if any(value is None for value in values):
+        raise MeasureError(f"needs {what}", [(name, None) for name in names])
+    for name, value in zip(names, values, strict=True):
+        number = WANTED_BY_NAME[name]
+        wrong = [float(one) for one in np.ravel(value) if not number.allows(one)]
+        if wrong and number.checked:
+            unit = f" {number.unit}" if number.unit else ""
+            raise MeasureError(f"needs {name} {number.allowed}{unit}, got {wrong[0]:g}{unit}")
+    return tuple(np.array(np.broadcast_to(value, shape), dtype=np.float64) for value in values)
 
 
 def frequency_of(wanted: WantedWall) -> float:

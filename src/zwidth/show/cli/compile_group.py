@@ -32,9 +32,13 @@ COMMANDS: Final = (
     (
         "move linkage.toml --plane 0,0.26,0,-1 --stiffness 2000 --damping 5 --push 0,2 --duration 0.05",
         "map linkage.toml --measure stiffness_max --cells 9,9 --output map.svg",
+        "map linkage.toml --measure stiffness_max_with_margins --measure felt_stiffness --measure rate_hardness "
+        "--cells 5,5 --stiffness 500 --damping 2 --frequency 5 --stiffness-margin 0.1 --damping-margin 0.1 "
+        "--delay-margin 0.5 --output margins.csv",
         "show linkage.toml",
         "chart linkage.toml --with-direction 1,0",
         "chart linkage.toml --model two-mass --operator thesis-arm",
+        "export linkage.toml --x -0.01,0.01 --y 0.17,0.19 --cells 1,1 --levels 2 --workers 1 --output walls.h",
         "show arm.toml --at upper=0.7,lower=1.4",
         "load linkage.toml --count 3",
         "chart arm.toml --set load.force_N=[0,-2] --set load.settle=true",
@@ -113,9 +117,22 @@ def identify_friction_of_a_step() -> None:
     )
 
 
+def margins_of_chords() -> None:
+    """The stiffest wall with margins of edges that compiled stages left in doubt."""
+    import numpy as np
+
+    from zwidth.chart.wall_margins import stiffness_with_chords
+    from zwidth.loop.controller import Controller
+    from zwidth.loop.loop import Loop
+    from zwidth.model.plant import Plant
+
+    one, none = np.ones(1), np.zeros((1, 1))
+    stiffness_with_chords([Loop(Plant(0.1 * one[:, None], none, none, one, one), Controller(0.001))], 1.1, 1.1)
+
+
 # What no short command line reaches, by group.
 RARE: Final[tuple[tuple[Callable[[], None], ...], ...]] = (
-    (compile_environments, run_estimators, identify_friction_of_a_step),
+    (compile_environments, run_estimators, identify_friction_of_a_step, margins_of_chords),
     (),
 )
 

@@ -28,6 +28,7 @@ COMMANDS: Final = {
     "sweep": ("sweep", "SweepCommand"),
     "tolerance": ("tolerance", "ToleranceCommand"),
     "optimise": ("optimise", "OptimiseCommand"),
+    "export": ("export", "ExportCommand"),
     "report": ("report", "ReportCommand"),
     "sensitivity": ("sensitivity", "SensitivityCommand"),
     "felt": ("felt", "FeltCommand"),

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.measures.catalogue import MEASURES
+from zwidth.measures.wanted import WANTED_NUMBERS, WantedNumber
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, processor_option, refuse_empty
+from zwidth.show.cli.resumable import check_workers, report_kept_work, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES
 
 if TYPE_CHECKING:
@@ -72,6 +74,13 @@ def _axis_range(name: str) -> Callable[[Callback], Callback]:
         help=f"Range along the plane's {'first' if name == 'x' else 'second'} axis [m]. Default: the "
         "workspace of the device file, or the reachable range.",
     )
+
+
+def _wanted_number(number: WantedNumber) -> Callable[[Callback], Callback]:
+    unit = f" [{number.unit}]" if number.unit else ""
+    meaning = number.meaning[0].upper() + number.meaning[1:]
+    name = number.name.replace("_", "-")
+    return click.option(f"--{name}", type=Finite(), metavar="NUMBER", help=f"{meaning}{unit}.")
 
 
 class MapCommand(Command):
@@ -140,6 +149,14 @@ class MapCommand(Command):
             metavar="F",
             help="Frequency of the hand's motion, for measures that depend on it [Hz].",
         ),
+        *(_wanted_number(one) for one in WANTED_NUMBERS[3:]),
+        click.option(
+            "--colliding-links",
+            metavar="A:B",
+            multiple=True,
+            help="Links that can collide, for link_clearance; repeatable. Default: all that are no neighbours.",
+        ),
+        worker_options,
         processor_option,
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
@@ -158,6 +175,9 @@ class MapCommand(Command):
         ]
         return "\b\nMeasures:\n" + "\n".join(lines) + "\n\n" + super().epilog()
 
+    def check(self, case: CommandLine) -> None:
+        check_workers(case.options)
+
     def parse(self, case: CommandLine) -> dict[str, Any]:
         from zwidth.measures.definition import WantedWall
 
@@ -165,7 +185,12 @@ class MapCommand(Command):
         frequency = case["frequency"]
         if frequency is not None and not (math.isfinite(frequency) and frequency > 0.0):
             raise BadInput(f"--frequency: must be positive, got {frequency:g}")
-        wall = WantedWall(case["stiffness"], case["damping"], frequency)
+        numbers = {one.name: case[one.name] for one in WANTED_NUMBERS}
+        for one in WANTED_NUMBERS[3:]:
+            value = numbers[one.name]
+            if value is not None and not one.allows(value):
+                raise BadInput(f"{as_option(one.name)}: must be {one.allowed}, got {value:g}")
+        wall = WantedWall(**numbers, colliding_links=case["colliding_links"] or None)
         return {"measures": measures, "requirements": required, "wall": wall}
 
     def repeated_options(self, case: CommandLine) -> dict[str, Any]:
@@ -192,17 +217,21 @@ class MapCommand(Command):
             raise BadInput(f"{question.name}: has no [mechanism], and so no workspace to map; use zwidth chart")
         try:
             plane = _plane(case)
-            dataset = workspace_map(
-                device,
-                case["measures"],
-                plane,
-                case["extreme"] or question.direction,
-                question.assembly,
-                question.model,
-                case["wall"],
-                progress=case.progress,
-                processor=case["processor"],
-            )
+            with report_kept_work(None):
+                dataset = workspace_map(
+                    device,
+                    case["measures"],
+                    plane,
+                    case["extreme"] or question.direction,
+                    question.assembly,
+                    question.model,
+                    case["wall"],
+                    progress=case.progress,
+                    workers=case["workers"],
+                    processor=case["processor"],
+                    time_limit=case["time_limit"],
+                    cluster=case["cluster"],
+                )
         except MeasureError as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except PlaneError as error:

@@ -328,6 +328,11 @@ def about_a_workspace(command: Callback) -> Callback:
     )
 
 
+def about_every_posture(command: Callback) -> Callback:
+    """The same for a command about all postures and all directions."""
+    return _with_device_options(command, DEVICE)
+
+
 def _with_device_options(command: Callback, device: Any, *where: Any) -> Callback:
     """The device, the options `where`, and those that every question about a device has."""
     decorators = [
@@ -355,10 +360,10 @@ def _with_device_options(command: Callback, device: Any, *where: Any) -> Callbac
     def with_arguments(
         device: str,
         assembly: Any,
-        direction: Any,
         model: Any,
         operator: Any,
         settings: Any,
+        direction: Any = None,
         at: Any = None,
         axis: Any = None,
         characteristic_length: Any = None,

@@ -1,16 +1,17 @@
-"""Long runs whose results are kept on disk, so that they can be stopped and go on."""
+"""Long runs: in several processes or on a cluster, kept on disk, so that they can be stopped and go on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.errors import BadInput, UnfinishedRun
-from zwidth.show.cli.options import Callback, refuse_empty
+from zwidth.show.cli.errors import BadInput, UnfinishedRun, as_option
+from zwidth.show.cli.options import Callback, Finite, refuse_empty
 from zwidth.show.cli.process import say, stopped_in_a_kernel
 from zwidth.show.output import printable
 
@@ -19,25 +20,54 @@ if TYPE_CHECKING:
     from zwidth.study.jobs.store import Store
 
 
-def resume_options(command: Callback) -> Callback:
-    """Give a command `--resume` and `--workers`."""
+resume_option: Final = click.option(
+    "--resume",
+    metavar="FOLDER",
+    callback=refuse_empty,
+    help="Save finished work here; the same command continues from it.",
+)
+
+
+def worker_options(command: Callback) -> Callback:
+    """Give a command `--workers`, `--cluster` and `--time-limit`."""
     options: list[Callable[[Any], Any]] = [
-        click.option(
-            "--resume",
-            metavar="FOLDER",
-            callback=refuse_empty,
-            help="Save finished work here; the same command continues from it.",
-        ),
         click.option(
             "--workers",
             type=click.IntRange(min=1),
             metavar="N",
             help="Largest number of processes for a long run. Default: one for each core.",
         ),
+        click.option(
+            "--cluster",
+            metavar="ADDRESS",
+            callback=refuse_empty,
+            help="Compute on the dask cluster whose scheduler has this address, such as tcp://192.168.1.5:8786, "
+            "or 'local' for one on this computer.",
+        ),
+        click.option(
+            "--time-limit",
+            type=Finite(),
+            metavar="SECONDS",
+            help="Give up a design or cell that takes longer: it is 'out of time', the others keep their values.",
+        ),
     ]
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def check_workers(options: Mapping[str, Any]) -> None:
+    """Refuse options of a run that do not go together. Raises BadInput."""
+    limit, cluster = options["time_limit"], options["cluster"]
+    if limit is not None and not (math.isfinite(limit) and limit > 0.0):
+        raise BadInput(f"--time-limit: must be positive, got {limit:g}; leave it out for none")
+    if options["workers"] is not None and cluster not in (None, "local"):
+        raise BadInput(
+            f"--workers: is for processes of this computer; the cluster at {printable(cluster)} has its own"
+        )
+    for name in ("cluster", "time_limit"):
+        if options[name] is not None and options["processor"] == "cuda":
+            raise BadInput(f"{as_option(name)}: needs processes, and --processor cuda computes in this one alone")
 
 
 def open_store(job: Job, beside: Path | None, resume: str | None) -> Store | None:
@@ -67,10 +97,12 @@ def _default_folder(beside: Path | None) -> Path:
 def report_kept_work(store: Store | None) -> Iterator[None]:
     """Run inside this block; says where the work is if it is stopped.
 
-    Raises  Stopped   where a process that computed is lost
-            BadInput  where the disk refuses
+    Raises  UnfinishedRun  where no process computes, or a cluster has ended
+            BadInput       where the disk refuses, another run computes here, or a cluster does not answer
     """
-    from zwidth.study.jobs.workers import WorkerLost
+    from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
+    from zwidth.study.jobs.recovery import CannotStart, WorkerLost
+    from zwidth.study.jobs.store import StoreError
 
     goes_on = (
         ""
@@ -84,12 +116,17 @@ def report_kept_work(store: Store | None) -> Iterator[None]:
         if stopped and store is not None and store.batch is not None:
             say(f"zwidth: {goes_on}")
         raise
-    except WorkerLost as error:
+    except (ClusterEnded, CannotStart, WorkerLost) as error:
         raise UnfinishedRun("; ".join(filter(None, (str(error), goes_on)))) from None
+    except ClusterError as error:
+        raise BadInput(f"--cluster: {error}") from None
+    except StoreError as error:
+        raise BadInput(str(error)) from None
     except OSError as error:
         if store is None:
             raise
-        raise BadInput(_unwritable(store.path, error)) from None
+        kept = "" if store.batch is None else f"; {goes_on}"
+        raise BadInput(_unwritable(store.path, error) + kept) from None
 
 
 def _unwritable(path: Path, error: OSError) -> str:

@@ -15,7 +15,8 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, processor_option, refuse_empty
-from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
+from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
 from zwidth.show.units import number, typed
 
@@ -84,7 +85,8 @@ class SweepCommand(Command):
     """Compare many designs of a device: measures over any numbers of its file, described in STUDY.toml.
 
     Designs that are no valid device, or out of reach, are marked by their status. Long runs are spread over
-    processes; with --resume or --output a run can be stopped, and the same command continues it.
+    processes, or over the computers of a cluster; with --resume or --output a run can be stopped, and the same
+    command continues it.
     """
 
     name = "sweep"
@@ -93,13 +95,20 @@ class SweepCommand(Command):
         "zwidth sweep my-study.toml",
         "zwidth sweep my-study.toml --output designs.svg",
         "zwidth sweep my-study.toml --resume my-study.cells --workers 4 --output designs.nc",
+        "zwidth sweep my-study.toml --cluster tcp://192.168.1.5:8786 --output designs.zarr",
     )
-    options = (resume_options, processor_option)
+    options = (resume_option, worker_options, processor_option)
     outputs = (*FIGURES, *DATA, *ARRAYS, *FOLDERS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat .zarr)."
 
     def about(self, command: Callback) -> Callback:
         return about_a_study(command)
+
+    def run(self, question: Question, as_json: bool, output: str | None = None, **options: Any) -> int:
+        return super().run(question, as_json, output, printed=as_json, **options)
+
+    def check(self, case: CommandLine) -> None:
+        check_workers(case.options)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return circumstances_of_study(case)
@@ -108,21 +117,35 @@ class SweepCommand(Command):
         from zwidth.measures.definition import MeasureError
         from zwidth.memory_limit import TooLarge
         from zwidth.study.designs.sweep import compute_designs
+        from zwidth.study.designs.sweep_data import check_listing
         from zwidth.study.designs.sweep_job import sweep_job
 
         question = case.question
         assert isinstance(question, StudyQuestion)
+        documents = _wants_document(case)
         try:
             job = sweep_job(question.study)
+            if documents or _lists_all(case):
+                check_listing(job, documents)
             store = open_store(job, case.path, case["resume"])
             with report_kept_work(store):
                 return compute_designs(
-                    question.study, job, store, case.progress, case["workers"], case["processor"]
+                    question.study,
+                    job,
+                    store,
+                    case.progress,
+                    case["workers"],
+                    case["processor"],
+                    time_limit=case["time_limit"],
+                    cluster=case["cluster"],
                 )
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         except MeasureError as error:
             raise BadInput(*(f"{question.name}: measures: {line}" for line in str(error).splitlines())) from None
+
+    def document(self, case: CommandLine, result: Sweep) -> dict[str, Any]:
+        return dict(result.document()) if _wants_document(case) else {}
 
     def reason(self, case: CommandLine, result: Sweep) -> str | None:
         return result.reason
@@ -159,11 +182,16 @@ class SweepCommand(Command):
         yield from _reasons(result)
 
     def write(self, case: CommandLine, result: Sweep, document: dict[str, Any], reason: str | None) -> str | None:
-        from zwidth.show.dataset import write_dataset, write_zarr
+        from zwidth.show.dataset import write_dataset
+        from zwidth.show.sweep_files import write_sweep_csv, write_sweep_zarr
 
         assert case.path is not None
-        if case.writes((*ARRAYS, *FOLDERS)):
-            (write_zarr if case.writes(FOLDERS) else write_dataset)(case.path, result.dataset())
+        if case.writes(FOLDERS):
+            write_sweep_zarr(case.path, result)
+        elif case.writes(ARRAYS):
+            write_dataset(case.path, result.dataset())
+        elif case.writes([".csv"]):
+            write_sweep_csv(case.path, result, keys_of_moments if self.is_about_moments(case) else dict)
         else:
             super().write(case, result, document, reason)
         if case["resume"] is None and (store := open_store(result.job, case.path, None)) is not None:
@@ -182,6 +210,16 @@ class SweepCommand(Command):
         return study_figure(result.dataset())
 
 
+def _wants_document(case: CommandLine) -> bool:
+    """Whether every design is listed in a document: printed by --json, or written."""
+    return bool(case["printed"]) or (case.path is not None and case.writes([".json"]))
+
+
+def _lists_all(case: CommandLine) -> bool:
+    """Whether a file is written that lists all designs at once, and not piece by piece."""
+    return case.path is not None and not case.writes([".csv", *FOLDERS])
+
+
 def _heading(one: Column) -> str:
     return f"{one.name} [{one.unit}]" if one.unit else one.name
 
@@ -196,25 +234,20 @@ def _design_texts(sweep: Sweep, design: int) -> list[str]:
 
 def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
     """The extremes of one column, with their designs; and how many designs there are of each status."""
-    import numpy as np
-
-    from zwidth.measures.definition import OK, STATUS
+    from zwidth.measures.definition import STATUS
     from zwidth.show.units import quantity
     from zwidth.study.designs.sweep_data import axis_value_text
 
-    one, sampling = sweep.job.columns[column], sweep.job.sampling
-    values, status = sweep.cells.values[:, column], sweep.cells.status[:, column]
-    there = np.flatnonzero(status == OK)
-    for name, pick in (("lowest", np.argmin), ("highest", np.argmax)):
-        if len(there):
-            n = int(there[int(pick(values[there]))])
+    one, sampling, summary = sweep.job.columns[column], sweep.job.sampling, sweep.summaries[column]
+    for name, extreme in (("lowest", summary.lowest), ("highest", summary.highest)):
+        if extreme is not None:
+            value, design = extreme
             where = ", ".join(
                 f"{axis.key} = {axis_value_text(v)}"
-                for axis, v in zip(sampling.axes, sampling.values(n), strict=True)
+                for axis, v in zip(sampling.axes, sampling.values(design), strict=True)
             )
-            yield name, f"{typed(quantity(float(values[n]), one.unit))} at {where}"
-    kinds, counts = np.unique(status, return_counts=True)
-    yield "designs", ", ".join(f"{n} {STATUS[int(kind)]}" for kind, n in zip(kinds, counts, strict=True))
+            yield name, f"{typed(quantity(value, one.unit))} at {where}"
+    yield "designs", ", ".join(f"{n} {STATUS[kind]}" for kind, n in summary.by_status)
 
 
 def _reasons(sweep: Sweep) -> Iterator[str]:

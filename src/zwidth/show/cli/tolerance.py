@@ -17,7 +17,7 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, refuse_empty
-from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.tolerance_text import (
     advice_sentence,
@@ -99,7 +99,8 @@ class ToleranceCommand(Command):
         click.option(
             "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the draws, in place of the file's."
         ),
-        resume_options,
+        resume_option,
+        worker_options,
     )
     outputs = (*FIGURES, *DATA, *ARRAYS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .nc .mat: drawn devices, .json: all)."
@@ -110,6 +111,9 @@ class ToleranceCommand(Command):
             return command(ToleranceFile(study, samples=samples, seed=seed), **more)
 
         return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
+
+    def check(self, case: CommandLine) -> None:
+        check_workers({**case.options, "processor": "cpu"})
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         device = case.device
@@ -203,6 +207,7 @@ class ToleranceCommand(Command):
 def _computing(case: CommandLine) -> Callable[[str, Job, str], CellValues]:
     """Computes jobs, each with a store of its own in the folder of this run."""
     from zwidth.study.jobs.executor import run
+    from zwidth.study.tolerances.tolerance_study import in_memory
 
     folder = _folder(case)
     if folder is not None and (folder / "zarr.json").exists():
@@ -213,7 +218,16 @@ def _computing(case: CommandLine) -> Callable[[str, Job, str], CellValues]:
         if folder is not None:
             store = open_store(job, None, str(folder / name))
         with report_kept_work(store):
-            return run(job, store, case.progress, case["workers"], stage=stage)
+            cells = run(
+                job,
+                store,
+                case.progress,
+                case["workers"],
+                stage=stage,
+                time_limit=case["time_limit"],
+                cluster=case["cluster"],
+            )
+            return in_memory(cells)
 
     return compute
 

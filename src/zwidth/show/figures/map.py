@@ -14,7 +14,15 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from zwidth.measures.definition import BEYOND_LIMIT, FAILED, NO_EQUILIBRIUM, NO_VALUE, SINGULAR, UNDECIDED
+from zwidth.measures.definition import (
+    BEYOND_LIMIT,
+    FAILED,
+    NO_EQUILIBRIUM,
+    NO_VALUE,
+    OUT_OF_TIME,
+    SINGULAR,
+    UNDECIDED,
+)
 from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
 from zwidth.show.figures.mechanism import drawn_links, joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
@@ -37,6 +45,7 @@ MARKS: Final = {
     NO_VALUE: ("no value", "////"),
     UNDECIDED: ("undecided", "...."),
     FAILED: ("failed", "\\\\\\\\"),
+    OUT_OF_TIME: ("out of time", "oo"),
 }
 HATCHES: Final = ("\\\\", "//", "||", "--", "xx")
 INFINITE_COLOUR: Final = "#C8C8C8"

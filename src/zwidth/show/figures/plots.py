@@ -282,6 +282,12 @@ def _optimisation(ax: Axes, result: Any) -> None:
     draw_optimisation(ax, result)
 
 
+def _safe_walls(ax: Axes, result: Any) -> None:
+    from zwidth.show.figures.safe_walls import draw_safe_walls
+
+    draw_safe_walls(ax, result)
+
+
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
     "CommonChart": _robust,
@@ -311,4 +317,5 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "Identification": _identification,
     "ToleranceStudy": _tolerance,
     "Optimisation": _optimisation,
+    "SafeWalls": _safe_walls,
 }

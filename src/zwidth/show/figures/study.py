@@ -22,6 +22,7 @@ from zwidth.measures.definition import (
     NO_EQUILIBRIUM,
     NO_VALUE,
     OUT_OF_REACH,
+    OUT_OF_TIME,
     SINGULAR,
     STATUS,
     UNDECIDED,
@@ -45,6 +46,7 @@ SYMBOLS: Final = {
     NO_VALUE: "o",
     UNDECIDED: "d",
     FAILED: "v",
+    OUT_OF_TIME: "^",
 }
 SAME: Final = 1e-9  # share by which the values of a constant column differ
 MOST_PANELS: Final = 12

@@ -13,11 +13,12 @@ from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, plural, quote, suggestion
 from zwidth.device.schema import device_file as schema
 from zwidth.device.toml_access import is_number, tables
+from zwidth.measures.wanted import WANTED_BY_KEY
 from zwidth.model.reduction import MODELS
 from zwidth.study.designs.catalogue import CatalogueError, read_catalogue
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, Tie, spread
 
-UNITS: Final = {"stiffness_N_per_m": "N/m", "damping_Ns_per_m": "N s/m", "frequency_Hz": "Hz"}
+UNITS: Final = {key: one.unit for key, one in WANTED_BY_KEY.items()}
 NUMBER: Final = ("number", "integer")
 SEARCH: Final = "search"  # how designs are spread over bounds
 
@@ -387,10 +388,10 @@ def _numbers(value: Any) -> bool:
 def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None) -> Iterator[Fault]:
     """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
     if key in WANTED:
-        least = "above 0" if key == "frequency_Hz" else "at least 0"
+        number = WANTED_BY_KEY[key]
         for where, value in _values(table):
-            if not is_number(value) or not isfinite(value) or value < 0 or (value == 0 and least == "above 0"):
-                yield (where, f"must be a finite number, {least}, got {quote(value)}")
+            if not is_number(value) or not number.allows(value):
+                yield (where, f"must be a finite number, {number.allowed}, got {quote(value)}")
         return
     if "range" in table:
         yield (("range",), f"cannot be used: {key} is not a number; write values = [...]")

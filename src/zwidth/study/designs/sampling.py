@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import exp, log, prod
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.measures.wanted import WANTED_BY_KEY
 from zwidth.study.designs.catalogue import Part
+from zwidth.study.designs.latin_hypercube import share, shares
 
-WANTED: Final = ("stiffness_N_per_m", "damping_Ns_per_m", "frequency_Hz")
+WANTED: Final = tuple(WANTED_BY_KEY)
 CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)
 
 
@@ -110,6 +111,18 @@ class Axis:
             return float(min(max(exp(log(low) + share * (log(high) - log(low))), low), high))
         return float(min(low + share * (high - low), high))
 
+    def values_at(self, shares: NDArray[np.float64]) -> list[Any]:
+        """The values at many shares, the same as of `at`.
+
+        >>> Axis("a", (), (1.0, 3.0)).values_at(np.array([0.0, 0.5]))
+        [1.0, 2.0]
+        """
+        if self.span is None or self.log:
+            return [self.at(share) for share in shares.tolist()]
+        low, high = self.span
+        along: list[Any] = np.minimum(low + shares * (high - low), high).tolist()
+        return along
+
 
 def spread(span: tuple[float, float], count: int, *, logarithmic: bool = False) -> tuple[float, ...]:
     """Divide a range into `count` values, its ends exactly among them; one value is the lower end.
@@ -126,9 +139,9 @@ class Sampling:
     """The designs of a study, numbered from 0.
 
     A grid has every combination; the last axis changes fastest. A Latin hypercube of n designs divides each axis
-    into n equal parts and has one design in each, at a random place in it (McKay, Beckman and Conover 1979,
-    known at second hand): the parts of the axes are paired at random, the same for the same seed. Of paired axes
-    the n-th design has the n-th value of each.
+    into n equal parts and has one design in each, at a random place in it: the parts of the axes are paired at
+    random, the same for the same seed (`latin_hypercube`). Of paired axes the n-th design has the n-th value of
+    each. Nothing grows with the number of designs of a grid or a hypercube.
 
     size    number of designs of the Latin hypercube; None: a grid, or paired axes
     seed    of its random numbers
@@ -164,11 +177,12 @@ class Sampling:
         (2, 'y')
         """
         if self.size is not None:
-            return tuple(axis.at(share) for axis, share in zip(self.axes, self._shares[design], strict=True))
+            places = (share(self.seed, n, self.size, design) for n in range(len(self.axes)))
+            return tuple(axis.at(place) for axis, place in zip(self.axes, places, strict=True))
         if self.paired:
             return tuple(axis.values[design] for axis in self.axes)
-        places = np.unravel_index(design, self.shape)
-        return tuple(axis.values[int(place)] for axis, place in zip(self.axes, places, strict=True))
+        steps = np.unravel_index(design, self.shape)
+        return tuple(axis.values[int(step)] for axis, step in zip(self.axes, steps, strict=True))
 
     def columns(self, first: int, last: int) -> list[tuple[Axis, Sequence[Any], NDArray[np.int64]]]:
         """Of designs first to last - 1: each axis, values along it, and at which of them each design is.
@@ -182,20 +196,11 @@ class Sampling:
         if self.size is None:
             places = np.unravel_index(designs, self.shape) if self.axes else ()
             return [(axis, axis.values, place) for axis, place in zip(self.axes, places, strict=True)]
-        own = designs - first
-        shares = self._shares[first:last].T
+        own, size = designs - first, self.size
         return [
-            (axis, [axis.at(share) for share in each], own) for axis, each in zip(self.axes, shares, strict=True)
+            (axis, axis.values_at(shares(self.seed, n, size, first, last)), own)
+            for n, axis in enumerate(self.axes)
         ]
-
-    @cached_property
-    def _shares(self) -> NDArray[np.float64]:
-        """Share 0..1 of the way along each axis at which each design lies, (size, axes)."""
-        assert self.size is not None
-        random = np.random.default_rng(self.seed)
-        columns = [(random.permutation(self.size) + random.random(self.size)) / self.size for _ in self.axes]
-        # the division may round up to 1
-        return np.minimum(np.stack(columns, axis=1), np.nextafter(1.0, 0.0))
 
 
 def settings(axes: tuple[Axis, ...], values: tuple[Any, ...]) -> Iterator[tuple[str, Any]]:

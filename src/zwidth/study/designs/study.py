@@ -15,22 +15,20 @@ from zwidth.device.faults import DeviceError, KeyPath, nearest, plural
 from zwidth.device.toml_access import is_number, table, tables
 from zwidth.device.validation_messages import validation_messages
 from zwidth.measures.definition import Measure, Spelling, WantedWall
-from zwidth.memory_limit import check_memory
+from zwidth.measures.wanted import WANTED_NUMBERS
+from zwidth.memory_limit import TooLarge
 from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
-from zwidth.study.designs.study_schema import StudyFile, description, unknown
+from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
 from zwidth.study.designs.task import DEMANDS, Task, task_of
 from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of
 
-PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
-PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose values are kept as they are written
+MOST_ALONG: Final = 10**6  # values of one axis that has a range and a count
 # Argument in Python -> what it is called as a key of a study file, or of its [workspace].
 KEYS: Final[dict[str, str]] = {
     "position": "at",
-    "stiffness": "stiffness_N_per_m",
-    "damping": "damping_Ns_per_m",
-    "frequency": "frequency_Hz",
+    **{one.name: one.key for one in WANTED_NUMBERS},
     "axes": "plane",
     "cells": "count",
 }
@@ -57,7 +55,7 @@ class Study:
     sampling   the designs
     columns    the measures, one column of the result each
     at, direction, assembly, model   circumstances that no axis sets; None: those of the device file
-    wall       stiffness, damping and frequency that some measures need, as far as no axis sets them
+    wall       the wanted wall and what else some measures need, as far as no axis sets it
     plane      grid over the workspace; None where no measure is over it
     task       where measures are taken instead; None without a [task]
     user_measures  measures of the user's own, by name
@@ -156,7 +154,10 @@ def check_study(
         direction=checked.direction,
         assembly=checked.assembly,
         model=checked.model,
-        wall=WantedWall(checked.stiffness_N_per_m, checked.damping_Ns_per_m, checked.frequency_Hz),
+        wall=WantedWall(
+            **{one.name: getattr(checked, one.key) for one in WANTED_NUMBERS},
+            colliding_links=checked.colliding_links,
+        ),
         plane=plane,
         task=task,
         user_measures=user_measures or {},
@@ -293,13 +294,18 @@ def _task(
 
 
 def _check_size(checked: StudyFile, hypercube: bool) -> None:
-    """Raises TooLarge where the designs would not fit into memory, before any of them is made."""
+    """Raise TooLarge for more designs than any computer takes, before any of them is made.
+
+    Whether fewer fit into memory, or on the disk, depends on where they are kept: `executor.run` and `Store` see.
+    """
     each = [len(axis.values) if axis.values is not None else axis.count or 1 for axis in checked.axis]
     designs = (checked.count or 0) if hypercube else each[0] if checked.sampling == "paired" else prod(each)
-    ties = sum(len(axis.tie) for axis in checked.axis)
-    numbers = designs * (PER_VALUE * len(checked.measures) + PER_AXIS * (len(checked.axis) + ties))
-    check_memory(
-        float(numbers),
-        f"{plural(designs, 'design')} of {plural(len(checked.measures), 'measure')}",
-        "lower a count",
-    )
+    many = f"{plural(designs, 'design')} of {plural(len(checked.measures), 'measure')}"
+    if designs > MOST:
+        raise TooLarge(f"{many} are more than zwidth computes, {MOST} at most; lower a count")
+    for axis in checked.axis:
+        if axis.values is None and (axis.count or 1) > MOST_ALONG:
+            raise TooLarge(
+                f"{many}: the axis {axis.key} has {axis.count} values, and {MOST_ALONG} at most are listed; lower "
+                "its count, or use a Latin hypercube"
+            )

@@ -11,6 +11,7 @@ from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath
 from zwidth.device.toml_access import is_number
 from zwidth.measures.definition import Measure, as_argument
+from zwidth.measures.wanted import WANTED_NUMBERS
 from zwidth.model.argument_checks import require, wrong_type
 from zwidth.study.designs.axis_tables import Faults
 from zwidth.study.designs.column import measure_list
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 
 LABEL: Final = "sweep"
 VECTORS: Final = ("at", "direction")  # of which each value is a list
-RENAMED_ARGUMENTS: Final = ("position", "stiffness", "damping", "frequency")  # that a study file calls otherwise
+# Arguments that a study file calls otherwise.
+RENAMED_ARGUMENTS: Final = ("position", *(one.name for one in WANTED_NUMBERS if one.name != one.key))
 ARGUMENTS: Final = {KEYS[name]: name for name in RENAMED_ARGUMENTS} | {"axis": "axes", "workspace": "plane"}
 
 
@@ -41,6 +43,15 @@ def study_over(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    spectral_radius: float | None = None,
+    stiffness_margin: float | None = None,
+    damping_margin: float | None = None,
+    delay_margin: float | None = None,
+    lowest_frequency: float | None = None,
+    highest_frequency: float | None = None,
+    force: float | None = None,
+    link_radius: float | None = None,
+    colliding_links: Sequence[str] | None = None,
     paired: bool = False,
     plane: PlaneGrid | None = None,
     user_measures: Mapping[str, Measure] | None = None,
@@ -63,6 +74,15 @@ def study_over(
         "stiffness": stiffness,
         "damping": damping,
         "frequency": frequency,
+        "spectral_radius": spectral_radius,
+        "stiffness_margin": stiffness_margin,
+        "damping_margin": damping_margin,
+        "delay_margin": delay_margin,
+        "lowest_frequency": lowest_frequency,
+        "highest_frequency": highest_frequency,
+        "force": force,
+        "link_radius": link_radius,
+        "colliding_links": colliding_links,
     }
     document: dict[str, Any] = {
         "device": device.label,

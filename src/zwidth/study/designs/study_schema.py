@@ -229,6 +229,31 @@ class StudyFile(Section):
     stiffness_N_per_m: Number | None = documented_key("of the wanted wall", "N/m", ge=0, default=None)
     damping_Ns_per_m: Number | None = documented_key("of the wanted wall", "N s/m", ge=0, default=None)
     frequency_Hz: Number | None = documented_key("at which the hand moves", "Hz", gt=0, default=None)
+    spectral_radius: Number | None = documented_key(
+        "that the wall must not exceed: vibration shrinks at least by it per sample", gt=0, le=1, default=None
+    )
+    stiffness_margin: Number | None = documented_key(
+        "share by which the wall's stiffness may be off", ge=0, default=None
+    )
+    damping_margin: Number | None = documented_key(
+        "share by which the wall's damping may be off", ge=0, default=None
+    )
+    delay_margin_samples: Number | None = documented_key(
+        "by which the delay may be longer", "samples", ge=0, le=20, default=None
+    )
+    lowest_frequency_Hz: Number | None = documented_key(
+        "lower end of the band of motion", "Hz", gt=0, default=None
+    )
+    highest_frequency_Hz: Number | None = documented_key(
+        "upper end of the band of motion", "Hz", gt=0, default=None
+    )
+    force_N: Number | None = documented_key("to be held along the rendered direction", "N", ge=0, default=None)
+    link_radius_m: Number | None = documented_key(
+        "of the links, taken for rods with round ends", "m", ge=0, default=None
+    )
+    colliding_links: tuple[Text, ...] | None = documented_key(
+        'pairs of links that can collide, each "A:B"; all that are no neighbours where left out', default=None
+    )
     workspace: StudyWorkspaceSection | None = documented_key("for measures over a workspace", default=None)
     task: TaskSection | None = documented_key("what the device is for", default=None)
     optimise: OptimiseSection | None = documented_key("for an optimiser", default=None)

@@ -9,9 +9,8 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
 
 from zwidth import _verbs
 from zwidth.device.device import Device
@@ -25,10 +24,18 @@ from zwidth.study.designs.sampling import settings
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_arguments import study_over
 from zwidth.study.designs.study_file import read_study
-from zwidth.study.designs.sweep_data import as_dataset, note_sentences, sweep_document, sweep_table
+from zwidth.study.designs.sweep_data import (
+    as_dataset,
+    check_listing,
+    note_sentences,
+    sweep_document,
+    sweep_table,
+)
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
+from zwidth.study.designs.sweep_summary import ColumnSummary, summaries
 from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.executor_interface import Executor
+from zwidth.study.jobs.job import Cells
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.plane_grid import PlaneGrid
 
@@ -46,12 +53,12 @@ SHOWN: Final = 3  # columns of a repr
 class Sweep(Result):
     """A study and its results.
 
-    cells  values and status (designs, columns), in the designs' order
+    cells  values and status (designs, columns), in the designs' order; of a large study in its store
     """
 
     study: Study
     job: SweepJob
-    cells: CellValues
+    cells: Cells
 
     def __repr__(self) -> str:
         axes = ", ".join(axis.key for axis in self.job.sampling.axes)
@@ -63,10 +70,16 @@ class Sweep(Result):
     @property
     def reason(self) -> str | None:
         """Why no design has a value: the first reason, or else their status; None where a design has one."""
-        if (self.cells.status == OK).any():
+        if any(one.counts[OK] for one in self.summaries):
             return None
-        status = ", ".join(STATUS[int(k)] for k in np.unique(self.cells.status))
+        kinds = sorted({kind for one in self.summaries for kind, _ in one.by_status})
+        status = ", ".join(STATUS[kind] for kind in kinds)
         return f"{NO_DESIGN}: {next((sentence for _, sentence in note_sentences(self)), status)}"
+
+    @cached_property
+    def summaries(self) -> tuple[ColumnSummary, ...]:
+        """The extremes of each column, and how many designs there are of each status."""
+        return summaries(self.cells, len(self.job.columns))
 
     def design(self, number: int) -> dict[str, Any]:
         """Path -> value of each number and circumstance that a design sets, by its number from 0; and the
@@ -89,10 +102,11 @@ class Sweep(Result):
         return sweep_table(self)
 
     def _extremes(self, column: int) -> str:
-        one, values = self.job.columns[column], self.cells.values[:, column]
-        known = values[self.cells.status[:, column] == OK]
-        span = f"{known.min():.4g} to {known.max():.4g} {one.unit}".rstrip() + ", " if len(known) else ""
-        return f"{one.name}: {span}{len(known)} of {len(values)} have a value"
+        one, summary = self.job.columns[column], self.summaries[column]
+        span = ""
+        if summary.lowest is not None and summary.highest is not None:
+            span = f"{summary.lowest[0]:.4g} to {summary.highest[0]:.4g} {one.unit}".rstrip() + ", "
+        return f"{one.name}: {span}{summary.counts[OK]} of {self.job.count} have a value"
 
 
 def sweep(
@@ -107,6 +121,15 @@ def sweep(
     stiffness: float | None = None,
     damping: float | None = None,
     frequency: float | None = None,
+    spectral_radius: float | None = None,
+    stiffness_margin: float | None = None,
+    damping_margin: float | None = None,
+    delay_margin: float | None = None,
+    lowest_frequency: float | None = None,
+    highest_frequency: float | None = None,
+    force: float | None = None,
+    link_radius: float | None = None,
+    colliding_links: Sequence[str] | None = None,
     paired: bool = False,
     plane: PlaneGrid | None = None,
     user_measures: Mapping[str, Measure] | None = None,
@@ -114,6 +137,9 @@ def sweep(
     progress: Progress | None = None,
     workers: int | None = None,
     processor: Processor = "cpu",
+    time_limit: float | None = None,
+    cluster: str | None = None,
+    executor: Executor | None = None,
 ) -> xr.Dataset:
     """Measures of a device with every combination of other numbers, or with those of paired axes.
 
@@ -121,12 +147,13 @@ def sweep(
 
     axes           path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly,
                    model, operator (names, files, "none"), and of the wanted wall stiffness_N_per_m,
-                   damping_Ns_per_m and frequency_Hz
+                   damping_Ns_per_m, frequency_Hz and the other numbers of `measures.wanted.WANTED_NUMBERS`
     measures       one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or
                    measures
     position, direction, assembly, model    of all designs, as for `Device.at`
     stiffness, damping, frequency           of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures
                                                 about them
+    spectral_radius ... colliding_links     what else some measures need, as in `measures.wanted.WantedWall`
     paired         True: not every combination, but as many designs as each axis has values: the n-th design has
                    the n-th value of every axis, such as numbers drawn at random
     plane          the workspace, for measures over it (`study.workspace.plane_grid`); left out: 15 by 15 points of
@@ -135,6 +162,10 @@ def sweep(
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with the stage, the number of designs done, and of all designs
     workers        processes at most; left out: one for each core
+    time_limit     s that a design may take; one that takes longer is `out of time`, the others keep their values
+    cluster        address of a scheduler of dask.distributed, or "local"; left out: processes of this computer
+    executor       what computes, opened before for many calls (`study.open_executor`), in place of workers,
+                   time_limit and cluster
     processor      "cuda": charts are computed on an NVIDIA GPU, by one process (`processors`); else "cpu"
     Returns        a dataset with a dimension for each axis, named by its path, or with the one dimension `design`
                    of paired axes: for each measure its values, nan where a design has none, and NAME_status. Why
@@ -159,12 +190,32 @@ def sweep(
         stiffness=stiffness,
         damping=damping,
         frequency=frequency,
+        spectral_radius=spectral_radius,
+        stiffness_margin=stiffness_margin,
+        damping_margin=damping_margin,
+        delay_margin=delay_margin,
+        lowest_frequency=lowest_frequency,
+        highest_frequency=highest_frequency,
+        force=force,
+        link_radius=link_radius,
+        colliding_links=colliding_links,
         paired=paired,
         plane=plane,
         user_measures=user_measures,
     )
     job = sweep_job(study)
-    return compute_designs(study, job, store_for(job, store), progress, workers, processor).dataset()
+    check_listing(job)
+    return compute_designs(
+        study,
+        job,
+        store_for(job, store),
+        progress,
+        workers,
+        processor,
+        time_limit=time_limit,
+        cluster=cluster,
+        executor=executor,
+    ).dataset()
 
 
 def run_study(
@@ -173,13 +224,19 @@ def run_study(
     progress: Progress | None = None,
     workers: int | None = None,
     processor: Processor = "cpu",
+    *,
+    time_limit: float | None = None,
+    cluster: str | None = None,
+    executor: Executor | None = None,
 ) -> Sweep:
     """Compute a study, read by `read_study` or named by its file.
 
-    store, progress, workers, processor  as for `sweep`
+    store, progress, workers, processor, time_limit, cluster, executor  as for `sweep`
+    Returns the study with its results. Of a large study with a store they stay there: `reason`, `summaries` and
+            `cells.pieces()` read one piece after the other; `dataset`, `document` and `table` list all designs
     Raises  DeviceError   with all faults of the study's file and the device's
             MeasureError  for measures that do not exist for this device
-            TooLarge      where the designs would not fit into memory
+            TooLarge      where the designs would not fit into memory, and there is no store
             what `executor.run` and `Store` raise
     """
     if not isinstance(study, Study | str | os.PathLike):
@@ -187,7 +244,17 @@ def run_study(
         raise wrong_type("study", "a Study or the path of a study file", study, hint)
     study = study if isinstance(study, Study) else read_study(study)
     job = sweep_job(study)
-    return compute_designs(study, job, store_for(job, store), progress, workers, processor)
+    return compute_designs(
+        study,
+        job,
+        store_for(job, store),
+        progress,
+        workers,
+        processor,
+        time_limit=time_limit,
+        cluster=cluster,
+        executor=executor,
+    )
 
 
 def compute_designs(
@@ -197,6 +264,21 @@ def compute_designs(
     progress: Progress | None = None,
     workers: int | None = None,
     processor: Processor = "cpu",
+    *,
+    time_limit: float | None = None,
+    cluster: str | None = None,
+    executor: Executor | None = None,
 ) -> Sweep:
     """Compute the designs of a study as its job; see `executor.run` for the rest."""
-    return Sweep(study, job, run(job, store, progress, workers, processor=processor, stage="computing designs"))
+    cells = run(
+        job,
+        store,
+        progress,
+        workers,
+        processor=processor,
+        stage="computing designs",
+        time_limit=time_limit,
+        cluster=cluster,
+        executor=executor,
+    )
+    return Sweep(study, job, cells)

@@ -1,15 +1,19 @@
-"""A study's results as labelled arrays, as a document, and as a table."""
+"""A study's results as labelled arrays, as a document, and as a table.
+
+These list every design, and so must fit into memory. `table_pieces` gives one piece after the other.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from zwidth.device.faults import plural
 from zwidth.measures.definition import STATUS, Note
+from zwidth.memory_limit import check_memory
 from zwidth.study.designs.axis_tables import unit_of
 from zwidth.study.designs.column import unit_attributes
 from zwidth.study.designs.sampling import Axis
@@ -18,9 +22,28 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from zwidth.study.designs.sweep import Sweep
+    from zwidth.study.designs.sweep_job import SweepJob
+    from zwidth.study.jobs.job import CellValues
 
+PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
+PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose values are kept as they are written
+PER_DESIGN: Final = 120  # numbers of memory for the dictionaries of a design in a document
 DESIGN: Final = "design"
 COMPONENTS: Final = "xyz"
+
+
+def check_listing(job: SweepJob, documents: bool = False) -> None:
+    """Raise TooLarge where the designs would not fit into memory, all listed at once.
+
+    documents  whether each is a dictionary
+    """
+    axes = job.sampling.axes
+    each = PER_VALUE * len(job.columns) + PER_AXIS * (len(axes) + sum(len(axis.ties) for axis in axes))
+    check_memory(
+        float(job.count) * (each + PER_DESIGN * documents),
+        f"{plural(job.count, 'design')} of {plural(len(job.columns), 'measure')}, listed all at once,",
+        "ask for fewer, or keep them on the disk (.zarr, .csv), which is written piece by piece",
+    )
 
 
 def as_dataset(sweep: Sweep) -> xr.Dataset:
@@ -30,32 +53,50 @@ def as_dataset(sweep: Sweep) -> xr.Dataset:
     NAME there are its values, nan where there is none, and NAME_status. Tied numbers, and the components of
     positions and directions, are further coordinates. Attributes of a column: unit, title, source, what is better,
     and `notes`, a line for each reason why designs have no value.
+    Raises  TooLarge  where they would not fit into memory
     """
     import xarray as xr
 
+    check_listing(sweep.job)
     sampling = sweep.job.sampling
     grid = sampling.kind == "grid"
     dims = tuple(axis.key for axis in sampling.axes) if grid else (DESIGN,)
     data: dict[str, Any] = {}
     for n, one in enumerate(sweep.job.columns):
-        attributes = {
-            **unit_attributes(one.unit),
-            "title": one.title,
-            "long_name": one.title,
-            "source": one.measure.source,
-            "better": one.better or "",
-            "key": one.key,
-            "notes": "\n".join(_sentence(sweep, note) for note in sweep.cells.notes[n]),
-        }
-        data[one.name] = (dims, sweep.cells.values[:, n].reshape(sampling.shape), attributes)
-        data[f"{one.name}_status"] = (dims, sweep.cells.status[:, n].reshape(sampling.shape), _flags())
-    coordinates: dict[str, Any] = {} if grid else {DESIGN: np.arange(sampling.count)}
-    rows = None if grid else [sampling.values(n) for n in range(sampling.count)]
-    for n, axis in enumerate(sampling.axes):
-        values = list(axis.values) if rows is None else [row[n] for row in rows]
-        dim = axis.key if grid else DESIGN
-        coordinates |= {name: (dim, *column) for name, column in _columns(sweep, axis, values)}
-    return xr.Dataset(data, coordinates, _attributes(sweep))
+        data[one.name] = (dims, sweep.cells.values[:, n].reshape(sampling.shape), column_attributes(sweep, n))
+        data[f"{one.name}_status"] = (dims, sweep.cells.status[:, n].reshape(sampling.shape), status_flags())
+    return xr.Dataset(data, coordinates(sweep, 0, sampling.count), dataset_attributes(sweep))
+
+
+def column_attributes(sweep: Sweep, column: int) -> dict[str, str]:
+    """What a dataset says of a column."""
+    one = sweep.job.columns[column]
+    return {
+        **unit_attributes(one.unit),
+        "title": one.title,
+        "long_name": one.title,
+        "source": one.measure.source,
+        "better": one.better or "",
+        "key": one.key,
+        "notes": "\n".join(_sentence(sweep, note) for note in sweep.cells.notes[column]),
+    }
+
+
+def coordinates(sweep: Sweep, first: int, last: int) -> dict[str, Any]:
+    """The coordinates of a dataset: of a grid all along its axes, else those of designs first to last - 1."""
+    sampling = sweep.job.sampling
+    if sampling.kind == "grid":
+        along = [(axis.key, axis, list(axis.values)) for axis in sampling.axes]
+        found: dict[str, Any] = {}
+    else:
+        along = [
+            (DESIGN, axis, [values[place] for place in places.tolist()])
+            for axis, values, places in sampling.columns(first, last)
+        ]
+        found = {DESIGN: np.arange(first, last)}
+    for dim, axis, values in along:
+        found |= {name: (dim, *column) for name, column in _columns(sweep, axis, values)}
+    return found
 
 
 def _columns(sweep: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
@@ -92,7 +133,11 @@ def axis_value_text(value: Any) -> str:
 
 
 def sweep_document(sweep: Sweep) -> dict[str, Any]:
-    """The designs, with values, status and notes of each measure, by key and unit; see `Sweep.document`."""
+    """The designs, with values, status and notes of each measure, by key and unit; see `Sweep.document`.
+
+    Raises  TooLarge  where they would not fit into memory
+    """
+    check_listing(sweep.job, documents=True)
     sampling, names = sweep.job.sampling, sweep.job.measures
     status = ([STATUS[int(s)] for s in row] for row in sweep.cells.status)
     return {
@@ -113,15 +158,34 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
 
 
 def sweep_table(sweep: Sweep) -> dict[str, list[Any]]:
-    """Column -> one entry for each design: its numbers, the values under names with units, the status."""
-    designs = [sweep.design(n) for n in range(sweep.job.count)]
-    settings = {path: [_cell(design[path]) for design in designs] for path in (designs[0] if designs else {})}
-    columns = {one.key: list(sweep.cells.values[:, n]) for n, one in enumerate(sweep.job.columns)}
-    status = {
-        f"{one.name}_status": [STATUS[int(s)] for s in sweep.cells.status[:, n]]
-        for n, one in enumerate(sweep.job.columns)
-    }
-    return settings | columns | status
+    """Column -> one entry for each design: its numbers, the values under names with units, the status.
+
+    Raises  TooLarge  where they would not fit into memory
+    """
+    check_listing(sweep.job)
+    whole: dict[str, list[Any]] = {}
+    for piece in table_pieces(sweep):
+        for name, values in piece.items():
+            whole.setdefault(name, []).extend(values)
+    return whole
+
+
+def table_pieces(sweep: Sweep) -> Iterator[dict[str, Sequence[Any]]]:
+    """The rows of the table in pieces, one after the other, each as columns."""
+    return (_table_piece(sweep, first, cells) for first, cells in sweep.cells.pieces())
+
+
+def _table_piece(sweep: Sweep, first: int, cells: CellValues) -> dict[str, Sequence[Any]]:
+    piece: dict[str, Sequence[Any]] = {}
+    for axis, values, places in sweep.job.sampling.columns(first, first + len(cells.values)):
+        for key, along in ((axis.key, values), *((tie.key, map(tie.value, values)) for tie in axis.ties)):
+            texts = [_cell(value) for value in along]
+            piece[key] = [texts[place] for place in places.tolist()]
+    for n, one in enumerate(sweep.job.columns):
+        piece[one.key] = cells.values[:, n].tolist()
+    for n, one in enumerate(sweep.job.columns):
+        piece[f"{one.name}_status"] = [STATUS[status] for status in cells.status[:, n].tolist()]
+    return piece
 
 
 def note_sentences(sweep: Sweep) -> Iterator[tuple[str, str]]:
@@ -145,12 +209,13 @@ def _sentence(sweep: Sweep, note: Note) -> str:
     return f"{many} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
 
 
-def _flags() -> dict[str, Any]:
+def status_flags() -> dict[str, Any]:
+    """What a dataset says of a column of status."""
     meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
     return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
 
 
-def _attributes(sweep: Sweep) -> dict[str, Any]:
+def dataset_attributes(sweep: Sweep) -> dict[str, Any]:
     """The study and its device, as attributes that any file can hold."""
     from zwidth._version import __version__
 

@@ -8,7 +8,7 @@ position, has a status instead of values; the other designs are not affected.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -38,6 +38,7 @@ from zwidth.measures.definition import (
     WantedWalls,
 )
 from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
+from zwidth.measures.wanted import WANTED_BY_NAME
 from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.load import LoadError
 from zwidth.model.posture import BeyondLimit, OutOfReach, PostureError, Singular
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
 Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
-WALL: Final = ("stiffness", "damping", "frequency")  # of the wanted wall, as arguments
+WALL: Final = tuple(WANTED_BY_NAME)  # numbers of the wanted wall, as arguments
 
 
 class _NoPoint(Exception):
@@ -297,10 +298,10 @@ class SweepJob:
     def _walls(self, designs: NDArray[np.int64], point: OperatingPoint) -> WantedWall | WantedWalls:
         """The walls wanted of some designs, along the first of the points' axes."""
         each = [self.design(int(number)).wall for number in designs]
-        if None in (each[0].stiffness, each[0].damping):  # and so of all of them
-            return each[0]
-        walls = np.array([(one.stiffness, one.damping) for one in each])
-        return WantedWalls(*walls.T.reshape(2, -1, *[1] * (len(point.shape) - 1)))
+        given = [name for name in WALL if getattr(each[0], name) is not None]  # and so of all of them
+        later = [1] * (len(point.shape) - 1)
+        numbers = {name: np.array([getattr(one, name) for one in each]).reshape(-1, *later) for name in given}
+        return WantedWalls(**numbers, colliding_links=each[0].colliding_links)
 
     def design(self, number: int) -> Design:
         """One of the designs, by its number from 0."""
@@ -350,7 +351,8 @@ class Design:
     @property
     def wall(self) -> WantedWall:
         """The wanted wall."""
-        return WantedWall(**{name: self._circumstance(KEYS[name]) for name in WALL})
+        numbers = {name: self._circumstance(KEYS[name]) for name in WALL}
+        return WantedWall(**numbers, colliding_links=self._circumstance("colliding_links"))
 
     def point(self) -> OperatingPoint:
         """The operating point at the design's handle position. Raises _NoPoint."""
@@ -424,7 +426,7 @@ def sweep_job(study: Study) -> SweepJob:
 
     Raises  MeasureError  for measures that do not exist for this device, with all their names
     """
-    wanted = {KEYS[name]: getattr(study.wall, name) for name in WALL}
+    wanted = {KEYS.get(one.name, one.name): getattr(study.wall, one.name) for one in fields(study.wall)}
     circumstances = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")} | wanted
     fixed = {key: value for key, value in circumstances.items() if value is not None}
     plane, task = study.plane, study.task

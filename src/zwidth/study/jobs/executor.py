@@ -8,32 +8,39 @@ that computes them.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Sequence
-from contextlib import closing
+import warnings
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, closing
 from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from zwidth.measures.definition import MISSING, Note
+from zwidth.measures.definition import MISSING
 from zwidth.memory_limit import check_memory
 from zwidth.processors import Processor, check_processor, computing_on
 from zwidth.progress import Progress
-from zwidth.study.jobs.job import CellValues, Job
-from zwidth.study.jobs.workers import CellRange, Workers, cores, pack_job
+from zwidth.study.jobs.batch_size import batch_size
+from zwidth.study.jobs.executor_interface import Executor, open_executor
+from zwidth.study.jobs.job import Cells, CellValues, Job, Notes
+from zwidth.study.jobs.notes import merge_notes
+from zwidth.study.jobs.recovery import Batch, compute_range
+from zwidth.study.jobs.workers import CellRange, PackedJob, cores, pack_job
 
 if TYPE_CHECKING:
     from zwidth.study.jobs.store import Store
 
-
 PATIENCE: Final = 10.0  # s; a longer job is worth starting processes, which takes some seconds
 GPU_BATCH: Final = 32768  # cells on a GPU: a loop for each thread of a large one
-BATCH: Final = 0.25  # s that a batch should take: much longer than sending and storing it
-TRIAL: Final = 0.05  # s of computation from which the time per cell is estimated
-SHARES: Final = 16  # least number of batches, so that no process waits long for the last one
-GOLDEN: Final = 0.6180339887498949
-MOST_NOTES: Final = 100  # notes per measure; a reason that contains a number may differ in each cell
-MORE: Final = "further reasons, each in few cells"
+SMALL: Final = 4096  # cells of which no time is measured where processes run already
+MOST_IN_MEMORY: Final = 200_000  # values of a stored job that are kept in memory, too
+ENOUGH: Final = 64  # cells that all raise the same error, from which a fault of the job is concluded
+MOST_EVENTS: Final = 10  # lost processes that are told of one by one
+
+
+class RecoveredWarning(UserWarning):
+    """A process that computed was lost, and its cells were computed again."""
 
 
 def run(
@@ -46,20 +53,33 @@ def run(
     batch: int | None = None,
     stage: str = "computing",
     patience: float = PATIENCE,
-) -> CellValues:
+    time_limit: float | None = None,
+    cluster: str | None = None,
+    executor: Executor | None = None,
+) -> Cells:
     """Compute all cells of a job.
 
-    store      keeps the batches done; those it already holds are not computed again
-    progress   is called with `stage`, the number of cells done, and of all cells
-    workers    largest number of processes; left out: one per core. 1: this process alone
-    processor  "cuda": charts are computed on a GPU, by this process alone and in batches of its own
-    batch      cells per batch; left out: as many as take 0.25 s (a store begun earlier keeps its own number)
-    patience   processes are started if the rest is estimated to take longer than this [s]
-    Raises    TooLarge    where the cells would not fit into memory
-              StoreError  where they would not fit on the disk
-              WorkerLost  where a process ended too early; batches done are kept
+    A cell that raises an error, or whose process ends again and again, is FAILED, with the reason; the others keep
+    their values. Where all cells raise the same error, at least the first 64, the job has a fault and the error is
+    raised. A process that ends is replaced, its cells are computed again, and a RecoveredWarning says so.
+
+    store       keeps the batches done; those it already holds are not computed again. Large results stay there and
+                are not read into memory
+    progress    is called with `stage`, the number of cells done, and of all cells
+    workers     largest number of processes; left out: one per core. 1: this process alone
+    processor   "cuda": charts are computed on a GPU, by this process alone and in batches of its own
+    batch       cells per batch; left out: as many as take 0.25 s (a store begun earlier keeps its own number)
+    patience    processes are started if the rest is estimated to take longer than this [s]
+    time_limit  s that a cell may take; one that takes longer is OUT_OF_TIME. All cells are computed in processes
+    cluster     address of a dask scheduler, or "local"; see `open_executor`
+    executor    what computes all cells, opened before; in place of workers, time_limit and cluster
+    Raises    TooLarge      where the cells would not fit into memory
+              StoreError    where they would not fit on the disk, or another run computes into the store
+              CannotStart   where no process can be started;  WorkerLost  where every cell ends its process
+              ClusterError  where the cluster cannot be used, or its scheduler ends; batches done are kept
+              ValueError    for arguments that do not go together
               what `processors.check_processor` raises
-              whatever the job raises
+              MeasureError, DeviceError as the job does
 
     >>> class Squares:
     ...     count, measures, question = 3, ("square",), "squares"
@@ -70,35 +90,153 @@ def run(
     [0.0, 1.0, 4.0]
     """
     check_processor(processor)
-    total = job.count
-    numbers = 2.0 * total * len(job.measures) * 9 / 8  # values and status, and a copy while they are put together
-    check_memory(numbers, f"{total} cells of {len(job.measures)} measures", "ask for fewer")
-    number = workers or cores()
-    if processor == "cuda":
-        number, batch = 1, GPU_BATCH
-    collection = _CellCollection(job)
-    if store is not None and store.batch is not None:
-        size = store.batch
-        for first, cells in store.stored_batches():
-            collection.add(first, cells)
-    else:
-        size = batch or _batch(job, number)
+    if store is None:
+        check_cells(job.count, len(job.measures))
+    with ExitStack() as stack:
         if store is not None:
-            store.begin(size)
-    all_ranges = [(first, min(first + size, total)) for first in range(0, total, size)]
-    ranges = [piece for piece in all_ranges if collection.status[piece[0], 0] == MISSING]
-    done = total - sum(last - first for first, last in ranges)
+            stack.enter_context(store.locked())
+        packed, executor = _executor_for(job, stack, processor, workers, time_limit, cluster, executor)
+        slots = (workers or cores()) if executor is None else executor.slots
+        size = _size(job, store, batch, slots, processor, executor, packed)
+        stack.enter_context(computing_on(processor))
+        plan = _Plan(job, store, size, time_limit)
+        if executor is not None and packed is not None:
+            batches = executor.compute(packed, plan.ranges())
+        else:
+            batches = _compute_here_first(job, plan, 1 if processor == "cuda" else slots, patience)
+        return _collect(job, store, plan, stack.enter_context(closing(batches)), progress, stage)
+
+
+def check_cells(count: int, measures: int) -> None:
+    """Raise TooLarge where the cells of a job would not fit into memory."""
+    numbers = 2.0 * count * measures * 9 / 8  # values and status, and a copy while they are put together
+    check_memory(numbers, f"{count} cells of {measures} measures", "ask for fewer, or keep them in a store")
+
+
+def _executor_for(
+    job: Job,
+    stack: ExitStack,
+    processor: Processor,
+    workers: int | None,
+    time_limit: float | None,
+    cluster: str | None,
+    executor: Executor | None,
+) -> tuple[PackedJob | None, Executor | None]:
+    """The packed job and what computes all of it; None: this process does, at least at first."""
+    if executor is not None and (workers, time_limit, cluster) != (None, None, None):
+        raise ValueError("an executor has its own workers, time limit and cluster; give either it or them")
+    if executor is None and time_limit is None and cluster is None:
+        return None, None
+    by = "executor" if executor is not None else "time_limit" if cluster is None else "cluster"
+    if processor == "cuda":
+        raise ValueError(f"{by} is for processes, and the GPU is used by this one alone; leave one of the two out")
+    if (packed := pack_job(job)) is None:
+        if executor is not None:
+            return None, None
+        raise ValueError(
+            f"{by} needs other processes, and a measure of this study exists in this process only; put it in a "
+            "file (measures_file)"
+        )
+    if executor is None:
+        executor = stack.enter_context(open_executor(workers, cluster, time_limit))
+    return packed, executor
+
+
+def _size(
+    job: Job,
+    store: Store | None,
+    batch: int | None,
+    slots: int,
+    processor: Processor,
+    executor: Executor | None,
+    packed: PackedJob | None,
+) -> int:
+    """Cells per batch; a store is begun with it."""
+    if store is not None and store.batch is not None:
+        return store.batch
+    if processor == "cuda":
+        size = GPU_BATCH
+    elif batch is not None:
+        size = batch
+    elif executor is None or packed is None:
+        size = batch_size(job.compute, job.count, slots)
+    elif store is None and job.count <= SMALL:
+        size = -(-job.count // (4 * executor.slots)) or 1
+    else:
+        size = batch_size(lambda first, last: _drain(executor, packed, first, last), job.count, slots)
+    if store is not None:
+        store.begin(size)
+    return size
+
+
+def _drain(executor: Executor, packed: PackedJob, first: int, last: int) -> None:
+    """Compute a range by an executor for the time it takes."""
+    with closing(executor.compute(packed, [(first, last)])) as batches:
+        for _ in batches:
+            pass
+
+
+class _Plan:
+    """Which batches of a job are to be computed.
+
+    left   number of cells that are to be computed
+    done   (batches,)  whether each is there
+    """
+
+    def __init__(self, job: Job, store: Store | None, size: int, time_limit: float | None) -> None:
+        self.count, self.size = job.count, size
+        self.done: NDArray[np.bool_] = np.zeros(-(-job.count // size), dtype=bool)
+        if store is not None:
+            self.done = store.done(time_limit)
+            store.limit_time(time_limit)
+        self.left = sum(last - first for first, last in self.ranges())
+
+    def ranges(self) -> Iterator[CellRange]:
+        """The ranges that are not done; read as they are needed, since there may be millions."""
+        for n in np.flatnonzero(~self.done):
+            first = int(n) * self.size
+            yield first, min(first + self.size, self.count)
+
+
+def _collect(
+    job: Job,
+    store: Store | None,
+    plan: _Plan,
+    batches: Iterator[tuple[CellRange, Batch]],
+    progress: Progress | None,
+    stage: str,
+) -> Cells:
+    """Take the batches as they are finished, and put them where they are kept."""
+    total, done = job.count, job.count - plan.left
+    memory = None if store is not None else _CellCollection(job)
+    events, fault = _Events(), _Fault(plan.left if not done else -1)
     if progress is not None:
         progress(stage, done, total)
-    with computing_on(processor), closing(_compute_ranges(job, ranges, number, patience)) as computed:
-        for (first, last), cells in computed:
+    for (first, last), found in batches:
+        events.tell(found.events)
+        for begin, cells in fault.sift(first, found):
             if store is not None:
-                store.write_batch(first, cells)
-            collection.add(first, cells)
-            done += last - first
-            if progress is not None:
-                progress(stage, done, total)
-    return collection.cells()
+                store.write_batch(begin, cells)
+            if memory is not None:
+                memory.add(begin, cells)
+        done += last - first
+        if progress is not None:
+            progress(stage, done, total)
+    events.close()
+    if memory is not None:
+        return memory.cells()
+    assert store is not None
+    return stored_cells(store)
+
+
+def stored_cells(store: Store) -> Cells:
+    """The cells of a store that is complete: in memory if they are few, else read from it in pieces."""
+    from zwidth.study.jobs.store import StoredCells
+
+    cells = StoredCells(store)
+    if store.count * len(store.measures) > MOST_IN_MEMORY:
+        return cells
+    return CellValues(cells.values, cells.status, cells.notes)
 
 
 class _CellCollection:
@@ -108,7 +246,7 @@ class _CellCollection:
         shape = job.count, len(job.measures)
         self.values = np.full(shape, np.nan)
         self.status = np.full(shape, MISSING, dtype=np.uint8)
-        self.notes: list[tuple[tuple[Note, ...], ...]] = []
+        self.notes: list[Notes] = []
 
     def add(self, first: int, cells: CellValues) -> None:
         last = first + len(cells.values)
@@ -122,70 +260,66 @@ class _CellCollection:
         return CellValues(self.values, self.status, tuple(each))
 
 
-def merge_notes(notes: Iterable[Note], most: int = MOST_NOTES) -> tuple[Note, ...]:
-    """Join notes of the same reason into one, in the order of their first cells.
+class _Events:
+    """Tells of processes that were lost."""
 
-    most  largest number of notes; further ones are counted in one more note for each status
+    def __init__(self) -> None:
+        self.count = 0
 
-    >>> merge_notes([Note(5, "no", 2, (7,)), Note(5, "no", 1, (3,))])
-    (Note(status=5, reason='no', count=3, first=(3,)),)
+    def tell(self, events: tuple[str, ...]) -> None:
+        for event in events:
+            self.count += 1
+            if self.count <= MOST_EVENTS:
+                warnings.warn(event, RecoveredWarning, stacklevel=4)
+
+    def close(self) -> None:
+        if self.count > MOST_EVENTS:
+            more = f"{self.count - MOST_EVENTS} more processes that computed were lost, and their cells recovered"
+            warnings.warn(more, RecoveredWarning, stacklevel=4)
+
+
+class _Fault:
+    """Holds batches back until it is certain that the job has no fault that every cell meets.
+
+    left  number of cells to come; -1: some cells are known already
     """
-    by_reason: dict[tuple[int, str], tuple[int, tuple[int, ...]]] = {}
-    for note in notes:
-        count, first = by_reason.get((note.status, note.reason), (0, note.first))
-        by_reason[note.status, note.reason] = (count + note.count, min(first, note.first))
-    notes_in_order = [Note(*key, *rest) for key, rest in by_reason.items()]
-    notes_in_order.sort(key=lambda note: (note.first, note.status, note.reason))
-    if len(notes_in_order) <= most:
-        return tuple(notes_in_order)
-    rest = [Note(note.status, MORE, note.count, note.first) for note in notes_in_order[most:]]
-    return (*notes_in_order[:most], *merge_notes(rest, len(rest)))
+
+    def __init__(self, left: int) -> None:
+        self.left = left
+        self.held: list[tuple[int, CellValues]] = []
+        self.count, self.text = 0, ""
+
+    def sift(self, first: int, batch: Batch) -> Iterator[tuple[int, CellValues]]:
+        """The batches that may be kept. Raises the error that all cells raise."""
+        self.held.append((first, batch.cells))
+        error = batch.error
+        if self.left >= 0 and error is not None and (not self.count or str(error) == self.text):
+            self.text = str(error)
+            self.count += len(batch.cells.values)
+            if self.count >= min(ENOUGH, self.left):
+                raise error
+            return
+        self.left = -1
+        yield from self.held
+        self.held = []
 
 
-def _batch(job: Job, workers: int) -> int:
-    """How many cells take about a quarter of a second.
-
-    Some cells are computed to measure the time, and their values are dropped: cells spread over the job, since the
-    first of a study are often its slowest, and growing numbers until they take long enough to tell: many at once
-    may cost little more than one. What takes long is computed again, since the first time may load what all cells
-    need; two cells at least, since a job may keep what it knows of its last one.
-    """
-    count = job.count
-    most = max(1, count // max(SHARES, 4 * workers))
-    if most == 1:
-        return 1
-    size, place = 2, 0.0
-    while size <= most:
-        first = int(place * (count - size))
-        place = (place + GOLDEN) % 1.0
-        for _ in range(2):
-            began = perf_counter()
-            job.compute(first, first + size)
-            seconds = perf_counter() - began
-            if seconds < TRIAL:
-                break
-        else:
-            return max(1, min(most, int(BATCH / (seconds / size))))
-        size *= 2
-    return most
-
-
-def _compute_ranges(
-    job: Job, ranges: Sequence[CellRange], workers: int, patience: float
-) -> Generator[tuple[CellRange, CellValues], None, None]:
+def _compute_here_first(
+    job: Job, plan: _Plan, workers: int, patience: float
+) -> Generator[tuple[CellRange, Batch], None, None]:
     """Compute the ranges: in this process until `patience` is exceeded, the rest in several processes."""
-    left = sum(last - first for first, last in ranges)
-    packed_job: bytes | None = None
+    left, measures = plan.left, len(job.measures)
+    ranges = plan.ranges()
     for n, (first, last) in enumerate(ranges):
         began = perf_counter()
-        cells = job.compute(first, last)
+        batch = compute_range(job.compute, measures, first, last)
         seconds = perf_counter() - began
-        yield (first, last), cells
+        yield (first, last), batch
         left -= last - first
         # the first range may include compiling
-        slow = n > 0 and seconds / (last - first) * left > patience
-        if slow and workers > 1 and (packed_job := pack_job(job)) is not None:
-            rest = ranges[n + 1 :]
-            with Workers(packed_job, min(workers, len(rest))) as pool:
-                yield from pool.compute(rest)
+        slow = n > 0 and left > 0 and seconds / (last - first) * left > patience
+        if slow and workers > 1 and (packed := pack_job(job)) is not None:
+            rest = -(-left // plan.size)
+            with open_executor(min(workers, rest)) as executor:
+                yield from executor.compute(packed, ranges)
             return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,19 +11,40 @@ from numpy.typing import NDArray
 
 from zwidth.measures.definition import Note
 
+Notes = tuple[tuple[Note, ...], ...]
 
-@dataclass(frozen=True)
-class CellValues:
-    """Measures of consecutive cells.
+
+class Cells(Protocol):
+    """Measures of consecutive cells, in memory or in a store.
 
     values  (k, m)  of k cells and m measures; nan where the status is not OK
     status  (k, m)  as in `measures.definition`
     notes   (m,)    per measure: why cells have no value; `first` counts from the first cell of the job
     """
 
+    @property
+    def values(self) -> NDArray[np.float64]: ...
+    @property
+    def status(self) -> NDArray[np.uint8]: ...
+    @property
+    def notes(self) -> Notes: ...
+
+    def pieces(self) -> Iterator[tuple[int, CellValues]]:
+        """First cell and values of consecutive pieces that fit into memory, in the order of the cells."""
+        ...
+
+
+@dataclass(frozen=True)
+class CellValues:
+    """Measures of consecutive cells in memory; see `Cells`."""
+
     values: NDArray[np.float64]
     status: NDArray[np.uint8]
-    notes: tuple[tuple[Note, ...], ...]
+    notes: Notes
+
+    def pieces(self) -> Iterator[tuple[int, CellValues]]:
+        """All cells, as one piece."""
+        yield 0, self
 
 
 class Job(Protocol):
@@ -45,5 +66,9 @@ class Job(Protocol):
         ...
 
     def compute(self, first: int, last: int) -> CellValues:
-        """Compute cells first to last - 1. A cell that fails has a status; only a failure of all is raised."""
+        """Compute cells first to last - 1. A cell that fails has a status.
+
+        A MeasureError or DeviceError says that the question has no answer for any cell, and ends the run. After
+        any other exception the cells are computed in smaller pieces: one that raises alone is FAILED.
+        """
         ...

@@ -2,34 +2,44 @@
 
     values    (count, measures)  float64; nan where there is none
     status    (count, measures)  uint8, named by its attributes; 255 = not computed
-    notes                        a journal beside them: why cells have no value
+    notes                        a file beside them: why cells have no value
+    lock                         held by the run that writes here
 
-Attributes hold the fingerprint of the question and the version of the format. A store of another question is
-emptied and begun again; one of a newer version is refused. Chunks are batches: one file of values and one of
-status, each written whole or not at all, the status last.
+Attributes hold the fingerprint of the question, the release of zwidth that computes and the version of the format.
+A store of another question or release, or of a newer version, is refused and left as it is. Chunks are batches:
+one file of values and one of status, each written whole or not at all, the status last.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 import shutil
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth._version import __version__
 from zwidth.device.format_version import STORE_VERSION, newer_version_message
-from zwidth.measures.definition import MISSING, OK, STATUS, Note
-from zwidth.study.jobs.job import CellValues, Job
-from zwidth.study.jobs.journal import Journal, JournalError, fingerprint
+from zwidth.measures.definition import MISSING, OK, OUT_OF_TIME, STATUS
+from zwidth.memory_limit import check_memory
+from zwidth.study.jobs.job import CellValues, Job, Notes
+from zwidth.study.jobs.journal import fingerprint
+from zwidth.study.jobs.notes import NoteSummary
+from zwidth.study.jobs.store_lock import FolderLock, owner_of
+from zwidth.study.jobs.store_notes import NotesFile
 
 KIND: Final = "cells"
 NOTES: Final = "notes.jsonl"
 PER_CELL: Final = 9  # bytes of value and status; compressed they take less
+UNLIMITED: Final = float("inf")
 
 
 class StoreError(ValueError):
@@ -41,72 +51,112 @@ class Store:
 
     path     of the folder
     batch    cells in each batch; None: not begun yet
-    Raises   StoreError  for a folder or file that holds something else (it is left alone), and for cells that
-                         would not fit on the disk
+    Raises   StoreError  for a folder or file that holds something else or the cells of another question or release
+                         (it is left alone), and for cells that would not fit on the disk
              OSError     where it cannot be read
     """
 
     def __init__(self, path: Path, job: Job) -> None:
         self.path = path
         self.measures, self.count = tuple(job.measures), job.count
-        self.question = fingerprint(job.question, self.count, self.measures, __version__)
+        study = job.question, self.count, self.measures
+        self.question = fingerprint(*study, __version__)
+        self._study = fingerprint(*study)  # the same in every release
         self.batch: int | None = None
-        self._ours = False
         self._arrays: tuple[Any, Any] | None = None
-        self._notes = Journal(None, self.question)
-        if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+        self._notes: NotesFile | None = None
+        self._lock = FolderLock()
+        if self._is_there():
             self._open()
         if self.batch is None:
             self._check_disk()
 
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs from writing here inside this block; where there is no folder yet, from `begin` on.
+
+        Raises  StoreError  where another run does
+        """
+        try:
+            if self._is_there():
+                self._acquire(self.path)
+                self._open()  # another run may have gone on since it was opened
+            yield
+        finally:
+            self._lock.release()
+
     def begin(self, batch: int) -> None:
-        """Begin again with batches of this size; the store is emptied."""
+        """Begin with batches of this size, where nothing is stored yet. Raises StoreError where something is."""
         import zarr
 
+        if self.batch is not None:
+            raise StoreError(f"{self.path.name}: has been begun already")
         draft = self.path.with_name(f".{self.path.name[:40]}-{secrets.token_hex(4)}")
         try:
             group = zarr.open_group(str(draft), mode="w-", zarr_format=3)
-            shape, chunks = (self.count, len(self.measures)), (min(batch, self.count), len(self.measures))
-            attributes: dict[str, Any] = {"measures": list(self.measures)}
-            group.create_array(
-                "values", shape=shape, chunks=chunks, dtype="float64", fill_value=np.nan, attributes=attributes
-            )
-            meanings = [text.replace(" ", "_") for text in STATUS.values()]
-            flags: dict[str, Any] = {"flag_values": list(STATUS), "flag_meanings": " ".join(meanings)}
-            group.create_array(
-                "status",
-                shape=shape,
-                chunks=chunks,
-                dtype="uint8",
-                fill_value=MISSING,
-                attributes=attributes | flags,
-            )
+            self._acquire(draft)
+            self._create_arrays(group, min(batch, self.count))
             header: dict[str, Any] = {
                 "zwidth": KIND,
                 "version": STORE_VERSION,
                 "question": self.question,
+                "study": self._study,
+                "release": __version__,
                 "batch": batch,
             }
             group.attrs.update(header)
-            if self._ours or (self.path.is_dir() and not any(self.path.iterdir())):
-                shutil.rmtree(self.path)
-            draft.replace(self.path)
+            if self.path.is_dir():
+                self.path.rmdir()  # empty
+            draft.replace(self.path)  # fails where another run has just put its own
+        except OSError:
+            self._lock.release()
+            if self._is_there():
+                self._acquire(self.path)
+            raise
         finally:
             shutil.rmtree(draft, ignore_errors=True)
         self._open()
 
+    def done(self, time_limit: float | None = None) -> NDArray[np.bool_]:
+        """Which batches are done, (batches,).
+
+        time_limit  of this run [s]; None: none. Batches of which cells were given up after a shorter time are not
+                    done
+        """
+        assert self.batch is not None
+        found = np.zeros(-(-self.count // self.batch), dtype=bool)
+        limit = UNLIMITED if time_limit is None else time_limit
+        given_up = self._given_up_after()
+        for first, cells in self.stored_batches():
+            longer = limit > given_up and bool((cells.status == OUT_OF_TIME).any())
+            found[first // self.batch] = not longer
+        return found
+
+    def limit_time(self, time_limit: float | None) -> None:
+        """Keep the time limit of the run that goes on here, see `done`."""
+        import zarr
+
+        if time_limit is not None and time_limit != self._given_up_after():
+            zarr.open_group(str(self.path), mode="r+").attrs["time_limit_s"] = time_limit
+
     def stored_batches(self) -> Iterator[tuple[int, CellValues]]:
         """First cell and values of each batch that is done."""
-        values, status = self._open_arrays()
         assert self.batch is not None
         for first in range(0, self.count, self.batch):
-            part = slice(first, min(first + self.batch, self.count))
             with suppress(Exception):  # a file that a crash has damaged: its batch is not done
-                cells = CellValues(values[part], status[part], self._batch_notes(first))
+                cells = self.read_batch(first)
                 # zarr does not tell a file that has gone from one that holds nan only
                 lost = (cells.status == OK) & np.isnan(cells.values)
                 if not (lost | (cells.status == MISSING)).any():
                     yield first, cells
+
+    def read_batch(self, first: int) -> CellValues:
+        """The batch that begins with a cell. Raises what zarr does where a file is damaged."""
+        values, status = self._open_arrays()
+        assert self.batch is not None
+        assert self._notes is not None
+        part = slice(first, min(first + self.batch, self.count))
+        return CellValues(values[part], status[part], self._notes.read(first, len(self.measures)))
 
     def write_batch(self, first: int, cells: CellValues) -> None:
         """Write a batch. Raises OSError where it cannot be written."""
@@ -114,50 +164,89 @@ class Store:
         part = slice(first, first + len(cells.values))
         values[part] = cells.values
         if any(cells.notes):
-            entry = [[[n.status, n.reason, n.count, list(n.first)] for n in notes] for notes in cells.notes]
-            self._notes.get_or_compute(str(first), lambda: entry)
+            assert self._notes is not None
+            self._notes.write(first, cells.notes)
         status[part] = cells.status
 
     def remove(self) -> None:
-        """Remove the store from the disk, if it is one of this job."""
-        if self._ours:
+        """Remove the store from the disk, if it has been begun."""
+        self._lock.release()
+        if self.batch is not None:
             shutil.rmtree(self.path, ignore_errors=True)
 
-    def _batch_notes(self, first: int) -> tuple[tuple[Note, ...], ...]:
-        entry = self._notes.known.get(str(first), [[] for _ in self.measures])
-        return tuple(tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in entry)
+    def _is_there(self) -> bool:
+        return self.path.exists() and not (self.path.is_dir() and not any(self.path.iterdir()))
+
+    def _acquire(self, folder: Path) -> None:
+        if not self._lock.acquire(folder):
+            raise StoreError(
+                f"{self.path.name}: {owner_of(folder)} is computing into it; wait until that has ended, or name "
+                "another folder"
+            )
+
+    def _create_arrays(self, group: Any, batch: int) -> None:
+        shape, chunks = (self.count, len(self.measures)), (batch, len(self.measures))
+        attributes: dict[str, Any] = {"measures": list(self.measures)}
+        group.create_array(
+            "values", shape=shape, chunks=chunks, dtype="float64", fill_value=np.nan, attributes=attributes
+        )
+        meanings = [text.replace(" ", "_") for text in STATUS.values()]
+        flags: dict[str, Any] = {"flag_values": list(STATUS), "flag_meanings": " ".join(meanings)}
+        group.create_array(
+            "status",
+            shape=shape,
+            chunks=chunks,
+            dtype="uint8",
+            fill_value=MISSING,
+            attributes=attributes | flags,
+        )
 
     def _open_arrays(self) -> tuple[Any, Any]:
         assert self._arrays is not None, "not begun"
         return self._arrays
 
+    def _given_up_after(self) -> float:
+        """The time limit of the last run that had one [s]."""
+        import zarr
+
+        limit = zarr.open_group(str(self.path), mode="r").attrs.get("time_limit_s")
+        return float(limit) if isinstance(limit, int | float) else 0.0
+
     def _open(self) -> None:
-        """Open the folder: a store of this question, of another one, or something else."""
+        """Open the folder: a store of this question, or something that is refused."""
         import zarr
 
         other = StoreError(f"{self.path.name}: is not the store of a study; name another folder, or remove it")
         try:
             group = zarr.open_group(str(self.path), mode="r+")
-            kind, version, question, batch = (
-                group.attrs.get(key) for key in ("zwidth", "version", "question", "batch")
-            )
+            attributes = dict(group.attrs)
         except PermissionError:
             raise
         except Exception:  # zarr's own, of many kinds
             raise other from None
+        kind, version, batch = (attributes.get(key) for key in ("zwidth", "version", "batch"))
         if kind == KIND and (message := newer_version_message(version, STORE_VERSION)):
             raise StoreError(f"{self.path.name}: its version {message}, or name another folder")
         if kind != KIND or not isinstance(batch, int):
             raise other
-        self._ours = True
-        if question != self.question:
-            return
+        if attributes.get("question") != self.question:
+            raise StoreError(f"{self.path.name}: {self._whose(attributes)}; name another folder, or remove it")
         try:
             self._arrays = group["values"], group["status"]
-            self._notes = Journal(self.path / NOTES, self.question)
-        except (KeyError, JournalError):
+            header = json.dumps({"version": STORE_VERSION, "question": self.question})
+            self._notes = NotesFile(self.path / NOTES, header)
+        except (KeyError, ValueError):
             raise StoreError(f"{self.path.name}: is damaged; remove it, or name another folder") from None
         self.batch = batch
+
+    def _whose(self, attributes: dict[str, Any]) -> str:
+        """Whose cells a store holds that is not of this question and release."""
+        release = str(attributes.get("release", "another release"))
+        if release != __version__:
+            same = attributes.get("study") == self._study
+            what = "this study" if same else "a study"
+            return f"keeps {what} as computed by zwidth {release}, and this is {__version__}"
+        return "keeps the finished work of another study"
 
     def _check_disk(self) -> None:
         folder = next((p for p in (self.path, *self.path.absolute().parents) if p.exists()), Path())
@@ -168,6 +257,48 @@ class Store:
                 f"{wanted / 1e9:.3g} GB of disk, of {free / 1e9:.3g} GB that are free; ask for fewer, or name a "
                 "folder on another disk"
             )
+
+
+@dataclass(frozen=True)
+class StoredCells:
+    """The cells of a job, all computed, in its store; they are read in pieces. See `job.Cells`."""
+
+    store: Store
+
+    def pieces(self) -> Iterator[tuple[int, CellValues]]:
+        """First cell and values of each batch, in the order of the cells."""
+        assert self.store.batch is not None
+        for first in range(0, self.store.count, self.store.batch):
+            yield first, self.store.read_batch(first)
+
+    @cached_property
+    def values(self) -> NDArray[np.float64]:
+        """All values in memory. Raises TooLarge."""
+        self._check()
+        return np.concatenate([cells.values for _, cells in self.pieces()])
+
+    @cached_property
+    def status(self) -> NDArray[np.uint8]:
+        """All status in memory. Raises TooLarge."""
+        self._check()
+        return np.concatenate([cells.status for _, cells in self.pieces()])
+
+    @cached_property
+    def notes(self) -> Notes:
+        """Why cells have no value, by measure; read in one pass, of which nothing else is kept."""
+        summaries = [NoteSummary() for _ in self.store.measures]
+        for _, cells in self.pieces():
+            for summary, notes in zip(summaries, cells.notes, strict=True):
+                summary.add(notes)
+        return tuple(summary.notes() for summary in summaries)
+
+    def _check(self) -> None:
+        count, measures = self.store.count, len(self.store.measures)
+        check_memory(
+            2.0 * count * measures * PER_CELL / 8,
+            f"{count} cells of {measures} measures",
+            "read them from the store in pieces (Cells.pieces)",
+        )
 
 
 def store_for(job: Job, store: Store | str | os.PathLike[str] | None) -> Store | None:

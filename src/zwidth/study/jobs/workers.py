@@ -1,25 +1,27 @@
-"""Processes that compute ranges of a job in parallel.
+"""A process that computes ranges of jobs for another, and the other's hold on it.
 
-Each is a new interpreter (a forked one would inherit numba's threads and crash) with one thread for numba
-and one for linear algebra, fed through pipes. The caller's main script is not run in them, so that a script
-or a notebook needs no guard. Ctrl-C does not reach them: the process that started them ends them, and if it is
-killed they read the end of their pipe and stop.
+It is a new interpreter (a forked one would inherit numba's threads and crash) with one thread for numba and one
+for linear algebra, fed through pipes. The caller's main script is not run in it, so that a script or a notebook
+needs no guard. Ctrl-C does not reach it: the process that started it ends it, and if that one is killed, the
+system ends it, even amid compiled code.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import pickle
-import queue
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from threading import Lock, Thread
-from types import TracebackType
+from dataclasses import dataclass
+from threading import Timer
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
+
+from zwidth.study.jobs.recovery import CannotStart, OutOfTime, WorkerLost
 
 if TYPE_CHECKING:
     from zwidth.study.jobs.job import CellValues, Job
@@ -31,10 +33,10 @@ START: Final = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from zwidth.study.jobs.workers import work; work()"
 )
 GRACE: Final = 2.0  # s; a process that has not ended by then is killed
-
-
-class WorkerLost(RuntimeError):
-    """A worker process ended before its task was done: killed, or out of memory."""
+TOGETHER: Final = 1.0  # s that several cells may take beyond the time limit of one, before they are cut apart
+LOADING: Final = 10.0  # s that a process may load code in until its first cells are there
+MOST_JOBS: Final = 8  # that a process holds
+STARTS: Final = 3  # tries to start a process
 
 
 def cores() -> int:
@@ -48,7 +50,20 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def pack_job(job: Job) -> bytes | None:
+@dataclass(frozen=True)
+class PackedJob:
+    """A job as bytes to send.
+
+    key       differs for different jobs
+    measures  number of columns
+    """
+
+    key: str
+    data: bytes
+    measures: int
+
+
+def pack_job(job: Job) -> PackedJob | None:
     """The job as bytes to send; None where another process could not read them.
 
     That is so for functions typed into a notebook or the main script: they exist in this process only.
@@ -59,146 +74,262 @@ def pack_job(job: Job) -> bytes | None:
         data = pickle.dumps(job)
     except Exception:  # any error that pickling raises
         return None
-    return None if b"__main__" in data else data
+    if b"__main__" in data:
+        return None
+    return PackedJob(hashlib.sha256(data).hexdigest(), data, len(job.measures))
 
 
-class Workers:
-    """Worker processes as a context manager; leaving the `with` block ends them.
+class WorkerProcess:
+    """One process, started when it is needed, and a new one after it was lost.
 
-    job    as `pack_job` returns it
-    count  number of processes
+    time_limit  s that a cell may take before its process is ended; None: no limit. Compiling is not counted. Cells
+                together may take a second more: they are computed apart if they take longer
     """
 
-    def __init__(self, job: bytes, count: int) -> None:
-        self.job, self.count = job, count
-        self.processes: list[subprocess.Popen[bytes]] = []
-        self.threads: list[Thread] = []
+    def __init__(self, time_limit: float | None = None) -> None:
+        self.time_limit = time_limit
+        self.process: subprocess.Popen[bytes] | None = None
+        self._jobs: list[str] = []  # keys of those that the process holds
+        self._computed: dict[str, int] = {}  # a cell of each job whose computation has ended before
+        self._ended = False
 
-    def __enter__(self) -> Workers:
-        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
-        command = [sys.executable, "-c", START, json.dumps(sys.path)]
-        try:
-            for _ in range(self.count):
-                self.processes.append(
-                    subprocess.Popen(
-                        command,
-                        stdin=subprocess.PIPE,
-                        stdout=subprocess.PIPE,
-                        env=environment,
-                        start_new_session=True,  # the terminal's ctrl-C is for this process alone
-                        creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
-                    )
-                )
-        except BaseException:
-            self._end()
-            raise
-        return self
+    def compute(self, job: PackedJob, first: int, last: int) -> CellValues:
+        """Cells first to last - 1 of a job.
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._end()
-
-    def compute(self, ranges: Sequence[CellRange]) -> Iterator[tuple[CellRange, CellValues]]:
-        """Compute the cells of ranges; yield them in the order in which they are finished.
-
-        Raises  WorkerLost  where a process ended before its task was done
+        Raises  WorkerLost   where the process ended before they were done
+                OutOfTime    where they took longer than the time limit
+                CannotStart  where no process can be started
                 whatever the job raises
         """
-        tasks, lock = iter(ranges), Lock()
-        replies: queue.SimpleQueue[tuple[CellRange, Any]] = queue.SimpleQueue()
+        fresh = self._prepare(job)
+        limit = self.time_limit
+        if limit is not None and last - first > 1:
+            limit += TOGETHER
+        if limit is not None and fresh and job.key in self._computed:
+            known = self._computed[job.key]
+            self._ask(("compute", job.key, known, known + 1), limit + LOADING)  # loads what all cells need
+        elif limit is not None and fresh:
+            limit += LOADING
+        cells: CellValues = self._ask(("compute", job.key, first, last), limit)
+        self._computed[job.key] = first
+        return cells
 
-        def next_task() -> CellRange | None:
-            with lock:
-                return next(tasks, None)
+    def end(self) -> None:
+        """End the process; a thread that waits for its cells gets a WorkerLost."""
+        self._ended = True
+        self._stop(wait=GRACE)
 
-        for process in self.processes:
-            self.threads.append(Thread(target=_feed, args=(process, self.job, next_task, replies), daemon=True))
-            self.threads[-1].start()
-        for _ in ranges:
-            task, reply = replies.get()
-            if isinstance(reply, BaseException):
-                raise reply
-            yield task, reply
+    def _prepare(self, job: PackedJob) -> bool:
+        """Start the process if there is none, and send it the job. Returns whether it has computed none of it."""
+        if self.process is None:
+            self._start()
+        if job.key in self._jobs:
+            return False
+        try:
+            self._ask(("job", job.key, job.data), None)
+        except WorkerLost:
+            raise
+        except Exception as error:
+            raise CannotStart(f"a process cannot read the job: {type(error).__name__}: {error}") from error
+        self._jobs = [*self._jobs, job.key][-MOST_JOBS:]
+        return True
 
-    def _end(self) -> None:
-        for process in self.processes:
-            process.terminate()
-        for process in self.processes:
+    def _start(self) -> None:
+        environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
+        command = [sys.executable, "-c", START, json.dumps(sys.path)]
+        for left in reversed(range(STARTS)):
+            self._jobs = []
             try:
-                process.wait(GRACE)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        for thread in self.threads:
-            thread.join(GRACE)
-        for process in self.processes:
-            for pipe in (process.stdin, process.stdout):
-                with suppress(OSError):
-                    assert pipe is not None
-                    pipe.close()
+                if self._ended:
+                    raise WorkerLost("the run was ended")
+                self.process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    env=environment,
+                    start_new_session=True,  # the terminal's ctrl-C is for the process that starts this one
+                    creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+                )
+                if self._ended:  # while it was started
+                    self._stop(wait=0.0)
+                    raise WorkerLost("the run was ended")
+                self._read(self.process)
+            except WorkerLost as error:
+                if self._ended or not left:
+                    raise CannotStart(f"no process can be started to compute: {error}") from None
+            except OSError as error:
+                raise CannotStart(f"no process can be started to compute: {error.strerror or error}") from None
+            else:
+                return
+
+    def _ask(self, message: tuple[Any, ...], limit: float | None) -> Any:
+        """Send a message and return what the process answers."""
+        process = self.process
+        if process is None:  # ended by another thread
+            raise WorkerLost("the run was ended")
+        assert process.stdin is not None
+        clock = None if limit is None else _Clock(limit, process)
+        try:
+            pickle.dump(message, process.stdin)
+            process.stdin.flush()
+            while (reply := self._read(process, clock))[0] == "compiling":
+                if clock is not None:
+                    clock.run(not reply[1])
+        except (OSError, ValueError) as error:  # ValueError: closed by `end`
+            raise WorkerLost(self._lost(process, error)) from None
+        finally:
+            if clock is not None:
+                clock.run(False)
+        if reply[0] == "raised":
+            raise reply[1]
+        return reply[1]
+
+    def _read(self, process: subprocess.Popen[bytes], clock: _Clock | None = None) -> tuple[str, Any]:
+        assert process.stdout is not None
+        try:
+            reply: tuple[str, Any] = pickle.load(process.stdout)
+        except (EOFError, OSError, ValueError, pickle.UnpicklingError) as error:
+            text = self._lost(process, error)
+            if clock is not None and clock.over:
+                raise OutOfTime(f"took longer than {self.time_limit:g} s") from None
+            raise WorkerLost(text) from None
+        return reply
+
+    def _lost(self, process: subprocess.Popen[bytes], error: Exception) -> str:
+        """Forget the process. Returns how it ended."""
+        code: int | None = None
+        with suppress(subprocess.TimeoutExpired):
+            code = process.wait(GRACE)
+        self._stop(wait=0.0)
+        how = f"ended with code {code}" if code is not None else f"answered no more ({error})"
+        if code is not None and code < 0:
+            with suppress(ValueError):
+                how = f"was killed ({signal.Signals(-code).name})"
+        hint = ", perhaps for lack of memory" if "KILL" in how else ""
+        return f"a process that computed {how}{hint}"
+
+    def _stop(self, wait: float) -> None:
+        """End the process and close its pipes."""
+        process, self.process = self.process, None
+        if process is None:
+            return
+        if wait:
+            process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(wait)
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            with suppress(OSError):
+                assert pipe is not None
+                pipe.close()
 
 
-def _feed(process: subprocess.Popen[bytes], job: bytes, next_task: Any, replies: Any) -> None:
-    """Send one process its tasks, one after the other, and pass on its replies."""
-    sent, received = process.stdin, process.stdout
-    assert sent is not None
-    assert received is not None
-    task = None
-    try:
-        pickle.dump(job, sent)
-        while (task := next_task()) is not None:
-            pickle.dump(task, sent)
-            sent.flush()
-            replies.put((task, pickle.load(received)))
-        sent.close()
-    except (EOFError, OSError, ValueError, pickle.UnpicklingError):  # ValueError: closed by `_end`
-        replies.put((task, WorkerLost(_how_it_ended(process))))
-    except Exception as error:  # a reply that cannot be unpickled
-        replies.put((task, error))
+class _Clock:
+    """Kills a process when its time is over; it can be stopped and go on."""
 
+    def __init__(self, seconds: float, process: subprocess.Popen[bytes]) -> None:
+        self.left, self.process, self.over = seconds, process, False
+        self._timer: Timer | None = None
+        self._since = 0.0
+        self.run(True)
 
-def _how_it_ended(process: subprocess.Popen[bytes]) -> str:
-    code: int | None = None
-    with suppress(subprocess.TimeoutExpired):
-        code = process.wait(GRACE)
-    how = f"ended with code {code}"
-    if code is not None and code < 0:
-        with suppress(ValueError):
-            how = f"was killed ({signal.Signals(-code).name})"
-    hint = ", perhaps for lack of memory" if "KILL" in how else ""
-    return f"a process that computed {how}{hint}; fewer workers need less memory"
+    def run(self, on: bool) -> None:
+        """Let the clock run, or stop it."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+            self.left -= monotonic() - self._since
+        if on:
+            self._since = monotonic()
+            self._timer = Timer(max(self.left, 0.0), self._kill)
+            self._timer.daemon = True
+            self._timer.start()
+
+    def _kill(self) -> None:
+        self.over = True
+        self.process.kill()
 
 
 def work() -> None:
-    """Main function of a worker: read a job and ranges from its input, write their cells to its output."""
+    """Main function of a worker: read jobs and ranges from its input, write their cells to its output."""
     import warnings
 
+    from zwidth.compile_events import listening
+
+    with suppress(AttributeError):
+        signal.signal(signal.SIGIO, signal.SIG_DFL)
     warnings.filterwarnings("ignore", category=RuntimeWarning)  # of arithmetic, hidden as in the command
     received, sent = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # text printed by a user's measure must not mix with the replies
+    depth = 0
+
+    def reply(kind: str, content: Any) -> None:
+        sent.write(_pickled(kind, content))
+        sent.flush()
+
+    def compiling(_: str, ended: bool) -> None:
+        nonlocal depth
+        depth += -1 if ended else 1
+        if depth == (0 if ended else 1):
+            reply("compiling", not ended)
+
+    jobs: dict[str, Any] = {}
     try:
-        job: Any = None
-        packed_job = pickle.load(received)
-        while True:
-            first, last = pickle.load(received)
-            try:
-                job = job or pickle.loads(packed_job)
-                reply = pickle.dumps(job.compute(first, last))
-            except Exception as error:
-                reply = _error(error)
-            sent.write(reply)
-            sent.flush()
-            sys.stdout.flush()
+        reply("started", None)
+        with listening(compiling):
+            while True:
+                kind, key, *content = pickle.load(received)
+                try:
+                    with _ended_with_its_starter():
+                        if kind == "job":
+                            jobs[key] = pickle.loads(content[0])
+                            for old in list(jobs)[:-MOST_JOBS]:
+                                del jobs[old]
+                            answer = None
+                        else:
+                            answer = jobs[key].compute(*content)
+                except Exception as error:
+                    reply("raised", error)
+                else:
+                    reply("done", answer)
+                sys.stdout.flush()
     except (EOFError, BrokenPipeError):
         os._exit(0)  # the process that started this one has ended, or needs no more; nothing to clean up
 
 
-def _error(error: Exception) -> bytes:
-    """The error as bytes to send; a RuntimeError with its text where it cannot be pickled."""
+class _ended_with_its_starter:
+    """Inside this block the system ends this process when the one that started it is killed.
+
+    It sends SIGIO, which ends a process that has not asked for anything else, when the input's other end closes;
+    no messages come meanwhile. Where there is no such signal, what runs is finished first.
+    """
+
+    def __enter__(self) -> None:
+        self._set(True)
+
+    def __exit__(self, *error: object) -> None:
+        self._set(False)
+
+    def _set(self, on: bool) -> None:
+        with suppress(ImportError, AttributeError, OSError):
+            import fcntl
+            import select
+
+            own = fcntl.fcntl(0, fcntl.F_GETFL) & ~os.O_ASYNC
+            fcntl.fcntl(0, fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(0, fcntl.F_SETFL, own | (os.O_ASYNC if on else 0))
+            if on and select.select([0], [], [], 0.0)[0]:  # it has closed already
+                os._exit(0)
+
+
+def _pickled(kind: str, content: Any) -> bytes:
+    """A reply as bytes; an error that cannot be pickled is sent as a RuntimeError with its text."""
+    if kind != "raised":
+        return pickle.dumps((kind, content))
     try:
-        data = pickle.dumps(error)
+        data = pickle.dumps((kind, content))
         pickle.loads(data)
     except Exception:
-        return pickle.dumps(RuntimeError(f"{type(error).__name__}: {error}"))
+        return pickle.dumps((kind, RuntimeError(f"{type(content).__name__}: {content}")))
     return data

@@ -13,7 +13,7 @@ from zwidth.memory_limit import check_memory
 from zwidth.study.designs.axis_tables import Faults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
-from zwidth.study.designs.study import PER_AXIS, PER_VALUE, Study
+from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_file import read_document, study_of
 from zwidth.study.tolerances.intervals import draws_needed
 from zwidth.study.tolerances.tolerance import Tolerance
@@ -24,6 +24,8 @@ SAMPLES: Final = 1000
 INDEX_SAMPLES: Final = 512
 QUANTILES: Final = (5.0, 50.0, 95.0)
 SEED: Final = 1
+PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy
+PER_AXIS: Final = 12  # numbers of memory for each number of a device, which are kept as they are written
 PER_CHART: Final = 6000  # numbers of memory for the edge of each drawn device on the lines of the bands
 STIFFEST: Final = "stiffness_max"  # is asked of every device, whether the study names it or not
 OF_A_SWEEP: Final = ("axis", "sampling", "count", "optimise")  # what a study of tolerances leaves aside

@@ -23,7 +23,7 @@ from zwidth.progress import Progress
 from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
 from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.job import CellValues, Job
+from zwidth.study.jobs.job import Cells, CellValues, Job
 from zwidth.study.jobs.store import Store
 from zwidth.study.tolerances.band import Band, Coverage, refined_dampings
 from zwidth.study.tolerances.draws import UNSEEN, drawn_values
@@ -125,9 +125,14 @@ def computing(
 
     def compute(name: str, job: Job, stage: str) -> CellValues:
         kept = None if store is None else Store(Path(store) / name, job)
-        return run(job, kept, progress, workers, stage=stage)
+        return in_memory(run(job, kept, progress, workers, stage=stage))
 
     return compute
+
+
+def in_memory(cells: Cells) -> CellValues:
+    """Cells that may lie in a store, read into memory."""
+    return CellValues(cells.values, cells.status, cells.notes)
 
 
 def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:

@@ -16,12 +16,14 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import NO_POSTURE, STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
 from zwidth.measures.evaluate import evaluate
+from zwidth.measures.wanted import WANTED_NUMBERS
 from zwidth.model.argument_checks import require
 from zwidth.processors import Processor
 from zwidth.progress import Progress
 from zwidth.study.designs.column import measure_list, unit_attributes
 from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.executor_interface import Executor
+from zwidth.study.jobs.job import Cells, CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.extreme_direction import EXTREMES, extreme_over_directions, extreme_sign
@@ -150,6 +152,9 @@ def workspace_map(
     progress: Progress | None = None,
     workers: int | None = None,
     processor: Processor = "cpu",
+    time_limit: float | None = None,
+    cluster: str | None = None,
+    executor: Executor | None = None,
 ) -> xr.Dataset:
     """Measures over a plane of a device's workspace.
 
@@ -162,6 +167,10 @@ def workspace_map(
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with "mapping", cells done, and cells of all
     workers        processes at most; left out: one for each core
+    time_limit     s that a cell may take; one that takes longer is `out of time`, the others keep their values
+    cluster        address of a scheduler of dask.distributed, or "local"; left out: processes of this computer
+    executor       what computes, opened before for many calls (`study.open_executor`), in place of workers,
+                   time_limit and cluster
     processor      "cuda": charts are computed on an NVIDIA GPU, by one process (`processors`); else "cpu"
     Returns        a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none,
                    NAME_status, and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have
@@ -174,7 +183,18 @@ def workspace_map(
     """
     job = map_job(device, measures, plane, direction, assembly, model, wall, user_measures=user_measures)
     kept = store_for(job, store)
-    cells = run(job, kept, progress, workers, processor=processor, batch=job.batch, stage="mapping")
+    cells = run(
+        job,
+        kept,
+        progress,
+        workers,
+        processor=processor,
+        batch=job.batch,
+        stage="mapping",
+        time_limit=time_limit,
+        cluster=cluster,
+        executor=executor,
+    )
     return as_dataset(job, cells)
 
 
@@ -221,7 +241,7 @@ def map_job(
     return MapJob(device, requested_measures, plane, direction, assembly, model, wanted)
 
 
-def as_dataset(job: MapJob, cells: CellValues) -> xr.Dataset:
+def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     """A map's cells with axes, units and circumstances. Raises PlaneError where the handle reaches none."""
     import xarray as xr
 
@@ -288,7 +308,7 @@ def _sentence(note: Note, plane: PlaneGrid) -> str:
     return f"{cells} {STATUS.get(note.status, 'ok')}: {note.reason}; first at {where}"
 
 
-def _check_reached(job: MapJob, cells: CellValues) -> None:
+def _check_reached(job: MapJob, cells: Cells) -> None:
     if not np.isin(cells.status, NO_POSTURE).all():
         return
     mechanism = job.device.mechanism
@@ -305,11 +325,9 @@ def _attributes(job: MapJob) -> dict[str, Any]:
     device, plane, direction = job.device, job.plane, job.direction
     assert device.mechanism is not None
     rendered = direction if isinstance(direction, str) else device.direction(direction).tolist()
-    wanted = {
-        "wanted_stiffness_N_per_m": job.wall.stiffness,
-        "wanted_damping_Ns_per_m": job.wall.damping,
-        "wanted_frequency_Hz": job.wall.frequency,
-    }
+    wanted = {f"wanted_{one.key}": getattr(job.wall, one.name) for one in WANTED_NUMBERS}
+    if job.wall.colliding_links is not None:
+        wanted["wanted_colliding_links"] = ", ".join(job.wall.colliding_links)
     return {
         "name": device.name,
         "device": device.label,

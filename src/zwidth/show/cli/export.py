@@ -1,0 +1,305 @@
+"""`zwidth export`: the safe walls over the workspace, for a haptic loop to clamp its gains by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from zwidth.show.cli.answer import two_columns
+from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.show.cli.options import Callback as Callback
+from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
+from zwidth.show.cli.resumable import open_store, report_kept_work, resume_options
+from zwidth.show.output import DATA, FIGURES, printable, write_text
+from zwidth.show.units import amount
+
+if TYPE_CHECKING:
+    from zwidth.study.safe_walls.table import SafeWalls
+
+HEADER: Final = ".h"
+ARRAY: Final = ".nc"
+
+
+class CountsType(ParamType):
+    """Two or three whole numbers."""
+
+    name = "counts"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return "NX,NY[,NZ]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        try:
+            counts = tuple(int(part) for part in value.split(","))
+        except ValueError:
+            counts = ()
+        if len(counts) not in (2, 3):
+            self.fail(f"must be two or three whole numbers such as 20,10, got {value!r}", param, ctx)
+        return counts
+
+
+def _axis_range(name: str) -> Any:
+    return click.option(
+        f"--{name}",
+        f"{name}_range",
+        type=Numbers("LOW,HIGH", (2,), "-0.1,0.1"),
+        help=f"Range of the table along {name} [m]. Default: the workspace of DEVICE, or the reachable range.",
+    )
+
+
+class ExportCommand(Command):
+    """Write the safe walls of DEVICE over its workspace, for a haptic loop to clamp its gains by.
+
+    A table of cells: in each the walls that are stable in every posture, every direction and with every hand; as
+    a C header without dependencies (.h), or as data.
+    """
+
+    name = "export"
+    summary = "Write safe gains over the workspace as a C header or a table."
+    examples = (
+        "zwidth export my-device.toml --margin 0.1",
+        "zwidth export my-device.toml --hands none,thesis-arm --cells 20,10 --output safe_walls.h",
+        "zwidth export my-device.toml --directions 4 --levels 8 --arduino my-wall --output safe.json",
+    )
+    options = (
+        _axis_range("x"),
+        _axis_range("y"),
+        _axis_range("z"),
+        click.option(
+            "--cells",
+            type=CountsType(),
+            help="Number of cells along each axis. Default: 20 along the longer side of a plane, 6 in space.",
+        ),
+        click.option(
+            "--hands",
+            metavar="A,B,C",
+            callback=refuse_empty,
+            help="Operators that may hold the handle: bundled ones, files, none. Default: that of DEVICE.",
+        ),
+        click.option(
+            "--margin",
+            type=float,
+            default=0.0,
+            metavar="SHARE",
+            help="Share by which stiffness and damping may both be off (default 0).",
+        ),
+        click.option(
+            "--levels",
+            type=int,
+            default=12,
+            metavar="N",
+            help="Number of bands of stiffness in each cell (default 12).",
+        ),
+        click.option(
+            "--directions",
+            type=int,
+            default=1,
+            metavar="N",
+            help="Further tables for sectors of directions: 2 N in a plane, 3 N² in space (default 1: none).",
+        ),
+        click.option(
+            "--span",
+            type=float,
+            metavar="B",
+            help="Damping range that every cell offers at least [Ns/m]: the stiffest walls that have it. Default: "
+            "the walls whose rectangle is the largest.",
+        ),
+        click.option(
+            "--size-limit",
+            type=click.IntRange(min=1),
+            metavar="BYTES",
+            help="Refuse a table that takes more bytes.",
+        ),
+        click.option(
+            "--arduino",
+            metavar="FOLDER",
+            callback=refuse_empty,
+            help="Also write a sketch that clamps its gains by the table, with the header.",
+        ),
+        click.option(
+            "--seed",
+            type=click.IntRange(min=0),
+            default=1,
+            metavar="N",
+            help="Seed of the random postures that cells are tried by (default 1).",
+        ),
+        resume_options,
+    )
+    outputs = (HEADER, *FIGURES, *DATA, ARRAY)
+    output_help = (
+        "Write a header (.h), a figure (.png .svg .pdf) or the data (.csv .json .nc). Default: safe_walls.h in "
+        "this folder."
+    )
+    keys = (
+        "file",
+        "axes",
+        "axis_vectors",
+        "hands",
+        "margin",
+        "damping_span_Ns_per_m",
+        "levels",
+        "direction_parts",
+        "table_bytes",
+        "status",
+        "stiffness_max_N_per_m",
+        "damping_min_Ns_per_m",
+        "damping_max_Ns_per_m",
+        "outside",
+        "notes",
+    )
+    no_response = (
+        "a measured response has no masses and springs to follow through the workspace, and its chart has an "
+        "uncertainty of its own; fit a [plant] with zwidth identify, or use zwidth chart"
+    )
+
+    def about(self, command: Callback) -> Callback:
+        return about_every_posture(command)
+
+    def default_output(self, question: Question) -> str:
+        return "safe_walls.h"
+
+    def check(self, case: CommandLine) -> None:
+        if case["hands"] is not None and case.question.operator is not None:
+            raise BadInput("--operator and --hands exclude each other; leave out --operator")
+        folder = None if case["arduino"] is None else Path(case["arduino"])
+        if folder is not None and not (folder.is_dir() or (not folder.exists() and folder.parent.is_dir())):
+            raise BadInput(
+                f"--arduino: {printable(str(folder))} is no folder and cannot be made one; name a new folder"
+            )
+
+    def parse(self, case: CommandLine) -> Mapping[str, Any]:
+        if case["hands"] is None:
+            return {}
+        names = tuple(dict.fromkeys(name.strip() for name in case["hands"].split(",")))
+        if "" in names:
+            raise BadInput(f"--hands: must be names with commas between them, got {case['hands']!r}")
+        return {"hands": names}
+
+    def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        # neither a single posture nor a direction; who holds the device is told by `hands`
+        facts = super().circumstances(case)
+        for key in ("position_m", "projected_m", "direction", "axis", "operator"):
+            facts.pop(key, None)
+        return facts
+
+    def is_about_moments(self, case: CommandLine) -> bool:
+        return False  # which `compute` refuses
+
+    def compute(self, case: CommandLine) -> SafeWalls:
+        from zwidth.memory_limit import TooLarge
+        from zwidth.study.safe_walls.safe_walls import SafeWallsError, compute_table, safe_walls_job
+        from zwidth.study.workspace.plane_grid import PlaneError
+
+        question, device = case.question, case.device
+        try:
+            job = safe_walls_job(
+                device,
+                case["hands"],
+                ranges=(case["x_range"], case["y_range"], case["z_range"]),
+                cells=case["cells"],
+                levels=case["levels"],
+                directions=case["directions"],
+                margin=case["margin"],
+                size_limit=case["size_limit"],
+                assembly=question.assembly,
+                model=question.model,
+                seed=case["seed"],
+            )
+            store = open_store(job, case.path, case["resume"])
+            with report_kept_work(store):
+                table = compute_table(device, job, case["span"], store, case.progress, case["workers"])
+        except (SafeWallsError, PlaneError) as error:
+            raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
+        except TooLarge as error:
+            raise BadInput(f"{question.name}: {error}") from None
+        if not (table.level > 0).any():
+            if store is not None and case["resume"] is None:
+                store.remove()
+            raise NoAnswer(f"no cell has safe walls: {'; '.join(table.reasons)}")
+        return table
+
+    def table(self, case: CommandLine, result: SafeWalls, document: Mapping[str, Any]) -> dict[str, Any]:
+        return result.table()
+
+    def write(
+        self, case: CommandLine, result: SafeWalls, document: dict[str, Any], reason: str | None
+    ) -> str | None:
+        from zwidth.study.safe_walls.job import SafeWallsJob
+
+        assert case.path is not None
+        if case.writes([HEADER]):
+            from zwidth.show.safe_walls.header import header_text
+
+            write_text(case.path, header_text(result))
+        elif case.writes([ARRAY]):
+            from zwidth.show.dataset import write_dataset
+
+            write_dataset(case.path, result.dataset())
+        else:
+            super().write(case, result, document, reason)
+        if case["resume"] is None:  # now that what it kept is written
+            store = open_store(SafeWallsJob(result.question), case.path, None)
+            if store is not None:
+                store.remove()
+        return reason
+
+    def caption(self, case: CommandLine, document: Mapping[str, Any]) -> list[str]:
+        held = ", ".join("nobody" if hand == "none" else hand for hand in document["hands"])
+        margin = f", gains off by {100.0 * document['margin']:.3g} %" if document["margin"] else ""
+        return [*super().caption(case, document), f"stable in every direction, held by {held}{margin}"]
+
+    def write_others(self, case: CommandLine, result: SafeWalls) -> dict[str, Path]:
+        if case["arduino"] is None:
+            return {}
+        from zwidth.show.safe_walls.header import write_sketch
+
+        folder = Path(case["arduino"])
+        write_sketch(folder, result)
+        return {"arduino": folder}
+
+    def heading(self, case: CommandLine) -> str:
+        return ""  # the pages say what cells hold for
+
+    def pages(self, case: CommandLine, result: SafeWalls, document: Mapping[str, Any]) -> Iterator[Any]:
+        yield f"{printable(result.device.name)}: walls that are stable {_for_whom(result)}"
+        if document["left_out"]:
+            yield f"linear: leaves out {', '.join(document['left_out'])}; `zwidth simulate` has them"
+        yield two_columns(list(_rows(result)))
+        yield from (printable(reason) for reason in result.reasons)
+
+
+def _for_whom(table: SafeWalls) -> str:
+    where = "in every posture of a cell, " if table.grid.dimensions else ""
+    along = "in every direction, " if table.grid.dimensions else ""
+    held = ", ".join("nobody" if hand == "none" else printable(hand) for hand in table.hands)
+    return f"{where}{along}held by {held}"
+
+
+def _rows(table: SafeWalls) -> Iterator[tuple[str, str]]:
+    grid, K = table.grid, table.rectangles[table.level > 0, 0]
+    if grid.dimensions:
+        cells = " x ".join(map(str, grid.counts))
+        yield "cells", f"{int((table.level > 0).sum())} of {cells} have safe walls"
+    spread = (
+        amount(float(K[0]), "N/m")
+        if K.min() == K.max()
+        else f"{amount(float(K.min()), 'N/m')} to " + amount(float(K.max()), "N/m")
+    )
+    yield "largest stiffness", spread
+    one = table.outside
+    if one.stiffness > 0.0:
+        limits = f"{amount(one.low, 'Ns/m')} to {amount(one.high, 'Ns/m')}"
+        yield "safe in all of them", f"stiffness up to {amount(one.stiffness, 'N/m')} with damping of {limits}"
+    elif grid.dimensions:
+        yield "safe in all of them", "no wall: outside the table there is no force"
+    if table.question.margin:
+        yield "margin", f"stiffness and damping may be off by {100.0 * table.question.margin:.3g} %"
+    if table.question.slots > 1:
+        yield "directions", f"{table.sectors.count} sectors, with a table each"
+    yield "size", f"{table.size} bytes"

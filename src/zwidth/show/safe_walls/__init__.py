@@ -1,0 +1,1 @@
+"""Tables of safe walls as programs for a haptic loop."""

@@ -1,0 +1,196 @@
+"""Safe walls over a device's workspace, for a haptic loop to clamp its gains by."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from math import isfinite
+from typing import Final
+
+from zwidth.device.device import Device
+from zwidth.device.operator_choice import NOBODY
+from zwidth.measures.definition import Spelling, as_argument
+from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import Store, store_for
+from zwidth.study.safe_walls.cell_walls import CellQuestion
+from zwidth.study.safe_walls.grid import Sectors, cells_of
+from zwidth.study.safe_walls.job import SafeWallsJob
+from zwidth.study.safe_walls.table import SafeWalls, table_of_cells, table_size
+from zwidth.study.sensitivity.advice import Advice
+
+LEVELS: Final = 12
+MOST_LEVELS: Final = 255  # what a byte of the exported program counts
+MOST_PARTS: Final = 16
+BATCH: Final = 4  # cells
+
+
+class SafeWallsError(ValueError):
+    """A table of safe walls that cannot be made.
+
+    reason  why not
+    advice  what to ask for instead; None where the reason says it
+    """
+
+    def __init__(self, reason: str, advice: Advice | None = None) -> None:
+        super().__init__(reason, advice)
+        self.reason, self.advice = reason, advice
+
+    def __str__(self) -> str:
+        return self.spelled(as_argument)
+
+    def spelled(self, spelling: Spelling) -> str:
+        """The message, with arguments spelled as in Python, or as options."""
+        return self.reason if self.advice is None else f"{self.reason}; {self.advice.spelled(spelling)}"
+
+
+def safe_walls(
+    device: Device,
+    hands: Sequence[str] | None = None,
+    *,
+    x: Sequence[float] | None = None,
+    y: Sequence[float] | None = None,
+    z: Sequence[float] | None = None,
+    cells: Sequence[int] | None = None,
+    levels: int = LEVELS,
+    directions: int = 1,
+    margin: float = 0.0,
+    span: float | None = None,
+    size_limit: int | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    seed: int = 1,
+    store: Store | str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> SafeWalls:
+    """A table of the walls that are stable in every posture of each cell of the workspace, in every direction and
+    with every hand; see `docs/export.md` for what is proven of it and what is tried.
+
+    hands       who may hold it: bundled operators, files, "none" for nobody; left out: as the device file says
+    x, y, z     lowest and highest coordinate of the handle [m]; left out: the file's workspace, or what is reached
+    cells       number of cells along each axis; left out: 20 along the longer side of a plane, 6 in space
+    levels      bands of stiffness in each cell, at most 255
+    directions  into how many pieces each face of a square (a cube) of directions is cut: 1 for a table of all
+                directions; n for further tables of 2 n (3 n^2) sectors, at most 16
+    margin      share by which stiffness and damping may both be off, at least 0 and below 1: the walls of the
+                table are stable with both times any factors from 1 - margin to 1 + margin
+    span        damping that every rectangle has at least [N s/m]; left out: the rectangles of the largest area
+    size_limit  bytes that the numbers of the exported program may take
+    assembly, model   as for `Device.at`
+    seed        of the random samples by which cells are tried
+    store       a folder that keeps the cells that are done
+    progress    is called with "cells", cells done, and cells of all
+    workers     processes at most; left out: one for each core
+    Raises      SafeWallsError  for arguments that are not allowed, a table beyond the limit, a device under load,
+                                one that renders moments, a measured response
+                PlaneError      as `grid.cells_of` does
+                DeviceError     for hands that cannot be read, and as `Device.at` does
+                what `OperatingPoint.loop`, `executor.run` and `Store` raise
+    """
+    job = safe_walls_job(
+        device,
+        hands,
+        ranges=(x, y, z),
+        cells=cells,
+        levels=levels,
+        directions=directions,
+        margin=margin,
+        size_limit=size_limit,
+        assembly=assembly,
+        model=model,
+        seed=seed,
+    )
+    return compute_table(device, job, span, store_for(job, store), progress, workers)
+
+
+def safe_walls_job(
+    device: Device,
+    hands: Sequence[str] | None,
+    *,
+    ranges: Sequence[Sequence[float] | None],
+    cells: Sequence[int] | None,
+    levels: int,
+    directions: int,
+    margin: float,
+    size_limit: int | None,
+    assembly: str | None,
+    model: str | None,
+    seed: int,
+) -> SafeWallsJob:
+    """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made."""
+    require("device", device, Device)
+    _check_numbers(levels, directions, margin)
+    if device.response is not None:
+        raise SafeWallsError(
+            "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth "
+            "identify"
+        )
+    if device.load is not None:
+        raise SafeWallsError(
+            "a table holds for a device without load: its walls would hang on how hard the hand pushes",
+            Advice("leave the load out, with {}", "set", "load=unset"),
+        )
+    if device.mechanism is not None and device.renders_moments(None):
+        raise SafeWallsError(
+            "the device renders moments about an axis, and a table is about forces; render a force"
+        )
+    grid = cells_of(device, ranges, cells, assembly)
+    if directions > 1 and not grid.dimensions:
+        raise SafeWallsError(
+            f"the device has no [mechanism] and one direction, got {directions} parts of directions",
+            Advice("leave out {}", "directions"),
+        )
+    held = tuple(device.held_by(hand) for hand in hands) if hands else (device,)
+    sectors = Sectors(grid.dimensions, directions)
+    question = CellQuestion(held, grid, sectors, levels, float(margin), assembly, model, seed)
+    if size_limit is not None and (size := table_size(question)) > size_limit:
+        raise SafeWallsError(
+            f"the table takes {size} bytes, more than the {size_limit} of its limit",
+            Advice("take fewer with {}, or fewer levels", "cells"),
+        )
+    _check_point(question)
+    return SafeWallsJob(question)
+
+
+def compute_table(
+    device: Device,
+    job: SafeWallsJob,
+    span: float | None,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> SafeWalls:
+    """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
+    if span is not None and not (isfinite(span) and span > 0.0):
+        raise SafeWallsError(f"the span of damping must be positive, got {span:g}")
+    cells = run(job, store, progress, workers, batch=BATCH, stage="cells")
+    asked = job.cell_question
+    return table_of_cells(device, hand_names(asked), asked, cells, span)
+
+
+def hand_names(question: CellQuestion) -> tuple[str, ...]:
+    """What the hands are called, in their order; "none" for nobody."""
+    return tuple(device.operator_name or NOBODY for device in question.devices)
+
+
+def _check_numbers(levels: int, directions: int, margin: float) -> None:
+    if not 1 <= levels <= MOST_LEVELS:
+        raise SafeWallsError(f"levels must be a whole number from 1 to {MOST_LEVELS}, got {levels}")
+    if not 1 <= directions <= MOST_PARTS:
+        raise SafeWallsError(f"directions must be a whole number from 1 to {MOST_PARTS}, got {directions}")
+    if not 0.0 <= margin < 1.0:
+        raise SafeWallsError(f"margin must be at least 0 and below 1, got {margin:g}")
+
+
+def _check_point(question: CellQuestion) -> None:
+    """Raise what is wrong with the device, its assembly or its model, before the cells have it as their status."""
+    from zwidth.model.posture import PostureError
+
+    for device in question.devices:
+        try:
+            point = device.at(assembly=question.assembly, model=question.model)
+        except PostureError:  # an assembly that does not reach the reference may reach others
+            continue
+        _ = point.loop

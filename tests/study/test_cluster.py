@@ -1,0 +1,181 @@
+"""A dask cluster computes the same bits as this computer alone, whichever of its programs are killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+from tests.study.cluster_cases import running_cluster
+from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
+from zwidth.measures.definition import FAILED, OUT_OF_TIME
+from zwidth.study.jobs import cluster as clusters
+from zwidth.study.jobs import cluster_worker
+from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
+from zwidth.study.jobs.executor import RecoveredWarning, run
+from zwidth.study.jobs.executor_interface import open_executor
+from zwidth.study.jobs.recovery import CannotStart
+from zwidth.study.jobs.store import Store
+from zwidth.study.jobs.workers import pack_job
+
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+
+
+def test_a_local_cluster_gives_the_same_bits_and_says_how_far_it_is():
+    told = []
+    found = run(RootsJob(60), None, lambda *now: told.append(now), 2, batch=7, cluster="local", stage="roots")
+    assert same_cells(found, RootsJob(60).compute(0, 60))
+    assert (told[0], told[-1]) == (("roots", 0, 60), ("roots", 60, 60))
+    assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
+
+
+def test_cells_that_raise_kill_or_never_end_are_data_as_on_one_computer(monkeypatch):
+    monkeypatch.setattr("zwidth.study.jobs.workers.LOADING", 1.0)
+    job = FaultyJob(24, raising=(3,), killing=(12,), endless=(20,), starter=os.getpid())
+    with pytest.warns(RecoveredWarning, match="SIGKILL"):
+        found = run(job, workers=2, batch=8, cluster="local", time_limit=0.5)
+    assert same_but_for(found, RootsJob(24).compute(0, 24), [3, 12, 20])
+    assert found.status[[3, 12, 20], 0].tolist() == [FAILED, FAILED, OUT_OF_TIME]
+
+
+def test_one_cluster_serves_many_jobs_with_one_thread_for_each():
+    with open_executor(1, "local") as executor:
+        found = [run(ProcessNumbersJob(8 + n), executor=executor).values for n in range(3)]
+    assert len({process for values in found for process in values[:, 0]}) == 1
+    assert {threads for values in found for threads in values[:, 1]} == {1.0}
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(found[0][0, 0]), 0)
+
+
+def test_a_killed_worker_is_told_and_its_batch_done_again():
+    with running_cluster() as cluster:
+
+        def progress(stage, done, of):
+            if done == 30:
+                os.killpg(cluster.workers[0].pid, signal.SIGKILL)
+
+        with pytest.warns(RecoveredWarning, match=r"^the worker at tcp://\S+ left the cluster; what it"):
+            found = run(RootsJob(150, seconds=0.02), None, progress, batch=5, cluster=cluster.address)
+        assert same_cells(found, RootsJob(150).compute(0, 150))
+
+
+def test_a_killed_scheduler_ends_the_run_and_the_store_goes_on(tmp_path):
+    path, job = tmp_path / "cells", RootsJob(100, seconds=0.01)
+    with running_cluster(1) as cluster:
+
+        def progress(stage, done, of):
+            if done == 30:
+                os.killpg(cluster.scheduler.pid, signal.SIGKILL)
+
+        with pytest.raises(ClusterEnded, match=r"the scheduler at tcp://127\.0\.0\.1:.* has ended"):
+            run(job, Store(path, job), progress, batch=5, cluster=cluster.address)
+    again = RootsJob(100)
+    assert same_cells(run(again, Store(path, again), workers=1), RootsJob(100).compute(0, 100))
+    assert again.computed_ranges[0] >= (30, 35)
+
+
+def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
+    """Nobody listens; somebody listens and says nothing; the address is none."""
+    monkeypatch.setattr(clusters, "ANSWER", 1.0)
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        port = silent.getsockname()[1]
+        with pytest.raises(ClusterError, match=rf"^tcp://127.0.0.1:{port}: no scheduler answers within 1 s;"):
+            run(RootsJob(3), cluster=f"tcp://127.0.0.1:{port}")
+        silent.listen()
+        with pytest.raises(ClusterError, match=rf"^tcp://127.0.0.1:{port}: no scheduler answers within 1 s;"):
+            run(RootsJob(3), cluster=f"tcp://127.0.0.1:{port}")
+    for wrong in ("nowhere", "hugo://here:1"):
+        with pytest.raises(ClusterError, match=rf"^{wrong}: is no address \(.*\); start one"):
+            run(RootsJob(3), cluster=wrong)
+
+
+def test_a_cluster_without_workers_and_workers_that_differ_are_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(clusters, "ANSWER", 1.0)
+    missing, older = tmp_path / "missing", tmp_path / "older" / "zwidth"
+    missing.mkdir()
+    older.mkdir(parents=True)
+    (missing / "zwidth.py").write_text("raise ModuleNotFoundError('no zwidth here')")
+    (older / "__init__.py").write_text("")
+    (older / "_version.py").write_text("__version__ = '0.0.1'")
+    with running_cluster(0) as cluster:
+        with pytest.raises(ClusterError, match=r"has no workers; start one on each computer: dask worker tcp://"):
+            run(RootsJob(3), cluster=cluster.address)
+        for folder, said in (
+            (missing, r"has no zwidth; install zwidth \S+ there, in the Python that runs dask worker"),
+            (older.parent, r"has zwidth 0\.0\.1 instead of \S+; results would not be the same: install the same"),
+        ):
+            worker = cluster.start_worker("--no-nanny", path=[str(folder), *sys.path])
+            with pytest.raises(ClusterError, match=rf"^the worker at tcp://\S+ {said}"):
+                run(RootsJob(3), cluster=cluster.address)
+            os.killpg(worker.pid, signal.SIGKILL)
+            worker.wait()
+
+
+def test_without_dask_there_is_one_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ClusterError, match=r"^a cluster needs dask.distributed; install it: pip"):
+        run(RootsJob(3), cluster="local")
+
+
+def test_a_cluster_at_an_address_has_its_own_workers():
+    with pytest.raises(ValueError, match="workers is for processes of this computer; the cluster at tcp"):
+        open_executor(2, "tcp://a:1")
+
+
+def test_dask_is_silent_here_and_its_levels_are_given_back(tmp_path: Path):
+    import logging
+
+    before = logging.getLogger("distributed.client").level
+    with warnings.catch_warnings(), open_executor(1, "local"):
+        warnings.simplefilter("ignore")
+        assert logging.getLogger("distributed.client").level > logging.CRITICAL
+    assert logging.getLogger("distributed.client").level == before
+
+
+def test_processes_of_a_run_that_was_killed_end_when_another_comes(monkeypatch):
+    monkeypatch.setattr(cluster_worker, "FORGOTTEN", 0.0)
+    packed = pack_job(ProcessNumbersJob(2))
+    assert packed is not None
+    expected = cluster_worker.versions()
+    (gone,) = {*cluster_worker.compute_on_worker(packed, 0, 1, "first", None, expected).cells.values[:, 0]}
+    os.kill(int(gone), 0)
+    cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(gone), 0)
+    cluster_worker.end_processes("second")
+    with pytest.raises(CannotStart, match="the run was ended"):
+        cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
+    with pytest.raises(CannotStart, match=r"a worker that joined the cluster has zwidth \S+ instead of 7"):
+        cluster_worker.compute_on_worker(packed, 0, 1, "third", None, expected | {"zwidth": "7"})
+
+
+def test_a_scheduler_that_falls_silent_ends_the_run(monkeypatch):
+    """It is there, and does nothing: the system has stopped it."""
+    monkeypatch.setattr(clusters, "SILENT", 1.0)
+    monkeypatch.setattr(clusters, "LEAVE", 1.0)
+    with running_cluster(1) as cluster:
+
+        def progress(stage, done, of):
+            if done == 30:
+                os.killpg(cluster.scheduler.pid, signal.SIGSTOP)
+
+        with pytest.raises(ClusterEnded, match=r"^the scheduler at tcp://127\S+ has not answered for 1 s$"):
+            run(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)
+
+
+def test_a_cluster_that_loses_all_its_workers_ends_the_run(monkeypatch):
+    monkeypatch.setattr(clusters, "SILENT", 1.5)
+    with running_cluster(1, "--no-nanny") as cluster:
+
+        def progress(stage, done, of):
+            if done == 30:
+                os.killpg(cluster.workers[0].pid, signal.SIGKILL)
+
+        with pytest.raises(ClusterEnded, match=r"^the scheduler at tcp://127\S+ has had no worker for 1\.5 s$"):
+            run(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)

@@ -1,0 +1,232 @@
+"""Cells that cannot be computed are data; all others have their values, bit for bit."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+import pytest
+
+from tests.interruption import HANG_TIMEOUT_S
+from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
+from zwidth.measures.definition import FAILED, OUT_OF_TIME, MeasureError
+from zwidth.study.jobs import recovery
+from zwidth.study.jobs.executor import RecoveredWarning, run
+from zwidth.study.jobs.executor_interface import open_executor
+from zwidth.study.jobs.recovery import CannotStart, WorkerLost, compute_range
+from zwidth.study.jobs.store import Store
+from zwidth.study.jobs.workers import WorkerProcess, pack_job
+
+NO_PATIENCE = -1.0
+TRUE_CELLS = RootsJob(40).compute(0, 40)
+
+
+@pytest.fixture(params=["here", "processes"])
+def place(request):
+    """Where cells are computed: by this process, or by two others."""
+    return {"workers": 1} if request.param == "here" else {"workers": 2, "patience": NO_PATIENCE}
+
+
+def test_a_cell_that_raises_fails_alone(place):
+    found = run(FaultyJob(40, raising=(3, 12, 13)), batch=5, **place)
+    assert same_but_for(found, TRUE_CELLS, [3, 12, 13])
+    assert (found.status[[3, 12, 13]] == FAILED).all()
+    assert np.isnan(found.values[[3, 12, 13]]).all()
+    assert [note.reason for note in found.notes[1]] == [
+        f"raised ZeroDivisionError: number {n}" for n in (3, 12, 13)
+    ]
+
+
+def test_cells_that_fail_do_not_depend_on_the_batches(place):
+    job = FaultyJob(40, raising=(0, 7, 39))
+    assert same_cells(run(job, batch=7, **place), run(job, batch=40, workers=1))
+
+
+@dataclass
+class WrongJob(RootsJob):
+    """A job with a fault of its own, which every cell meets, or all but the first few."""
+
+    right: int = 0
+
+    def compute(self, first, last):
+        if last > self.right:
+            raise TypeError("a fault of the program")
+        return super().compute(first, last)
+
+
+def test_a_fault_that_every_cell_meets_is_raised(place, tmp_path):
+    with pytest.raises(TypeError, match="a fault of the program"):
+        run(WrongJob(200), batch=20, **place)
+    job = WrongJob(200)
+    with pytest.raises(TypeError):
+        run(job, Store(tmp_path / "cells", job), batch=20, **place)
+    assert list(Store(tmp_path / "cells", job).stored_batches()) == [], "it is no result"
+    assert (run(WrongJob(200, right=1), batch=20, workers=1).status == FAILED).sum() == 2 * 199
+
+
+def test_what_a_job_says_of_all_cells_ends_the_run_at_once():
+    asked = []
+
+    def attempt(first, last):
+        asked.append(last)
+        raise MeasureError("cannot be asked")
+
+    with pytest.raises(MeasureError):
+        compute_range(attempt, 1, 0, 100)
+    assert asked == [100]
+
+
+def test_a_killed_process_is_replaced_and_told(tmp_path):
+    """Killed once, from outside: nothing is lost."""
+    job = FaultyJob(40, killing=(12,), starter=os.getpid(), once=str(tmp_path / "killed"))
+    with pytest.warns(RecoveredWarning) as told:
+        found = run(job, workers=2, batch=5, patience=NO_PATIENCE)
+    assert same_cells(found, TRUE_CELLS)
+    (said,) = told
+    assert str(said.message) == (
+        "a process that computed was killed (SIGKILL), perhaps for lack of memory; "
+        "numbers 10 to 14 are computed again"
+    )
+
+
+def test_a_cell_that_kills_every_process_fails_alone(tmp_path):
+    job, path = FaultyJob(40, killing=(12,), starter=os.getpid()), tmp_path / "cells"
+    with pytest.warns(RecoveredWarning) as told:
+        found = run(job, Store(path, job), workers=2, batch=5, patience=NO_PATIENCE)
+    assert str(told[-1].message).endswith("; number 12 is left out")
+    assert same_but_for(found, TRUE_CELLS, [12])
+    assert (found.status[12] == FAILED).all()
+    assert found.notes[1][0].reason.endswith("was killed (SIGKILL), perhaps for lack of memory, 3 times")
+    assert same_cells(run(job, Store(path, job), workers=1), found), "kept"
+
+
+def test_where_every_cell_kills_its_process_the_run_ends(monkeypatch):
+    monkeypatch.setattr("zwidth.study.jobs.executor.ENOUGH", 1)
+    job = FaultyJob(2, killing=(0, 1))
+    with pytest.warns(RecoveredWarning), pytest.raises(WorkerLost, match="SIGKILL"), open_executor(1) as executor:
+        run(job, executor=executor)
+
+
+def test_a_cell_that_never_ends_is_out_of_time_and_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("zwidth.study.jobs.workers.LOADING", 1.0)
+    job, path = FaultyJob(16, endless=(9,), starter=os.getpid()), tmp_path / "cells"
+    found = run(job, Store(path, job), workers=2, batch=8, time_limit=0.5)
+    truth = RootsJob(16).compute(0, 16)
+    assert same_but_for(found, truth, [9])
+    assert (found.status[9] == OUT_OF_TIME).all()
+    assert found.notes[1][0].reason == "took longer than 0.5 s"
+    # it is not tried again under the same limit, but under a longer one, or none
+    assert same_cells(run(job, Store(path, job), workers=2, time_limit=0.5), found)
+    mended = RootsJob(16)
+    assert same_cells(run(mended, Store(path, mended), workers=1), truth)
+    assert mended.computed_ranges == [(8, 16)]
+
+
+def test_compiling_does_not_count_as_time():
+    worker = WorkerProcess(time_limit=0.2)
+    try:
+        packed = pack_job(CompilingJob(3))
+        assert packed is not None
+        worker.compute(packed, 0, 1)
+        assert worker.compute(packed, 1, 2).values.shape == (1, 2)
+    finally:
+        worker.end()
+
+
+@dataclass
+class CompilingJob(RootsJob):
+    """A job that says it compiles for a second."""
+
+    def compute(self, first, last):
+        from time import sleep
+
+        from zwidth.compile_events import compiling
+
+        with compiling("kernel"):
+            sleep(0.6)
+        return super().compute(first, last)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_time_limit_that_is_none_is_refused(limit):
+    with pytest.raises(ValueError, match="time_limit must be positive, got"):
+        run(RootsJob(3), time_limit=limit)
+
+
+def test_arguments_that_do_not_go_together_are_refused():
+    class Local(RootsJob):
+        pass
+
+    with pytest.raises(ValueError, match="time_limit needs other processes, and a measure of this study exists"):
+        run(Local(3), time_limit=1.0)
+    with open_executor(1) as executor, pytest.raises(ValueError, match="give either it or them"):
+        run(RootsJob(3), executor=executor, workers=2)
+
+
+def test_one_executor_serves_many_jobs_in_the_same_processes():
+    with open_executor(1) as executor:
+        own = [run(ProcessNumbersJob(8 + n), executor=executor).values[:, 0] for n in range(12)]
+        assert len({process for each in own for process in each}) == 1
+        assert own[0][0] != os.getpid()
+        batches = executor.compute(pack_job(RootsJob(40)), [(0, 5), (5, 10)])
+        next(batches)
+        batches.close()  # stopped early, which ends them
+        assert run(ProcessNumbersJob(3), executor=executor).values[0, 0] != own[0][0]
+
+
+def test_a_process_that_cannot_start_is_said():
+    worker = WorkerProcess()
+    packed = pack_job(RootsJob(3))
+    assert packed is not None
+    unreadable = type(packed)("key", b"no pickle", 2)
+    with pytest.raises(CannotStart, match="cannot read the job: UnpicklingError"):
+        worker.compute(unreadable, 0, 1)
+    worker.end()
+    with pytest.raises(CannotStart, match="the run was ended"):
+        worker.compute(packed, 0, 1)
+
+
+ORPHANS = """
+import os, sys
+sys.path[:0] = {path!r}
+from tests.study.executor_cases import FaultyJob
+from zwidth.study.jobs.executor import run
+run(FaultyJob(4, endless=(1,), starter=os.getpid()), workers=1, batch=2, time_limit=1000.0)
+"""
+
+
+def test_processes_end_with_the_one_that_started_them_even_in_an_endless_cell():
+    """SIGKILL, after which nobody can tell them."""
+    running = subprocess.Popen([sys.executable, "-c", ORPHANS.format(path=sys.path)], start_new_session=True)
+    children: list[str] = []
+    until = monotonic() + HANG_TIMEOUT_S
+    while not (children and busy(children[0])) and monotonic() < until:
+        sleep(0.1)
+        children = subprocess.run(["pgrep", "-P", str(running.pid)], capture_output=True, text=True).stdout.split()
+    running.kill()
+    running.wait()
+    while alive(children[0]) and monotonic() < until:
+        sleep(0.1)
+    assert not alive(children[0])
+
+
+def busy(process: str) -> bool:
+    """Whether it has computed for two seconds: it is in the endless cell, since it started in less."""
+    ticks = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[11]
+    return int(ticks) / os.sysconf("SC_CLK_TCK") > 2.0
+
+
+def alive(process: str) -> bool:
+    return os.path.exists(f"/proc/{process}")
+
+
+def test_pieces_cover_a_range():
+    for first, last in ((0, 1), (3, 5), (0, 8), (5, 100)):
+        pieces = recovery._cut(first, last)
+        assert [n for piece in pieces for n in range(*piece)] == list(range(first, last))
+        assert len(pieces) <= recovery.PIECES

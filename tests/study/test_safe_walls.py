@@ -1,0 +1,307 @@
+"""Safe walls over the workspace: stable in postures that nobody chose, however they are searched for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.study.safe_wall_cases import largest_radii, random_device, search_table, try_table
+from zwidth.device.load import load
+from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH
+from zwidth.study import SafeWallsError, Store, safe_walls
+from zwidth.study.jobs.executor import run
+from zwidth.study.safe_walls.job import SafeWallsJob
+from zwidth.study.safe_walls.safe_walls import compute_table, safe_walls_job
+from zwidth.study.safe_walls.table import rounded
+from zwidth.study.workspace.plane_grid import PlaneError
+
+MECHANISM, TWO_MASS, MEASURED_HAND = "five-bar", "published-two-mass", "thesis-arm"
+WALLS = 10_000
+# A root at 1 is left to rounding where K is next to nothing.
+ROUNDING = 1e-9
+MIDDLE = {"x": (-0.1, 0.1), "y": (0.12, 0.28)}
+
+
+@pytest.fixture(scope="module")
+def table():
+    """A table of sectors, with two hands, over the whole workspace."""
+    return safe_walls(
+        load(MECHANISM), ["none", MEASURED_HAND], cells=(8, 4), levels=6, directions=2, margin=0.05, workers=1
+    )
+
+
+def job_of(device, *, narrowing=True, **arguments):
+    given = {"ranges": (None, None, None), "cells": None, "levels": 8, "directions": 1, "margin": 0.0}
+    given |= {"size_limit": None, "assembly": None, "model": None, "seed": 1}
+    job = safe_walls_job(device, None, **(given | arguments))
+    return SafeWallsJob(replace(job.cell_question, narrowing=narrowing))
+
+
+# --- nothing unstable --------------------------------------------------------------------------------
+
+
+def test_no_wall_of_the_table_is_unstable_with_any_hand(table):
+    tried = try_table(table, WALLS, seed=2)
+    assert tried.inside > WALLS // 3
+    assert tried.unstable == 0
+
+
+@pytest.mark.parametrize(("kind", "seed", "cells"), [("serial-2r", 3, (10, 8)), ("five-bar", 1, (8, 6))])
+def test_no_wall_of_a_random_device_is_unstable(kind, seed, cells):
+    found = safe_walls(random_device(kind, seed), cells=cells, levels=5, workers=1)
+    tried = try_table(found, WALLS, seed)
+    assert tried.inside > WALLS // 3
+    assert tried.unstable == 0
+
+
+def test_a_search_finds_no_unstable_wall_where_limits_are_narrowed_and_finds_one_where_they_are_not():
+    job = {"ranges": (*MIDDLE.values(), None), "cells": (2, 2)}
+    narrowed, bare = (
+        compute_table(load(MECHANISM), job_of(load(MECHANISM), narrowing=narrowing, **job), None, workers=1)
+        for narrowing in (True, False)
+    )
+    assert search_table(narrowed, seed=4, each=6, rounds=8).radius < 1.0
+    assert search_table(bare, seed=4, each=6, rounds=8).radius > 1.0 + 1e-6
+
+
+def test_limits_are_not_narrower_than_they_need_to_be():
+    """Beside each limit of a small cell there is an unstable wall, 3 % of the range away."""
+    device = load(MECHANISM)
+    found = safe_walls(device, x=(0.0, 0.002), y=(0.2, 0.202), cells=(1, 1), workers=1)
+    u = np.pi * np.arange(90) / 90
+    points = device.at((0.001, 0.201), np.column_stack([np.cos(u), np.sin(u)]))
+    for j in range(0, found.levels - 2, 3):
+        low, high = found.ranges[0, 0, j]
+        beyond = 0.03 * (high - low)
+        K = np.linspace(found.stiffness_of_level(0, 0, j), found.stiffness_of_level(0, 0, j + 1), 9)[1:]
+        for B in (low - beyond, high + beyond):
+            assert max(points[n].check(K, np.full(8, B)).spectral_radius.max() for n in range(90)) > 1.0
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("serial-2r", 4), ("five-bar", 2)])
+def test_the_margin_is_what_walls_may_be_off_by(kind, seed):
+    """Stiffness and damping are multiplied by factors of 0.8 and 1.2 of their own."""
+    found = safe_walls(random_device(kind, seed), cells=(6, 4), levels=5, margin=0.2, workers=1)
+    tried = try_table(found, 2000, seed)
+    rng = np.random.default_rng(seed)
+    K, B = (one * rng.choice([0.8, 1.0, 1.2], 2000)[: len(one)] for one in (tried.stiffness, tried.damping))
+    assert tried.inside > 500
+    assert largest_radii(found, tried.position, tried.direction, K, B).max() < 1.0 + ROUNDING
+    plain = safe_walls(random_device(kind, seed), cells=(6, 4), levels=5, workers=1)
+    assert plain.outside.stiffness > found.outside.stiffness
+
+
+def test_sectors_allow_more_than_every_direction_does(table):
+    """A sector's stiffness is that of all directions at least, but for what each is narrowed by of its own."""
+    good = table.level > 0
+    every, sectors = table.top[good, :1], table.top[good, 1:]
+    assert (sectors > 0.93 * every).all()
+    assert (sectors.max(axis=1) > 1.2 * every[:, 0]).any()
+
+
+# --- the table --------------------------------------------------------------------------------------
+
+
+def test_outside_the_table_are_the_walls_that_all_cells_have(table):
+    far = [(9.0, 9.0), (np.nan, 0.2), (0.0, np.inf), (0.0, -1e300), (-0.3, 0.35)]
+    assert all(table.at(place) == (1, table.outside) for place in far)
+    K, low, high = table.outside.stiffness, table.outside.low, table.outside.high
+    assert K > 0.0
+    assert low < high
+    for cell in np.flatnonzero(table.level):
+        band = 0
+        while table.stiffness_of_level(cell, 0, band + 1) < K * (1.0 - 1e-6):
+            band += 1
+        ranges = table.ranges[cell, 0, : band + 1]
+        assert (ranges[:, 0] <= low).all()
+        assert (ranges[:, 1] >= high).all()
+    assert table.damping_at((9.0, 9.0), K) == (1, low, high)
+    assert table.damping_at((9.0, 9.0), 1.01 * K) == (1, 0.0, -1.0)
+
+
+def test_the_rectangle_is_the_largest_or_the_stiffest_with_the_wanted_span(table):
+    for cell in np.flatnonzero(table.level)[::3]:
+        box = table.rectangle(cell)
+        areas = []
+        for level in range(1, table.levels + 1):
+            part = table.ranges[cell, 0, :level]
+            width = part[:, 1].min() - max(part[:, 0].max(), 0.0)
+            areas.append(
+                table.stiffness_of_level(cell, 0, level) * width if (part[:, 0] <= part[:, 1]).all() else 0.0
+            )
+        assert box.stiffness * (box.high - max(box.low, 0.0)) == pytest.approx(max(areas), rel=1e-6)
+    device = load(TWO_MASS)
+    wide, narrow = (safe_walls(device, span=span) for span in (20.0, 5.0))
+    assert wide.outside.high - wide.outside.low >= 20.0
+    assert 5.0 <= narrow.outside.high - narrow.outside.low < 20.0
+    assert narrow.outside.stiffness > wide.outside.stiffness
+    assert (safe_walls(device, span=1e3).level == 0).all()
+
+
+def test_a_stiffness_beyond_the_table_and_one_that_is_none_have_no_range(table):
+    place = (0.01, 0.2)
+    assert table.at(place)[0] == 0
+    for K in (-1.0, np.nan, 1e9, np.inf):
+        assert table.damping_at(place, K) == (2, 0.0, -1.0)
+    code, low, high = table.damping_at(place, 0.0)
+    assert code == 0
+    assert low < high
+    for direction in (None, (0.0, 0.0), (np.nan, 1.0), (np.inf, 0.0)):
+        assert table.damping_at(place, 1000.0, direction) == table.damping_at(place, 1000.0)
+    assert table.damping_at(place, 1000.0, (0.3, 0.7)) == table.damping_at(place, 1000.0, (-0.6, -1.4))
+
+
+def test_numbers_of_32_bits_are_rounded_to_the_safe_side():
+    values = np.random.default_rng(1).standard_normal(1000) * 10.0 ** np.arange(-20, 20).repeat(25)
+    for towards, sign in ((np.inf, 1.0), (-np.inf, -1.0)):
+        found = rounded(values, towards)
+        assert (sign * (found - values) >= 0.0).all()
+        assert (found == found.astype(np.float32)).all()
+        np.testing.assert_allclose(found, values, rtol=2.4e-7)
+
+
+def test_a_device_without_a_workspace_has_one_cell_that_is_everywhere():
+    device = load(TWO_MASS)
+    found = safe_walls(device)
+    assert found.at(()) == found.at((5.0, np.nan)) == (0, found.rectangle(0))
+    box, rng = found.rectangle(0), np.random.default_rng(3)
+    K, B = box.stiffness * rng.random(300), box.low + (box.high - box.low) * rng.random(300)
+    assert (device.check(K, B).verdict == 1).all()
+    assert found.top[0, 0] > 0.95 * device.chart(decay=False).stiffness_max
+    assert "everywhere" in repr(found)
+
+
+def test_the_document_and_the_columns_hold_the_table(table):
+    document, columns, data = table.document(), table.table(), table.dataset()
+    K = np.array(document["stiffness_max_N_per_m"], dtype=float)
+    assert K.shape == (4, 8)
+    assert {axis["name"]: axis["cells"] for axis in document["axes"]} == {"x": 8, "y": 4}
+    code, box = table.at((0.01, 0.2))
+    row, column = int((0.2 - 0.05) / 0.075), int((0.01 + 0.3) / 0.075)
+    assert (code, box.stiffness) == (0, K[row, column])
+    assert document["status"][row][column] == "ok"
+    assert set(table.status) == {OK, OUT_OF_REACH}
+    assert len({len(values) for values in columns.values()}) == 1
+    assert len(columns["x_m"]) == (table.level > 0).sum() * 5 * 6 + (table.level == 0).sum()
+    assert data["band_damping_min"].dims == ("y_m", "x_m", "sector", "band")
+    assert data["stiffness_max"].sel(x_m=0.0375, y_m=0.2375, method="nearest") == K[2, 4]
+    assert "16 of 32 cells" in repr(table)
+
+
+# --- how it is computed -------------------------------------------------------------------------------
+
+
+def test_cells_hang_on_neither_batches_nor_stops(tmp_path):
+    job = job_of(load(MECHANISM), cells=(4, 3), levels=4)
+    whole = run(job, workers=1, batch=12)
+    kept = []
+
+    class Stop(Exception):
+        pass
+
+    def stop(stage, done, of):
+        kept.append(done)
+        if done >= 5:
+            raise Stop
+
+    with pytest.raises(Stop):
+        run(job, Store(tmp_path / "cells", job), stop, 1, batch=1)
+    continued = run(job, Store(tmp_path / "cells", job), lambda stage, done, of: kept.append(done), 1)
+    assert kept[6] == 5, "what was done is not done again"
+    for one, other in ((whole, continued), (whole, run(job, workers=2, batch=3, patience=-1.0))):
+        np.testing.assert_array_equal(one.values, other.values)
+        np.testing.assert_array_equal(one.status, other.status)
+        assert one.notes == other.notes
+
+
+def test_questions_differ_where_cells_do():
+    device = load(MECHANISM)
+    changed = [{"levels": 5}, {"margin": 0.1}, {"directions": 2}, {"cells": (3, 3)}, {"seed": 2}]
+    questions = {job_of(device, **({"cells": (4, 3)} | one)).question for one in ({}, *changed)}
+    questions.add(job_of(device.with_({"loop.delay_samples": 1}), cells=(4, 3)).question)
+    assert len(questions) == 7
+
+
+# --- refusals -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"levels": 0}, "levels must be a whole number from 1 to 255, got 0"),
+        ({"directions": 17}, "directions must be a whole number from 1 to 16, got 17"),
+        ({"margin": 1.0}, "margin must be at least 0 and below 1, got 1"),
+        ({"margin": float("nan")}, "margin must be at least 0 and below 1, got nan"),
+        ({"span": 0.0}, "span of damping must be positive, got 0"),
+        (
+            {"cells": (20, 20), "size_limit": 1000},
+            "takes 40400 bytes, more than the 1000 of its limit; take fewer",
+        ),
+    ],
+)
+def test_arguments_that_are_not_allowed_are_named(arguments, message):
+    with pytest.raises(SafeWallsError, match=message):
+        safe_walls(load(MECHANISM), **({"cells": (2, 2)} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"cells": (2, 2, 2)}, "moves in 2 dimensions, and 2,2,2 are 3 counts; give cells as NX,NY"),
+        ({"cells": (0, 2)}, "at least 1 cell along each axis, got 0,2"),
+        ({"z": (0.0, 0.1)}, "moves in a plane, whose two axes have the ranges x and y; leave out z"),
+        ({"x": (0.1, 0.1)}, "range along x must be LOW,HIGH with LOW < HIGH"),
+        ({"cells": (2000, 2000)}, "at most 1e\\+06 cells"),
+    ],
+)
+def test_cells_that_cannot_be_are_named(arguments, message):
+    with pytest.raises(PlaneError, match=message):
+        safe_walls(load(MECHANISM), **arguments)
+
+
+def test_devices_that_have_no_table_are_refused_with_what_to_do():
+    with pytest.raises(SafeWallsError, match="one direction, got 2 parts of directions; leave out directions"):
+        safe_walls(load(TWO_MASS), directions=2)
+    with pytest.raises(PlaneError, match="no workspace; its walls are the same everywhere"):
+        safe_walls(load(TWO_MASS), x=(0.0, 1.0))
+    with pytest.raises(SafeWallsError, match=r"a device without load.*leave the load out, with set='load=unset'"):
+        safe_walls(load(MECHANISM).under((0.0, -5.0)))
+    with pytest.raises(PlaneError, match=r"one drive and moves along a curve.*as a \[plant\]"):
+        safe_walls(load("hapkit"))
+
+
+def test_a_device_that_is_never_stable_has_no_cell():
+    slow = load(MECHANISM).with_({"loop.delay_samples": 40, "mechanism.damping": {"mode_ratio": 0.0}})
+    found = safe_walls(slow, x=(-0.02, 0.02), y=(0.2, 0.22), cells=(1, 1), workers=1)
+    assert found.status.tolist() == [NO_VALUE]
+    assert found.at((0.0, 0.21)) == (1, found.outside)
+    assert found.outside.stiffness == found.outside.high == 0.0
+    assert found.reasons == ("1 cell no value: no wall is stable in all of the cell's postures and directions",)
+
+
+# --- longer -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("kind", "cells"), [("serial-2r", (14, 10)), ("five-bar", (12, 10))])
+def test_no_search_finds_an_unstable_wall_of_a_random_device(kind, cells, seed):
+    device = random_device(kind, 10 + seed)
+    found = safe_walls(device, cells=cells, levels=8)
+    if not (found.level > 0).any():
+        pytest.skip("no wall of this device is stable anywhere")
+    assert try_table(found, WALLS, seed).unstable == 0
+    assert search_table(found, seed, each=12, rounds=10).radius < 1.0 + ROUNDING
+
+
+@pytest.mark.slow
+def test_no_wall_in_space_is_unstable():
+    found = safe_walls(
+        random_device("delta", 1), x=(-0.03, 0.03), y=(-0.03, 0.03), z=(-0.15, -0.1), cells=(3, 3, 2), levels=6
+    )
+    tried = try_table(found, WALLS, 1)
+    assert tried.inside > WALLS // 3
+    assert tried.unstable == 0
+    assert search_table(found, 1, each=8, rounds=8).radius < 1.0 + ROUNDING

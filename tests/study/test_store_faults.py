@@ -1,0 +1,148 @@
+"""Two runs on one store, a full disk, a run that is killed: one clear line, and the store goes on."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.interruption import HANG_TIMEOUT_S
+from tests.study.executor_cases import NotedJob, RootsJob, same_cells
+from zwidth.study.jobs import executor
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import Store, StoredCells, StoreError
+from zwidth.study.jobs.store_lock import FolderLock, owner_of
+
+HOLDING = """
+import sys, time
+from pathlib import Path
+sys.path[:0] = {path!r}
+from tests.study.executor_cases import RootsJob
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import Store
+job = RootsJob(100, seconds=0.2)
+run(job, Store(Path({store!r}), job), lambda stage, done, of: print(done, flush=True), 1, batch=2)
+"""
+
+
+def start_run(store: Path, past: int) -> subprocess.Popen[str]:
+    """Another process that computes into a store, when it has done more than so many cells."""
+    program = HOLDING.format(path=sys.path, store=str(store))
+    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert running.stdout is not None
+    while int(running.stdout.readline()) <= past:
+        pass
+    return running
+
+
+def test_a_second_run_is_refused_while_the_first_lives_and_a_killed_one_blocks_nobody(tmp_path):
+    path, job = tmp_path / "cells", RootsJob(100)
+    running = start_run(path, 4)
+    try:
+        store = Store(path, job)
+        with pytest.raises(StoreError) as caught:
+            run(job, store, workers=1)
+        here = f"process {running.pid} on {socket.gethostname()}"
+        assert str(caught.value) == (
+            f"cells: {here} is computing into it; wait until that has ended, or name another folder"
+        )
+    finally:
+        running.send_signal(signal.SIGKILL)
+        running.communicate(timeout=HANG_TIMEOUT_S)
+    assert json.loads((path / "lock").read_text())["process"] == running.pid, "which has left its name behind"
+    found = run(job, Store(path, job), workers=1)
+    assert same_cells(found, RootsJob(100).compute(0, 100))
+    assert (0, 2) not in job.computed_ranges
+
+
+def test_two_runs_that_begin_at_once_do_not_mix(tmp_path, monkeypatch):
+    """The second finds the folder of the first in the place where it would put its own."""
+    path = tmp_path / "cells"
+    first, second = Store(path, RootsJob(33)), Store(path, RootsJob(33))
+    with first.locked(), second.locked():
+        first.begin(5)
+        with pytest.raises(StoreError, match="is computing into it"):
+            second.begin(7)
+    assert Store(path, RootsJob(33)).batch == 5
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["cells"], "nothing is left of the other's"
+    with Store(path, RootsJob(33)).locked():
+        pass
+
+
+def test_a_lock_is_one_of_the_system(tmp_path):
+    one, other = FolderLock(), FolderLock()
+    assert one.acquire(tmp_path)
+    assert not other.acquire(tmp_path)
+    assert owner_of(tmp_path) == f"process {os.getpid()} on {socket.gethostname()}"
+    one.release()
+    assert other.acquire(tmp_path)
+    other.release()
+    (tmp_path / "lock").write_text("torn")
+    assert owner_of(tmp_path) == "another process"
+    assert one.acquire(tmp_path)
+
+
+def test_a_full_disk_is_an_error_and_the_store_goes_on(tmp_path):
+    """A file that may not grow is refused as on a full disk; here notes grow beyond what is allowed."""
+    path, job = tmp_path / "cells", NotedJob(4000)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, limits[1]))
+        with pytest.raises(OSError) as caught:  # noqa: PT011  its number is looked at
+            run(job, Store(path, job), workers=1, batch=100)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert caught.value.errno == errno.EFBIG
+    kept = len(list(Store(path, job).stored_batches()))
+    assert 2 < kept < 30
+    again = NotedJob(4000)
+    found = run(again, Store(path, again), workers=1)
+    assert same_cells(found, run(NotedJob(4000), workers=1, batch=4000))
+    assert len(again.computed_ranges) == 40 - kept
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.geteuid() != 0, reason="a file system of its own needs the rights of root")
+def test_a_disk_that_is_really_full(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", disk]).returncode:
+        pytest.skip("no file system can be mounted here")
+    try:
+        job = RootsJob(3000)
+        (disk / "other").write_bytes(bytes(700_000))
+        with pytest.raises(OSError, match="No space left"):
+            run(job, Store(disk / "cells", job), workers=1, batch=50)
+        kept = len(list(Store(disk / "cells", job).stored_batches()))
+        assert kept > 2
+        (disk / "other").unlink()
+        again = RootsJob(3000)
+
+        assert same_cells(run(again, Store(disk / "cells", again), workers=1), RootsJob(3000).compute(0, 3000))
+        assert len(again.computed_ranges) == 60 - kept
+    finally:
+        subprocess.run(["umount", "-l", disk], check=True)
+
+
+def test_many_cells_stay_in_the_store(tmp_path, monkeypatch):
+    job = NotedJob(1000)
+    few = run(job, Store(tmp_path / "few", job), workers=1, batch=30)
+    monkeypatch.setattr(executor, "MOST_IN_MEMORY", 500)
+    many = run(job, Store(tmp_path / "many", job), workers=1, batch=30)
+    assert isinstance(many, StoredCells)
+    assert same_cells(few, run(NotedJob(1000), workers=1))
+    assert same_cells(many, few)
+    pieces = list(many.pieces())
+    assert [first for first, _ in pieces] == list(range(0, 1000, 30))
+    assert np.concatenate([cells.values for _, cells in pieces]).tobytes() == few.values.tobytes()
