@@ -32,6 +32,7 @@ def test_the_commands_are_those_promised():
         "load",
         "map",
         "sweep",
+        "optimise",
         "tolerance",
         "export",
         "report",

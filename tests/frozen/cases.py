@@ -74,8 +74,9 @@ def cases(
         quick = device.kind == "bundled" or index % 10 == 0
         made += _device_cases(device, index, walls.get(device.word, RecordWall()), quick)
     for name, text in study_files.items():
+        command = "tolerance" if name.startswith("tolerances") else "sweep"
         made.append(
-            _case_without_device("sweep", name, "--workers", "1", reads=text, quick=name == "study-plant.toml")
+            _case_without_device(command, name, "--workers", "1", reads=text, quick=name == "study-plant.toml")
         )
     made += [_case_without_device(*words) for words in USAGE]
     return sorted(made, key=lambda case: _SHARE.get(case.command, 1))
@@ -83,7 +84,7 @@ def cases(
 
 def commands_with_arguments() -> set[str]:
     """Names of the commands that there are arguments for."""
-    return {"devices", "schema", "sweep"} | set(_SHARE)
+    return {"devices", "schema", "sweep", "tolerance"} | set(_SHARE)
 
 
 # commands without a number to compare: `new` and `import` write a device file, which tests of their own load and

@@ -159,6 +159,22 @@ def studies() -> dict[str, str]:
             count=12,
             seed=7,
         ),
+        "tolerances-five-bar.toml": toml_text(
+            {
+                "device": "five-bar",
+                "stiffness_N_per_m": 7000.0,
+                "damping_Ns_per_m": 9.5,
+                "draw": {"samples": 72, "index_samples": 32},
+                "tolerance": [
+                    {
+                        "key": "damping.mode_ratio",
+                        "distribution": "normal",
+                        "standard_deviation_percent": 20.0,
+                    },
+                    {"key": "loop.sampling_period_s", "distribution": "uniform", "plus_minus_percent": 5.0},
+                ],
+            }
+        ),
         "study-faulty.toml": _study("hapkit-course", ["no_such_measure"], [{"key": "plant.mass_kg"}]),
     }
 

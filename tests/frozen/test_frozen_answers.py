@@ -67,7 +67,7 @@ def test_an_interrupted_run_goes_on_where_it_was(side):
 
 def test_every_command_that_has_arguments_is_asked_somewhere():
     devices = [RecordDevice("five-bar", "bundled"), RecordDevice("p.toml", "plant", {"p.toml": "name = 'p'"})]
-    asked = cases(devices, {}, {"study.toml": ""})
+    asked = cases(devices, {}, {"study.toml": "", "tolerances.toml": ""})
     assert {case.command for case in asked} == commands_with_arguments()
     assert len({case.name for case in asked}) == len({case.digest for case in asked}) == len(asked)
     assert any(case.quick for case in asked)

@@ -98,45 +98,52 @@ def rendered_modes(
     spring = ratio**2 * per_design(mechanism, drives.stiffness, 1)
     # B = r_m M + r_k K and a ratio on every flexible mode: a = (r_m + r_k w^2)/2 + ratio w
     coefficients = _coefficients(mechanism, damping)
+    each = design if len(coefficients) == int(np.prod(mechanism.design_shape)) else np.arange(len(coefficients))
     if drives.winding_damping is not None:
         braked = per_design(mechanism, drives.winding_damping, 1).any(axis=1)
-        coefficients[braked] = np.nan
+        coefficients[np.broadcast_to(braked, len(coefficients))] = np.nan
     if model == "full":
         rotor = ratio**2 * per_design(mechanism, drives.motor_inertia, 1)
         modes = _of_full(rotor, spring, posture, direction, design, shape, encoders)
-        r_m, r_k, share = coefficients[design].T[:, :, None]
+        r_m, r_k, share = coefficients[each].T[:, :, None]
         decay = 0.5 * (r_m + r_k * modes.frequency_squared) + share * np.sqrt(modes.frequency_squared)
         modes = replace(modes, decay=decay)
     else:
         if model != "rigid":
-            coefficients[~np.isfinite(spring).any(axis=1)] = np.nan
+            rigid = ~np.isfinite(spring).any(axis=1)
+            coefficients[np.broadcast_to(rigid, len(coefficients))] = np.nan
         numbers = effective_parameters(mechanism, posture, direction)
-        modes = _of_reduced(numbers, model, coefficients[design])
+        modes = _of_reduced(numbers, model, coefficients[each])
     modes.input[np.isnan(modes.decay).any(axis=-1)] = np.nan
     return modes
 
 
 def _coefficients(mechanism: Mechanism, damping: Damping) -> Floats:
-    """r_m, r_k and the damping ratio of each design, (P, 3); nan where given dampers couple the modes."""
+    """r_m, r_k and the damping ratio of each design, (P, 3), or of each point, where the designs differ in their
+    damping and not in their mechanism, (N, 3); nan where given dampers couple the modes."""
     P = int(np.prod(mechanism.design_shape))
-    out = np.zeros((P, 3))
     if isinstance(damping, ModalDamping):
+        out = np.zeros((max(P, np.size(damping.ratio)), 3))
         out[:, 2] = np.ravel(damping.ratio)
-    elif isinstance(damping, ProportionalDamping):
+        return out
+    if isinstance(damping, ProportionalDamping):
+        size = max(np.size(damping.mass_coefficient_1_per_s), np.size(damping.stiffness_coefficient_s))
+        out = np.zeros((max(P, size), 3))
         out[:, 0], out[:, 1] = (
             np.ravel(damping.mass_coefficient_1_per_s),
             np.ravel(damping.stiffness_coefficient_s),
         )
-    else:
-        stiffness, damper = (
-            per_design(mechanism, each, 1) for each in (mechanism.drives.stiffness, mechanism.drives.damping)
-        )
-        flexible = np.isfinite(stiffness)
-        share = np.where(flexible, damper / np.where(flexible, stiffness, 1.0), np.nan)
-        first = np.argmax(flexible, axis=1)
-        common = np.where(flexible.any(axis=1), share[np.arange(P), first], 0.0)
-        alike = np.where(flexible, share == common[:, None], True).all(axis=1)
-        out[:, 1] = np.where(alike, common, np.nan)
+        return out
+    out = np.zeros((P, 3))
+    stiffness, damper = (
+        per_design(mechanism, each, 1) for each in (mechanism.drives.stiffness, mechanism.drives.damping)
+    )
+    flexible = np.isfinite(stiffness)
+    share = np.where(flexible, damper / np.where(flexible, stiffness, 1.0), np.nan)
+    first = np.argmax(flexible, axis=1)
+    common = np.where(flexible.any(axis=1), share[np.arange(P), first], 0.0)
+    alike = np.where(flexible, share == common[:, None], True).all(axis=1)
+    out[:, 1] = np.where(alike, common, np.nan)
     return out
 
 

@@ -24,9 +24,7 @@ SAMPLES: Final = 1000
 INDEX_SAMPLES: Final = 512
 QUANTILES: Final = (5.0, 50.0, 95.0)
 SEED: Final = 1
-PER_VALUE: Final = (
-    3  # numbers of memory for each value: the value, its status, and a copy while it is put together
-)
+PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy
 PER_NUMBER: Final = 12  # numbers of memory for each number of a device that differs
 PER_CHART: Final = 6000  # numbers of memory for the edge of each drawn device on the lines of the bands
 STIFFEST: Final = "stiffness_max"  # is asked of every device, whether the study names it or not
