@@ -19,6 +19,7 @@ from zwidth.device.load import load
 from zwidth.show.safe_walls.header import header_text
 from zwidth.study import safe_walls
 
+SMALL = ("--x", "-0.05,0.05", "--y", "0.2,0.25", "--cells", "2,1", "--levels", 4, "--workers", 1)
 FEW = ("--cells", "4,3", "--levels", 4, "--workers", 1)
 
 
@@ -40,21 +41,21 @@ def test_a_header_is_written_where_none_is_named(here):
 
 
 def test_tables_are_written_as_data_too(here):
-    table = safe_walls(load(MECHANISM), cells=(4, 3), levels=4, workers=1)
-    document = document_of("export", MECHANISM, *FEW, "--output", "walls.json")
+    table = safe_walls(load(MECHANISM), x=(-0.05, 0.05), y=(0.2, 0.25), cells=(2, 1), levels=4, workers=1)
+    document = document_of("export", MECHANISM, *SMALL, "--output", "walls.json")
     assert json.loads((here / "walls.json").read_text()) == document
     K = np.array(document["stiffness_max_N_per_m"], dtype=float)
     np.testing.assert_array_equal(K.ravel(), table.rectangles[:, 0])
-    run_command("export", MECHANISM, *FEW, "--output", "walls.csv")
+    run_command("export", MECHANISM, *SMALL, "--output", "walls.csv")
     rows = list(csv.DictReader((here / "walls.csv").read_text().splitlines()))
     assert len(rows) == len(table.table()["sector"])
     first = next(row for row in rows if row["status"] == "ok")
     cell = int(np.flatnonzero(table.level)[0])
     assert float(first["damping_max_Ns_per_m"]) == table.ranges[cell, 0, 0, 1]
-    run_command("export", MECHANISM, *FEW, "--output", "walls.nc")
+    run_command("export", MECHANISM, *SMALL, "--output", "walls.nc")
     with xr.open_dataset(here / "walls.nc", engine="scipy") as data:
         np.testing.assert_array_equal(data["stiffness_max"].values, K)
-    assert run_command("export", MECHANISM, *FEW, "--output", "walls.png").code == 0
+    assert run_command("export", MECHANISM, *SMALL, "--output", "walls.png").code == 0
     assert (here / "walls.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -126,7 +127,7 @@ def test_what_is_wrong_is_said_in_a_line(here, words, message):
 
 def test_ctrl_c_keeps_the_cells_that_are_done(here):
     """The same command goes on from them, and ends with the same bytes as one that was never stopped."""
-    words = ["export", MECHANISM, "--cells", "10,6", "--levels", "4", "--workers", "1", "--output", "walls.h"]
+    words = ["export", MECHANISM, "--cells", "7,4", "--levels", "3", "--workers", "1", "--output", "walls.h"]
     command = [sys.executable, "-m", "zwidth", *words]
     environment = {**os.environ, "ZWIDTH_QUIET": ""}
     running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)
@@ -142,5 +143,5 @@ def test_ctrl_c_keeps_the_cells_that_are_done(here):
     assert not (here / "walls.h").exists()
     assert run_command(*words).code == 0
     assert [path.name for path in here.iterdir()] == ["walls.h"]
-    table = safe_walls(load(MECHANISM), cells=(10, 6), levels=4, workers=1)
+    table = safe_walls(load(MECHANISM), cells=(7, 4), levels=3, workers=1)
     assert (here / "walls.h").read_text() == header_text(table)

@@ -82,6 +82,7 @@ def function_results(point, arms):
         ),
         "eigenvalue paths": zwidth.measures.wall_paths(loop, np.linspace(1e3, 1e5, 9), 5.0),
         "common area": zwidth.study.common_area(maps, [zwidth.study.parse_requirement("rigid_mass>=0.25")]),
+        "safe walls": zwidth.study.safe_walls(device()),
         "designs": zwidth.run_study(study_over(device(), designs, "stiffness_max")),
         "designs of one number": zwidth.run_study(
             study_over(device(), {"plant.mass_kg.0.0": [0.2, 0.3]}, "stiffness_max")

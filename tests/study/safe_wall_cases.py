@@ -74,10 +74,10 @@ def try_table(table, count, seed):
     """Try walls by eigenvalues: of rectangles, and of bands along a direction; a third at the ends of a range."""
     rng = np.random.default_rng(seed)
     grid, d = table.grid, table.grid.dimensions
-    places = grid.low + rng.random((count, d)) * (grid.high - grid.low)
-    onto_lines = rng.random((count, d)) < 0.1  # between two cells
-    lines = np.round((places - grid.low) / grid.step) * grid.step + grid.low
-    places = np.where(onto_lines, lines, places)
+    index = np.array([grid.index(int(cell)) for cell in rng.choice(np.flatnonzero(table.level), count)])
+    share = rng.random((count, d))
+    share = np.where(rng.random((count, d)) < 0.05, np.round(share), share)  # on the line between two cells
+    places = grid.low + grid.step * (index + share)
     directions = rng.standard_normal((count, d))
     K, B, inside = np.empty(count), np.empty(count), np.zeros(count, dtype=bool)
     for n in range(count):

@@ -26,10 +26,8 @@ MIDDLE = {"x": (-0.1, 0.1), "y": (0.12, 0.28)}
 
 @pytest.fixture(scope="module")
 def table():
-    """A table of sectors, with two hands, over the whole workspace."""
-    return safe_walls(
-        load(MECHANISM), ["none", MEASURED_HAND], cells=(8, 4), levels=6, directions=2, margin=0.05, workers=1
-    )
+    """A table with two hands over the whole workspace."""
+    return safe_walls(load(MECHANISM), ["none", MEASURED_HAND], cells=(8, 4), levels=6, margin=0.05, workers=1)
 
 
 def job_of(device, *, narrowing=True, **arguments):
@@ -44,15 +42,15 @@ def job_of(device, *, narrowing=True, **arguments):
 
 def test_no_wall_of_the_table_is_unstable_with_any_hand(table):
     tried = try_table(table, WALLS, seed=2)
-    assert tried.inside > WALLS // 3
+    assert tried.inside > 0.9 * WALLS
     assert tried.unstable == 0
 
 
-@pytest.mark.parametrize(("kind", "seed", "cells"), [("serial-2r", 3, (10, 8)), ("five-bar", 1, (8, 6))])
+@pytest.mark.parametrize(("kind", "seed", "cells"), [("serial-2r", 3, (8, 6)), ("five-bar", 1, (7, 5))])
 def test_no_wall_of_a_random_device_is_unstable(kind, seed, cells):
     found = safe_walls(random_device(kind, seed), cells=cells, levels=5, workers=1)
     tried = try_table(found, WALLS, seed)
-    assert tried.inside > WALLS // 3
+    assert tried.inside > 0.9 * WALLS
     assert tried.unstable == 0
 
 
@@ -86,19 +84,24 @@ def test_the_margin_is_what_walls_may_be_off_by(kind, seed):
     found = safe_walls(random_device(kind, seed), cells=(6, 4), levels=5, margin=0.2, workers=1)
     tried = try_table(found, 2000, seed)
     rng = np.random.default_rng(seed)
-    K, B = (one * rng.choice([0.8, 1.0, 1.2], 2000)[: len(one)] for one in (tried.stiffness, tried.damping))
-    assert tried.inside > 500
+    K, B = (one * rng.choice([0.8, 1.0, 1.2], len(one)) for one in (tried.stiffness, tried.damping))
+    assert tried.inside > 1800
     assert largest_radii(found, tried.position, tried.direction, K, B).max() < 1.0 + ROUNDING
     plain = safe_walls(random_device(kind, seed), cells=(6, 4), levels=5, workers=1)
     assert plain.outside.stiffness > found.outside.stiffness
 
 
-def test_sectors_allow_more_than_every_direction_does(table):
+def test_sectors_allow_more_than_every_direction_does():
     """A sector's stiffness is that of all directions at least, but for what each is narrowed by of its own."""
-    good = table.level > 0
-    every, sectors = table.top[good, :1], table.top[good, 1:]
+    found = safe_walls(load(MECHANISM), **MIDDLE, cells=(2, 1), levels=5, directions=2, workers=1)
+    every, sectors = found.top[:, :1], found.top[:, 1:]
     assert (sectors > 0.93 * every).all()
     assert (sectors.max(axis=1) > 1.2 * every[:, 0]).any()
+    tried = try_table(found, 4000, seed=9)
+    assert tried.inside > 3600
+    assert tried.unstable == 0
+    ranges = {found.damping_at((0.01, 0.2), 1000.0, (np.cos(u), np.sin(u))) for u in np.linspace(0.0, np.pi, 40)}
+    assert len(ranges) == 4
 
 
 # --- the table --------------------------------------------------------------------------------------
@@ -184,7 +187,7 @@ def test_the_document_and_the_columns_hold_the_table(table):
     assert document["status"][row][column] == "ok"
     assert set(table.status) == {OK, OUT_OF_REACH}
     assert len({len(values) for values in columns.values()}) == 1
-    assert len(columns["x_m"]) == (table.level > 0).sum() * 5 * 6 + (table.level == 0).sum()
+    assert len(columns["x_m"]) == (table.level > 0).sum() * 6 + (table.level == 0).sum()
     assert data["band_damping_min"].dims == ("y_m", "x_m", "sector", "band")
     assert data["stiffness_max"].sel(x_m=0.0375, y_m=0.2375, method="nearest") == K[2, 4]
     assert "16 of 32 cells" in repr(table)
@@ -194,7 +197,7 @@ def test_the_document_and_the_columns_hold_the_table(table):
 
 
 def test_cells_hang_on_neither_batches_nor_stops(tmp_path):
-    job = job_of(load(MECHANISM), cells=(4, 3), levels=4)
+    job = job_of(load(MECHANISM), cells=(4, 3), levels=3)
     whole = run(job, workers=1, batch=12)
     kept = []
 
@@ -302,6 +305,6 @@ def test_no_wall_in_space_is_unstable():
         random_device("delta", 1), x=(-0.03, 0.03), y=(-0.03, 0.03), z=(-0.15, -0.1), cells=(3, 3, 2), levels=6
     )
     tried = try_table(found, WALLS, 1)
-    assert tried.inside > WALLS // 3
+    assert tried.inside > 0.9 * WALLS
     assert tried.unstable == 0
     assert search_table(found, 1, each=8, rounds=8).radius < 1.0 + ROUNDING
