@@ -107,9 +107,6 @@ class ToleranceCommand(Command):
 
         return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
 
-    def check(self, case: CommandLine) -> None:
-        check_workers({**case.options, "processor": "cpu"})
-
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         device = case.device
         return {
