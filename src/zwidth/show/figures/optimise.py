@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from zwidth.show.figures.style import (
     BLUE,
@@ -24,6 +25,8 @@ from zwidth.show.figures.style import (
 from zwidth.study.designs.column import Column
 from zwidth.study.optimise.front import undominated
 from zwidth.study.optimise.optimisation import Optimisation
+
+Floats = NDArray[np.float64]
 
 MOST_PANELS: Final = 3  # pairs of objectives that are drawn
 MOST_POINTS: Final = 4000  # designs that are drawn of those tried; a vector file holds each of them
@@ -72,6 +75,8 @@ def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -
     line = best[np.argsort(front[best, 0])]
     ax.plot(*front[line].T, "-", color=BLUE, linewidth=1.2, zorder=2)
     ax.plot(*front.T, "o", color=BLUE, markersize=4.0, label="front", zorder=3)
+    if found.bars is not None:
+        _draw_bars(ax, front, found.bars.low[:, columns], found.bars.high[:, columns])
     if knee is not None:
         ax.plot(*front[knee], "D", color=VERMILION, markersize=7.0, label="knee", zorder=4)
     if found.baseline is not None and not np.isnan(own := found.baseline.values[0, columns]).any():
@@ -82,6 +87,13 @@ def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -
         _name(axis, problem.columns[column])
     if legend:
         legend_above(ax, 4)
+
+
+def _draw_bars(ax: Axes, front: Floats, low: Floats, high: Floats) -> None:
+    """What tolerances make of each design: 5 to 95 % of the produced devices."""
+    style: dict[str, Any] = {"color": GREY, "linewidth": 0.9, "zorder": 2.5}
+    ax.hlines(front[:, 1], low[:, 0], high[:, 0], label="5 to 95 % as produced", **style)
+    ax.vlines(front[:, 0], low[:, 1], high[:, 1], **style)
 
 
 def _draw_approach(ax: Axes, found: Optimisation) -> None:

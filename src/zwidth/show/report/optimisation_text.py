@@ -22,7 +22,14 @@ def sentences(found: Optimisation) -> list[str]:
     tried = plural(len(found.shares), "design")
     if not len(found.front):
         return [f"{tried} tried: {found.reason}"]
-    said = [_how_found(found, tried), _gain(found), *_held_back(found), *_finer(found), *_contacts(found)]
+    said = [
+        _how_found(found, tried),
+        _gain(found),
+        *_held_back(found),
+        *_finer(found),
+        *_produced(found),
+        *_contacts(found),
+    ]
     return [sentence for sentence in said if sentence]
 
 
@@ -81,6 +88,23 @@ def _finer(found: Optimisation) -> list[str]:
         if not kept.all():
             said.append(f"on a grid twice as fine {plural(int((~kept).sum()), 'design')} breaks {demand.text}")
     return said or ["a grid twice as fine gives the same values"]
+
+
+def _produced(found: Optimisation) -> list[str]:
+    """What tolerances make of the chosen design, and of the objectives over the front."""
+    bars, knee, problem = found.bars, found.knee, found.problem
+    if bars is None or knee is None:
+        return []
+    chosen = "the best design" if len(problem.objectives) == 1 else "the knee"
+    kept = percent(float(bars.kept[knee]))
+    said = [f"{kept} of {bars.devices} devices within the tolerances of {chosen} keep all demands"]
+    for objective in problem.objectives:
+        one = problem.columns[objective.column]
+        low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
+        if np.isfinite(low):
+            span = f"{quantity(low, one.unit)} to {quantity(high, one.unit)}"
+            said.append(f"90 % of them have {one.name} {span}")
+    return said
 
 
 def _contacts(found: Optimisation) -> list[str]:

@@ -10,14 +10,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.device import address
 from zwidth.measures.definition import NO_VALUE, OK, Note
 from zwidth.measures.overall import global_conditioning_index, overall
 from zwidth.study.designs.column import Column
-from zwidth.study.designs.sampling import Axis, Sampling
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.optimise.problem import Problem
+from zwidth.study.tolerances.draws import MemberChanges, member_changes
 
 Floats = NDArray[np.float64]
 MOST_VIOLATED: Final = 10.0  # a demand is violated by more only where there is no value
@@ -118,32 +120,63 @@ def margins(values: Floats, bound: float, at_least: bool) -> Floats:
 class Judge:
     """Turns designs into jobs, and their cells into judgements.
 
-    problem   what is optimised
+    problem  what is optimised
+    drawn    produced devices by which each design is judged besides as it is; left out: the problem's own
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, drawn: int | None = None) -> None:
         self.problem = problem
+        drawn = problem.drawn if drawn is None else drawn
+        self._changes = member_changes(problem.tolerances, drawn, problem.seed) if drawn else None
+        self._devices = 1 + drawn
         study = replace(problem.study, columns=problem.columns)
         # checks on the way that the measures exist for this device
         self._sweep = replace(sweep_job(_small(study)), cells=True)
 
     def job(self, designs: Sequence[tuple[Any, ...]]) -> EvaluationJob:
-        """The job that computes designs, each by the values of its variables."""
-        members = self.problem.members
-        axes = []
-        for n, variable in enumerate(self.problem.variables):
-            for key, values in variable.columns([design[n] for design in designs]):
-                axes.append(Axis(key, tuple(value for value in values for _ in members)))
+        """The job that computes designs, each by the values of its variables: held by each operator in turn, as it
+        is and then as it is produced."""
+        members, devices = self.problem.members, self._devices
+        columns = {
+            key: list(values)
+            for n, variable in enumerate(self.problem.variables)
+            for key, values in variable.columns([design[n] for design in designs])
+        }
+        each = {key: [[value] * devices for value in values] for key, values in columns.items()}
+        if self._changes is not None:
+            each |= self._produced(self._changes, columns, len(designs))
+        axes = [
+            Axis(key, tuple(value for of_design in rows for _ in members for value in of_design))
+            for key, rows in each.items()
+        ]
         for key in members[0]:
-            axes.append(Axis(key, tuple(member[key] for _ in designs for member in members)))
-        return EvaluationJob(replace(self._sweep, sampling=Sampling(tuple(axes), paired=True)), len(members))
+            values = [member[key] for _ in designs for member in members for _ in range(devices)]
+            axes.append(Axis(key, tuple(values)))
+        sampling = Sampling(tuple(axes), paired=True)
+        return EvaluationJob(replace(self._sweep, sampling=sampling), len(members) * devices)
+
+    def _produced(
+        self, changes: MemberChanges, columns: dict[str, list[Any]], count: int
+    ) -> dict[str, list[list[Any]]]:
+        """Path -> for each design the number as it is, and as it is produced, of each number with a tolerance."""
+        document = self.problem.study.device.document
+        variables = {address.resolve(document, key): key for key in columns if key not in CIRCUMSTANCES}
+        produced: dict[str, list[list[Any]]] = {}
+        for design in range(count):
+            own = {}
+            for key in changes.keys:
+                variable = variables.get(address.resolve(document, key))
+                own[key] = address.get(document, key) if variable is None else columns[variable][design]
+            drawn = changes.of(own)
+            for n, key in enumerate(changes.keys):
+                name = variables.get(address.resolve(document, key), key)
+                produced.setdefault(name, []).append([float(own[key]), *drawn[:, n].tolist()])
+        return produced
 
     def judge(self, found: CellValues) -> Judgement:
-        """The columns of k designs from the cells of their job."""
-        k, columns, members = len(found.values), len(self.problem.columns), len(self.problem.members)
-        shape = (k, members, columns, -1)
-        cells = np.moveaxis(found.values.reshape(shape), 1, 2)
-        status = np.moveaxis(found.status.reshape(shape), 1, 2)
+        """The columns of k designs from the cells of their job, over all operators and produced devices."""
+        cells, status = self._cells(found)
+        k, columns = cells.shape[:2]
         values, kinds = np.full((k, columns), np.nan), np.zeros((k, columns), dtype=np.uint8)
         for c, column in enumerate(self.problem.columns):
             for i in range(k):
@@ -151,10 +184,28 @@ class Judge:
         absent = (status != OK).mean(axis=(2, 3))
         return Judgement(values, kinds, absent, cells.reshape(k, columns, -1))
 
+    def judge_produced(self, found: CellValues) -> Floats:
+        """The columns (devices, k, c) of k designs as they are, and then as each of them is produced."""
+        cells, status = self._cells(found)
+        k, columns = cells.shape[:2]
+        values = np.full((self._devices, k, columns), np.nan)
+        for device in range(self._devices):
+            own = slice(device, None, self._devices)
+            for c, column in enumerate(self.problem.columns):
+                for i in range(k):
+                    values[device, i, c], _ = self._reduce(column, cells[i, c, own], status[i, c, own])
+        return values
+
+    def _cells(self, found: CellValues) -> tuple[Floats, NDArray[np.uint8]]:
+        """Values and status (k, c, members, w), produced devices the faster among the members."""
+        k, columns = len(found.values), len(self.problem.columns)
+        shape = (k, len(self.problem.members) * self._devices, columns, -1)
+        return np.moveaxis(found.values.reshape(shape), 1, 2), np.moveaxis(found.status.reshape(shape), 1, 2)
+
     def reasons(self, found: CellValues) -> dict[str, tuple[Note, ...]]:
         """Column -> why designs have no value there."""
-        columns, members = len(self.problem.columns), len(self.problem.members)
-        width = found.values.shape[1] // (columns * members)
+        members = len(self.problem.members) * self._devices
+        width = found.values.shape[1] // (len(self.problem.columns) * members)
         return {one.name: found.notes[n * width] for n, one in enumerate(self.problem.columns)}
 
     @cached_property

@@ -17,7 +17,7 @@ from zwidth.study.designs.study import Study
 from zwidth.study.optimise.evaluation import Judgement, margins
 from zwidth.study.optimise.front import hypervolume, knee
 from zwidth.study.optimise.problem import Demand, Problem
-from zwidth.study.optimise.recheck import Contact
+from zwidth.study.optimise.recheck import Bars, Contact
 from zwidth.study.optimise.variables import pieces, values_at
 
 Floats = NDArray[np.float64]
@@ -52,6 +52,7 @@ class Optimisation(Result):
     searched, polished  numbers of designs judged by each
     notes      column -> why designs have no value in it
     finer      the front on a finer grid of the task; None where there is none
+    bars       what tolerances make of the front; None without any
     contacts   a wall of each design of the front in nonlinear simulation
     """
 
@@ -64,6 +65,7 @@ class Optimisation(Result):
     polished: int
     notes: Mapping[str, tuple[Note, ...]]
     finer: Judgement | None = None
+    bars: Bars | None = None
     contacts: tuple[Contact, ...] = ()
 
     def __repr__(self) -> str:
@@ -205,6 +207,7 @@ class Optimisation(Result):
             "finer": None
             if self.finer is None
             else [dict(zip(names, row, strict=True)) for row in self.finer.values.tolist()],
+            "produced": None if self.bars is None else self._bars_document(self.bars, names),
             "contacts": [
                 {
                     "stiffness_N_per_m": one.stiffness,
@@ -228,6 +231,17 @@ class Optimisation(Result):
             "values": dict(zip(names, values, strict=True)),
             "status": {name: STATUS[one] for name, one in zip(names, status, strict=True)},
         }
+
+    def _bars_document(self, bars: Bars, names: list[str]) -> list[dict[str, Any]]:
+        return [
+            {
+                "devices": bars.devices,
+                "kept_share": kept,
+                "low": dict(zip(names, low, strict=True)),
+                "high": dict(zip(names, high, strict=True)),
+            }
+            for kept, low, high in zip(bars.kept.tolist(), bars.low.tolist(), bars.high.tolist(), strict=True)
+        ]
 
     def table(self) -> dict[str, list[Any]]:
         """The front's designs as columns, one design a row."""

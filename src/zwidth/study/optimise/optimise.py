@@ -26,7 +26,14 @@ from zwidth.study.optimise.front import ranges, spread_out, undominated
 from zwidth.study.optimise.optimisation import Optimisation
 from zwidth.study.optimise.polish import polish
 from zwidth.study.optimise.problem import Problem, problem_of
-from zwidth.study.optimise.recheck import Contact, finer_problem, simulate_contact
+from zwidth.study.optimise.recheck import (
+    PRODUCED,
+    Bars,
+    Contact,
+    bars_of,
+    finer_problem,
+    simulate_contact,
+)
 from zwidth.study.optimise.search import generations
 from zwidth.study.optimise.variables import share_of, values_at
 
@@ -201,7 +208,16 @@ class _Archive:
         judgement = self.judgement
         notes = {name: merge_notes(each) for name, each in self.notes.items()}
         found = Optimisation(self.problem, self.shares, judgement, best, baseline, searched, polished, notes)
-        return replace(found, finer=self._finer(best), contacts=self._contacts(found))
+        return replace(found, finer=self._finer(best), bars=self._bars(best), contacts=self._contacts(found))
+
+    def _bars(self, best: NDArray[np.int64]) -> Bars | None:
+        """What tolerances make of the front; None without any."""
+        if not self.problem.tolerances or not len(best):
+            return None
+        judging = Judge(self.problem, PRODUCED)
+        job = judging.job(values_at(self.problem.variables, self.shares[best]))
+        cells = self._compute(job, "judging the front as it is produced", 0, len(best))
+        return bars_of(self.problem, judging.judge_produced(cells))
 
     def _finer(self, best: NDArray[np.int64]) -> Judgement | None:
         """The front on a finer grid of the task."""

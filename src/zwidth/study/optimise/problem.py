@@ -17,6 +17,8 @@ from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.task import DEMANDS
+from zwidth.study.tolerances.tolerance import Tolerance
+from zwidth.study.tolerances.tolerance_tables import tolerances_of
 
 BUDGET: Final = 2000  # designs tried, where the study does not say
 FRONT: Final = 16  # designs of the front, where the study does not say
@@ -75,6 +77,8 @@ class Problem:
     budget      designs to try
     front       designs of the front to keep, at most
     members     the circumstances in which each design is judged, such as who holds it: path -> value of each
+    tolerances  how numbers differ from one produced device to the next
+    drawn       produced devices by which each design is judged besides as it is
     """
 
     study: Study
@@ -85,6 +89,8 @@ class Problem:
     seed: int
     front: int
     members: tuple[dict[str, Any], ...] = ({},)
+    tolerances: tuple[Tolerance, ...] = ()
+    drawn: int = 0
 
     @property
     def variables(self) -> tuple[Axis, ...]:
@@ -161,6 +167,10 @@ def problem_of(study: Study) -> Problem:
     budget = given.get("budget", BUDGET)
     if budget < LEAST_BUDGET:
         faults.append((("optimise", "budget"), f"must be at least {LEAST_BUDGET} designs, got {budget}"))
+    tolerances = tolerances_of(study.document, study.device, faults)
+    drawn = given.get("tolerance_members", 0)
+    if drawn and "tolerance" not in study.document:
+        faults.append((("optimise", "tolerance_members"), "needs a [[tolerance]]; add one, or remove this"))
     if faults:
         raise DeviceError(in_order(faults, study.document, study.label))
     operators = study.task.operators if study.task is not None else ()
@@ -173,6 +183,8 @@ def problem_of(study: Study) -> Problem:
         int(given.get("seed", 1)),
         int(given.get("front", FRONT)),
         tuple({"operator": name} for name in operators) or ({},),
+        tolerances,
+        int(drawn),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.chart.chart import largest_stiffness
 from zwidth.device.faults import DeviceError
@@ -16,9 +17,14 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import WantedWall
 from zwidth.study.designs.sampling import CIRCUMSTANCES
 from zwidth.study.designs.task import Task, task_of
+from zwidth.study.optimise.evaluation import margins
 from zwidth.study.optimise.problem import Problem
 
+Floats = NDArray[np.float64]
+
 FINER: Final = 2  # times as many steps between points, and directions
+PRODUCED: Final = 64  # devices within the tolerances for the bars of each design
+QUANTILES: Final = (0.05, 0.95)
 SHARE: Final = 0.9  # of the largest stiffness: of the wall that is simulated
 
 
@@ -37,6 +43,35 @@ class Contact:
     stable: bool | None = None
     amplitude: float = float("nan")
     reason: str = ""
+
+
+@dataclass(frozen=True)
+class Bars:
+    """What tolerances make of k designs.
+
+    low, high  (k, c)  of each column: 5 and 95 % of the produced devices that have a value lie below
+    kept       (k,)    share of the produced devices that keep all demands, and have a value in every column
+    devices    number of produced devices of each design
+    """
+
+    low: Floats
+    high: Floats
+    kept: Floats
+    devices: int
+
+
+def bars_of(problem: Problem, produced: Floats) -> Bars:
+    """Bars from the columns (devices, k, c) of designs: as they are, which is left out, and as produced."""
+    drawn = produced[1:]
+    kept = ~np.isnan(drawn).any(axis=-1)
+    for demand in problem.demands:
+        with np.errstate(invalid="ignore"):
+            kept &= margins(drawn[..., demand.column], demand.bound, demand.at_least) >= 0.0
+    low, high = np.full(drawn.shape[1:], np.nan), np.full(drawn.shape[1:], np.nan)
+    known = ~np.isnan(drawn).all(axis=0)
+    if known.any():
+        low[known], high[known] = np.nanquantile(drawn[:, known], QUANTILES, axis=0)
+    return Bars(low, high, kept.mean(axis=0), len(drawn))
 
 
 def finer_problem(problem: Problem) -> Problem | None:
@@ -88,7 +123,8 @@ def _wall(wanted: WantedWall, point: OperatingPoint) -> tuple[float, float] | No
 def worst_point(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) -> OperatingPoint:
     """The operating point at which the first objective is worst, held by whom it is worst with."""
     study, task, column = problem.study, problem.study.task, problem.objectives[0].column
-    values = np.asarray(cells[column]).reshape(len(problem.members), -1)
+    # of the devices as they are, not as they are produced
+    values = np.asarray(cells[column]).reshape(len(problem.members), 1 + problem.drawn, -1)[:, 0]
     worst = np.nanargmin if problem.columns[column].measure.better == "higher" else np.nanargmax
     member, place = (int(n) for n in np.unravel_index(int(worst(values)), values.shape))
     chosen: dict[str, Any] = {key: getattr(study, key) for key in ("at", "direction", "assembly", "model")}
