@@ -105,7 +105,7 @@ STAGES = """
 NUMBERS = """
     Any Self None bool int float str complex dict list tuple Iterator Callable NDArray np bool_ complex128 float64
     Floats Complex Complexes ArrayLike Mapping Sequence xr Dataset Axes
-    Peak FastestDecay EffectiveParameters ImpedanceRange OptimalMass Overall Judgement Bound LimitCycle Variant
+    Peak FastestDecay Rectangle EffectiveParameters ImpedanceRange OptimalMass Overall Judgement Bound LimitCycle Variant
 """
 
 NAMES = [
