@@ -104,7 +104,7 @@ STAGES = """
 # Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
 NUMBERS = """
     Any Self None bool int float str complex dict list tuple Iterator Callable NDArray np bool_ complex128 float64
-    Floats Complex Complexes ArrayLike Mapping Sequence xr Dataset Axes
+    Floats Complex Complexes ArrayLike Mapping Sequence xr Dataset Axes Rectangle
     Peak FastestDecay EffectiveParameters ImpedanceRange OptimalMass Overall Judgement Bound LimitCycle Variant
 """
 
