@@ -212,6 +212,13 @@ class OptimiseSection(Section):
     front: WholeNumber | None = documented_key(
         "designs of the front to keep, at most", ge=1, le=1000, default=None
     )
+    tolerance_members: WholeNumber | None = documented_key(
+        "devices within the [[tolerance]]s by which each design is judged besides as it is, by the worst; left "
+        "out: none, tolerances are bars of the front alone",
+        ge=1,
+        le=1000,
+        default=None,
+    )
 
 
 class StudyFile(Section):

@@ -81,6 +81,8 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
     alone = len(problem.objectives) == 1
     searching, spent = problem.budget - int((POLISHED_ALONE if alone else POLISHED) * problem.budget), 0
     for number, (shares, tell) in enumerate(generations(problem, searching, start), 1):
+        if spent >= searching and len(archive.front()):
+            break  # else there is nothing to polish, and the search goes on with what is left
         judged = archive.judge(shares, "searching", problem.budget)
         spent += len(shares)
         tell(judged.costs(problem), judged.violations(problem).sum(axis=1))

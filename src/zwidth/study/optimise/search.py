@@ -26,8 +26,9 @@ CHOSEN_ANEW: Final = 0.5  # of the variables in pieces that change, how many jum
 def generations(
     problem: Problem, budget: int, first: Floats
 ) -> Iterator[tuple[Floats, Callable[[Floats, Floats], None]]]:
-    """Generations of designs to judge, until so many have been asked for.
+    """Generations of designs to judge, until the problem's budget has been asked for.
 
+    budget  designs within which the search should be done, for the size of the generations
     first   (k, v)  shares of designs that the first generation holds
     Yields  shares (n, v), and a function to be called with their costs (n, m) and their violations (n,),
             before the next generation is asked for
@@ -49,13 +50,13 @@ def generations(
         eliminate_duplicates=True,
     )
     algorithm.setup(bounds, seed=problem.seed, termination=NoTermination(), verbose=False)
-    left = budget
+    left, within = problem.budget, budget
     while left > 0:
         asked = algorithm.ask()
         if asked is None or len(asked) == 0:
             return  # every combination of pieces has been tried
-        asked = asked[:left]
-        left -= len(asked)
+        asked = asked[: within if within > 0 else left]
+        left, within = left - len(asked), within - len(asked)
         told = []
 
         def tell(costs: Floats, violations: Floats) -> None:
