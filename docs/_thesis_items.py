@@ -81,9 +81,9 @@ NOT_COVERED_ELSEWHERE = (
     (
         "6.1",
         "Future work, without numbers: [virtual environments](environments.md), delays that are not whole samples "
-        "([the chart](chart.md)), [operators](operators.md), [measures](measures.md) and [studies](studies.md) "
-        "have what zwidth does about it. There is no other model of dissipation than viscous and Coulomb "
-        "friction.",
+        "([the chart](chart.md)), [operators](operators.md), [measures](measures.md), [studies](studies.md) and "
+        "[a design algorithm](optimise.md) have what zwidth does about it. There is no other model of dissipation "
+        "than viscous and Coulomb friction.",
     ),
 )
 

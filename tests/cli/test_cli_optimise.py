@@ -44,10 +44,20 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def apart(text: str) -> tuple[list[str], list[float]]:
+    """The words of a text, and its numbers."""
+    parts = text.split()
+    numbers = [part for part in parts if re.fullmatch(r"[\d.]+", part)]
+    return [part for part in parts if part not in numbers], [float(part) for part in numbers]
+
+
 def test_the_page_s_study_prints_what_the_page_says(folder):
     ran = run_command("optimise", "arms.toml", "--workers", "1")
     assert (ran.code, ran.err) == (0, "")
-    assert ran.out == blocks("")[0]
+    # a search goes on from each of its designs, so that rounding by another processor may lead it a little elsewhere
+    (words, numbers), (expected_words, expected) = apart(ran.out), apart(blocks("")[0])
+    assert words == expected_words
+    assert numbers == pytest.approx(expected, rel=0.03)
 
 
 def test_the_page_s_python_runs(folder):
