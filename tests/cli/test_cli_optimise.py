@@ -54,7 +54,7 @@ def apart(text: str) -> tuple[list[str], list[float]]:
 def test_the_page_s_study_prints_what_the_page_says(folder):
     ran = run_command("optimise", "arms.toml", "--workers", "1")
     assert (ran.code, ran.err) == (0, "")
-    # a search goes on from each of its designs, so that rounding by another processor may lead it a little elsewhere
+    # a search goes on from what it has found: rounding by another processor may lead it a little elsewhere
     (words, numbers), (expected_words, expected) = apart(ran.out), apart(blocks("")[0])
     assert words == expected_words
     assert numbers == pytest.approx(expected, rel=0.03)
