@@ -9,11 +9,16 @@ Run `python benchmarks/design_measures.py`.
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import zwidth
+from benchmarks._cases import Cases, TimedCase, run
 from zwidth.loop.operating_point import OperatingPoint
 
 DESIGNS, SAMPLE = 100, 12
@@ -58,6 +63,19 @@ def seconds_of(point: OperatingPoint, name: str, wanted: dict[str, float]) -> fl
     return perf_counter() - begin
 
 
+def cases() -> Cases:
+    """The measures that the mechanism alone tells, and a wall with margins, of a few designs."""
+    points = designs()[:4]
+    margins = {"stiffness_margin": 0.2, "damping_margin": 0.2, "delay_margin": 0.5}
+    asked = {"distance_to_singularity": {}, "first_mode": {}, "stiffness_max_with_margins": margins}
+    return {
+        f"{name} of 400 loops": TimedCase(
+            lambda name=name, wanted=wanted: float(np.nanmean(points[...].measure(name, **wanted).values))
+        )
+        for name, wanted in asked.items()
+    }
+
+
 def main() -> None:
     """Print microseconds for each loop, together and alone, and how many times as long it takes alone."""
     points = designs()
@@ -76,4 +94,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, cases))

@@ -10,12 +10,11 @@ many:
 Hypervolumes are of what designs that keep the demands dominate, up to a point that is worse than all fronts; the
 share is of the largest that any run has found. Several seeds say how much of it is chance.
 
-Run `python benchmarks/optimise.py`, or with `--budget 1000` and `--seeds 2` for a shorter one.
+Run `python benchmarks/optimise.py`.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 from time import perf_counter
@@ -24,11 +23,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
 from zwidth.study.designs.sampling import Axis, Sampling
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_file import study_of
-from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.executor import run as run_job
 from zwidth.study.optimise.evaluation import Judge, Judgement
 from zwidth.study.optimise.front import hypervolume
 from zwidth.study.optimise.optimise import optimise
@@ -83,7 +83,7 @@ def study(budget: int, seed: int) -> Study:
 def judged(problem: Problem, shares: np.ndarray) -> Judgement:
     """Designs judged as one batch."""
     judge = Judge(problem)
-    return judge.judge(run(judge.job(values_at(problem.variables, shares)), workers=WORKERS))
+    return judge.judge(run_job(judge.job(values_at(problem.variables, shares)), workers=WORKERS))
 
 
 def kept_costs(problem: Problem, judgement: Judgement) -> np.ndarray:
@@ -91,17 +91,23 @@ def kept_costs(problem: Problem, judgement: Judgement) -> np.ndarray:
     return judgement.costs(problem)[~judgement.violations(problem).any(axis=1)]
 
 
+def cases() -> Cases:
+    """A short search; its best stiffness."""
+
+    def stiffest() -> float:
+        return float(optimise(study(120, 1), workers=1).values[0, 0])
+
+    return {"120 designs of a front of the five-bar": TimedCase(stiffest)}
+
+
 def main() -> None:
-    options = argparse.ArgumentParser()
-    options.add_argument("--budget", type=int, default=BUDGET)
-    options.add_argument("--seeds", type=int, default=SEEDS)
-    chosen = options.parse_args()
+    """Time ours, and print hypervolumes beside those of designs chosen at random."""
     print(machine("numpy", "numba", "pymoo"))
     optimise(study(40, 1), workers=WORKERS)  # compiles
     found: dict[str, list[np.ndarray]] = {"zwidth optimise": [], "random designs": [], "Latin hypercube": []}
     times = []
-    for seed in range(1, chosen.seeds + 1):
-        wanted = study(chosen.budget, seed)
+    for seed in range(1, SEEDS + 1):
+        wanted = study(BUDGET, seed)
         problem = problem_of(wanted)
         start = perf_counter()
         ours = optimise(wanted, workers=WORKERS)
@@ -120,8 +126,8 @@ def main() -> None:
     best = max(max(each) for each in volumes.values())
     cells = 25 * 4
     print(
-        f"{chosen.budget} designs over {cells} points each, {WORKERS} processes at most: "
-        f"{', '.join(map(seconds, times))}; {verdict(max(times), WANTED * chosen.budget / BUDGET)}"
+        f"{BUDGET} designs over {cells} points each, {WORKERS} processes at most: "
+        f"{', '.join(map(seconds, times))}; {verdict(max(times), WANTED)}"
     )
     rows = [
         (
@@ -131,8 +137,8 @@ def main() -> None:
         )
         for name, each in volumes.items()
     ]
-    print_table(("hypervolume, share of best", *(f"seed {n + 1}" for n in range(chosen.seeds)), "ratio"), rows)
+    print_table(("hypervolume, share of best", *(f"seed {n + 1}" for n in range(SEEDS)), "ratio"), rows)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, cases))

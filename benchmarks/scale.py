@@ -9,7 +9,7 @@ other programs take for a batch, in processor time: on a computer that is busy w
 Memory. `zwidth sweep` of a one-mass device with a store and a zarr folder as output, 1e5, 1e6 and 1e7 designs of a
 Latin hypercube: the largest resident memory of the command's process, and of its workers, and designs per second.
 
-Run `python benchmarks/scale.py`, or with a word `speed`, or `memory` and numbers of designs.
+Run `python benchmarks/scale.py`.
 """
 
 from __future__ import annotations
@@ -23,13 +23,18 @@ from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter, sleep
 
+import numpy as np
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
 from tests.study.cluster_cases import running_cluster
 from zwidth.study.designs.study_file import study_of
 from zwidth.study.designs.sweep_job import sweep_job
+from zwidth.study.jobs.executor import run as run_job
 from zwidth.study.jobs.executor_interface import Executor, open_executor
+from zwidth.study.jobs.store import Store
 from zwidth.study.jobs.workers import PackedJob, pack_job
 
 BATCH, BATCHES, REPEATS = 0.1, 40, 7
@@ -185,14 +190,23 @@ def children(process: int) -> list[int]:
     return [int(child) for text in texts for child in text.split()]
 
 
+def cases() -> Cases:
+    """Cheap cells through the executor, and many of them through a store."""
+
+    def stored() -> float:
+        job = sweep_job(study_of({**FIVE_BAR, "count": 400}))
+        with tempfile.TemporaryDirectory() as folder:
+            return float(np.nanmean(run_job(job, Store(Path(folder) / "cells", job), workers=1, batch=50).values))
+
+    return {"400 five-bars through a store, 50 in a batch": TimedCase(stored)}
+
+
 def main() -> None:
-    words = sys.argv[1:]
+    """Print what processes and a cluster cost, and how much memory many designs take."""
     print(machine("numpy", "numba", "zarr", "distributed"))
-    if not words or words[0] == "speed":
-        speed()
-    if not words or words[0] == "memory":
-        memory(tuple(int(float(word)) for word in words[1:]) or COUNTS)
+    speed()
+    memory(COUNTS)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run(main, cases))
