@@ -10,10 +10,12 @@ from zwidth.device.read import OPERATORS, bundled_names
 from zwidth.measures.definition import OK, OUT_OF_REACH
 from zwidth.study.designs.study_file import study_of
 from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.store import StoreError
 from zwidth.study.optimise.evaluation import Judge
 from zwidth.study.optimise.optimise import optimise
+from zwidth.study.optimise.polish import gradients, neighbours
 from zwidth.study.optimise.problem import problem_of
-from zwidth.study.optimise.variables import values_at
+from zwidth.study.optimise.variables import share_of, values_at
 
 TWO_MASS = "published-two-mass"
 LINKS = [
@@ -122,6 +124,44 @@ def test_a_front_s_values_are_those_of_single_devices_at_single_points(front):
         stiffness = min(float(point.measure("stiffness_max")) for point in points)
         others = [max(float(point.measure(name)) for point in points) for name in ("isotropy", "rigid_mass")]
         np.testing.assert_allclose(front.values[place], [stiffness, *others], rtol=1e-10)
+
+
+def test_derivatives_of_the_polish_are_those_of_the_sensitivities():
+    device = load("five-bar")
+    study = problem_study(
+        axis("drives.motor-right.motor_inertia_kg_m2", range=[1e-6, 3e-6]),
+        axis("loop.sampling_period_s", range=[0.001, 0.002]),
+        objectives={"stiffness_max": "max"},
+        budget=20,
+    )
+    axes, free = study.sampling.axes, np.arange(2)
+    own = [device.document["mechanism"]["drives"][0]["motor_inertia_kg_m2"], 0.00125]
+    shares = np.array([share_of(one, value) for one, value in zip(axes, own, strict=True)])
+    here, around = judged(study, shares[None]).values[0], judged(study, neighbours(shares, free)).values
+    slopes = gradients(shares, free, here, around)[0]
+    known = {one.path: one.logarithmic for one in device.sensitivities().numbers}
+    for one, slope, value in zip(axes, slopes, own, strict=True):
+        low, high = one.span
+        exact = next(known[path] for path in known if path.endswith(one.key))
+        assert slope * value / ((high - low) * here[0]) == pytest.approx(exact, rel=1e-6)
+
+
+def test_two_runs_into_one_folder_are_not_mixed(tmp_path):
+    study = problem_study(RATIO, objectives={"stiffness_max": "max"}, budget=20)
+    refused = []
+
+    def beside(stage, done, of):
+        if not refused:
+            with pytest.raises(StoreError) as caught:
+                optimise(study, tmp_path / "kept", workers=1)
+            refused.append(str(caught.value))
+
+    first = optimise(study, tmp_path / "kept", beside, workers=1)
+    assert "another run" in refused[0] or "process" in refused[0]
+    other = problem_study(RATIO, objectives={"stiffness_max": "max"}, budget=20, seed=2)
+    with pytest.raises(StoreError, match="another study"):
+        optimise(other, tmp_path / "kept", workers=1)
+    assert optimise(study, tmp_path / "kept", workers=1).values.tobytes() == first.values.tobytes()
 
 
 def test_random_designs_nearby_and_anywhere_do_not_dominate_the_front(front):

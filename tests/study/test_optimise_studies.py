@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.study.study_cases import axis
 from tests.study.test_optimise import LENGTH, RATIO, TASK, judged, problem_study
 from zwidth.study.optimise.optimise import optimise
 
@@ -69,6 +70,43 @@ def test_no_random_design_of_a_random_plant_is_better(seed):
     for n, reach in enumerate(REACHES):
         best, own = rivals(found, reach, 10 * seed + n)
         assert best >= own - BETTER * abs(own), (reach, best, own)
+
+
+@pytest.mark.slow
+def test_fronts_of_several_seeds_are_one_within_their_bars():
+    # half a per cent of the motors' inertia, which no maker holds more closely
+    tolerance = {
+        "key": "drives.motor-right.motor_inertia_kg_m2",
+        "distribution": "uniform",
+        "plus_minus_percent": 0.5,
+        "tie": ["drives.motor-left.motor_inertia_kg_m2"],
+    }
+    distal = axis("links.distal-right.length_m", range=[0.15, 0.25], tie=["links.distal-left.length_m"])
+    fronts = [
+        optimise(
+            problem_study(
+                LENGTH,
+                distal,
+                objectives={"stiffness_max": "max", "isotropy": "min"},
+                constraints={"isotropy": "<= 3"},
+                task=TASK,
+                tolerance=[tolerance],
+                budget=1500,
+                front=12,
+                seed=seed,
+            )
+        )
+        for seed in (1, 2, 3)
+    ]
+    for one in fronts:
+        for other in fronts:
+            along, across = other.values[:, 1], other.values[:, 0]
+            order = np.argsort(along)
+            within = (one.values[:, 1] >= along.min()) & (one.values[:, 1] <= along.max())
+            expected = np.interp(one.values[within, 1], along[order], across[order])
+            half = 0.5 * (one.bars.high - one.bars.low)[within, 0]
+            assert within.sum() >= 8
+            assert (np.abs(one.values[within, 0] - expected) <= half).all()
 
 
 @pytest.mark.slow
