@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
+from tests.interruption import stopped_by_ctrl_c
 from zwidth.device.load import load
 from zwidth.show.safe_walls.header import header_text
 from zwidth.study import safe_walls
@@ -128,18 +124,9 @@ def test_what_is_wrong_is_said_in_a_line(here, words, message):
 def test_ctrl_c_keeps_the_cells_that_are_done(here):
     """The same command goes on from them, and ends with the same bytes as one that was never stopped."""
     words = ["export", MECHANISM, "--cells", "7,4", "--levels", "3", "--workers", "1", "--output", "walls.h"]
-    command = [sys.executable, "-m", "zwidth", *words]
-    environment = {**os.environ, "ZWIDTH_QUIET": ""}
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)
-    kept = here / "walls.h.progress" / "status" / "c"
-    while running.poll() is None and not kept.exists():
-        time.sleep(0.01)
-    running.send_signal(signal.SIGINT)
-    _, error = running.communicate()
-    if running.returncode == 0:
-        pytest.fail("it was done before it could be stopped")
-    assert running.returncode == 130
-    assert b"walls.h.progress keeps the finished work; the same command continues from it" in error
+    code, _, error = stopped_by_ctrl_c(words, "zwidth.study.jobs.store:Store.write_batch", 2, here)
+    assert code == 130
+    assert "walls.h.progress keeps the finished work; the same command continues from it" in error
     assert not (here / "walls.h").exists()
     assert run_command(*words).code == 0
     assert [path.name for path in here.iterdir()] == ["walls.h"]

@@ -82,7 +82,7 @@ def test_a_source_is_noted_beside_those_that_are_there(file):
 def test_what_cannot_be_edited_is_refused(file):
     with pytest.raises(DeviceError, match=r"loop\.delay_sample"):
         edited_text(file, {"loop.delay_sample": 1.0})
-    with pytest.raises(DeviceError, match="no such file"):
+    with pytest.raises(DeviceError, match="is neither a file nor a bundled device"):
         edited_text(file.with_name("none.toml"), {})
     file.write_text("name = ", encoding="utf-8")
     with pytest.raises(DeviceError, match="no TOML"):

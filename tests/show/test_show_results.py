@@ -18,6 +18,7 @@ from zwidth.result import Result
 from zwidth.show.figures.plots import DRAWINGS
 from zwidth.show.output import json_value
 from zwidth.study.designs.study_arguments import study_over
+from zwidth.study.designs.study_file import study_of
 from zwidth.study.workspace.plane_grid import plane_of
 
 LINES = 8
@@ -30,6 +31,13 @@ def device():
 
 def rubbing():
     return zwidth.load("hapkit-course", {"loop.saturation.force_N": 5.0})
+
+
+BEST_DESIGNS = {
+    "device": "hapkit-course",
+    "axis": [{"key": "plant.mass_kg", "range": [0.02, 0.1]}, {"key": "loop.delay_samples", "range": [0.0, 1.0]}],
+    "optimise": {"objectives": {"stiffness_max": "max", "rigid_mass": "min"}, "budget": 40},
+}
 
 
 def results():
@@ -83,6 +91,15 @@ def function_results(point, arms):
         "eigenvalue paths": zwidth.measures.wall_paths(loop, np.linspace(1e3, 1e5, 9), 5.0),
         "common area": zwidth.study.common_area(maps, [zwidth.study.parse_requirement("rigid_mass>=0.25")]),
         "safe walls": zwidth.study.safe_walls(device()),
+        "tolerances": zwidth.study.tolerance(
+            device(),
+            {"plant.mass_kg.0.0": {"distribution": "uniform", "plus_minus_percent": 5}},
+            stiffness=1000.0,
+            damping=5.0,
+            samples=72,
+            index_samples=16,
+        ),
+        "best designs": zwidth.study.optimise(study_of(BEST_DESIGNS, bounds=True), workers=1),
         "designs": zwidth.run_study(study_over(device(), designs, "stiffness_max")),
         "designs of one number": zwidth.run_study(
             study_over(device(), {"plant.mass_kg.0.0": [0.2, 0.3]}, "stiffness_max")
@@ -99,7 +116,7 @@ def all_results():
 STAGES = """
     Device OperatingPoint Posture Plant MultiPlant Response Loop Controller Estimator AlphaBeta Nonlinear
     Measure Requirement Environment PlaneGrid Study RangeFault CellValues MeasureError ForceLaw Function UserPoint
-    Walls Family FamilyMember
+    Walls Family FamilyMember Executor ToleranceQuestion MemberChanges
 """
 # Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
 NUMBERS = """
@@ -138,6 +155,9 @@ NAMES = [
     "common area",
     "designs",
     "designs of one number",
+    "safe walls",
+    "tolerances",
+    "best designs",
 ]
 
 

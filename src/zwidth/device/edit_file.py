@@ -27,8 +27,9 @@ def edited_text(
     import tomlkit
 
     label = os.fspath(path)
+    text = device_text(label)
     try:
-        document = tomlkit.parse(device_text(label))
+        document = tomlkit.parse(text)
     except ValueError as error:
         raise fail(label, "", f"is no TOML: {error}") from None
     before = document.unwrap()
