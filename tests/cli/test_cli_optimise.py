@@ -188,6 +188,45 @@ def test_what_is_refused(folder, old, new, line):
     assert any(line in one for one in lines), lines
 
 
+def test_the_files_have_the_circumstances_that_the_designs_were_judged_in(folder):
+    study = """
+device = "five-bar"
+operator = "thesis-arm"
+direction = [1, 0]
+[[axis]]
+key = "assembly"
+values = ["elbows-in", "elbows-out"]
+[[axis]]
+key = "drives.motor-right.transmission_ratio"
+range = [10.0, 20.0]
+[optimise]
+objectives = { stiffness_max = "max" }
+budget = 30
+"""
+    (folder / "circumstances.toml").write_text(study)
+    document = document_of("optimise", "circumstances.toml", "--designs", "better")
+    (path,) = Path("better").iterdir()
+    device = load(str(path))
+    assert device.reference_assembly == document["designs"][0]["assembly"]
+    assert float(device.measure("stiffness_max")) == pytest.approx(
+        document["values"][0]["stiffness_max"], rel=1e-12
+    )
+    (folder / "circumstances.toml").write_text('model = "rigid"\n' + study)
+    document_of("optimise", "circumstances.toml", "--designs", "rigid")
+    (path,) = Path("rigid").iterdir()
+    assert path.read_text().startswith("# The design was judged with model = rigid, which no device file holds.\n")
+
+
+def test_an_infinite_objective_is_no_answer(folder):
+    (folder / "plant.toml").write_text(
+        'device = "five-bar"\n[[axis]]\nkey = "drives.motor-right.transmission_ratio"\nrange = [10.0, 20.0]\n'
+        '[optimise]\nobjectives = { joint_margin = "max" }\nbudget = 20\n'
+    )
+    ran = run_command("optimise", "plant.toml", "--json")
+    assert ran.code == 1
+    assert parse_strict_json(ran.out)["reason"].startswith("joint_margin is infinite")
+
+
 def test_a_folder_that_cannot_be_made_is_one_line(folder):
     Path("file").write_text("")
     (line,) = refusal_lines("optimise", "plant.toml", "--designs", "file/inside")

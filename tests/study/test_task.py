@@ -38,6 +38,16 @@ def test_a_column_over_a_task_is_the_statistic_of_single_points():
         np.testing.assert_allclose(row, expected, rtol=1e-11)
 
 
+@pytest.mark.parametrize("name", ["optimal_spectral_radius", "structural_distortion", "felt_stiffness"])
+def test_measures_of_one_point_at_a_time_have_values_over_a_task(name):
+    wanted = {"stiffness_N_per_m": 800.0, "damping_Ns_per_m": 4.0, "frequency_Hz": 2.0}
+    study = study_document(PERIOD, measures=[f"worst({name})"], task={"points_m": [[0.0, 0.25]]}, **wanted)
+    alone = study_document(PERIOD, measures=[name], **wanted)
+    swept, expected = run_study(study_of(study)), run_study(study_of(alone))
+    assert (swept.cells.status == OK).all()
+    np.testing.assert_allclose(swept.cells.values, expected.cells.values, rtol=1e-12)
+
+
 def test_a_task_that_is_not_reached_everywhere_gives_no_value():
     far = {"box_m": [[-0.03, 0.03], [0.22, 0.60]]}
     measures = ["worst(isotropy)", "share(isotropy)"]

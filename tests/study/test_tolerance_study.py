@@ -248,7 +248,8 @@ def test_the_same_question_has_the_same_answer_bit_for_bit_whoever_computes_and_
 
     with pytest.raises(KeyboardInterrupt):
         answer(question, until_edges)
-    assert sorted(inside.name for inside in (tmp_path / "kept").iterdir()) == ["devices", "edges-0"]
+    kept = sorted(inside.name for inside in (tmp_path / "kept").iterdir() if inside.is_dir())
+    assert kept == ["devices", "edges-0"]
     done = {"devices", "edges-0"}
     going_on = answer(
         question, lambda name, job, stage: compute(name, Finished(job) if name in done else job, stage)

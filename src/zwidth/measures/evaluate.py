@@ -211,6 +211,9 @@ def evaluate_safely(compute: Callable[[], Any]) -> tuple[float, int, str]:
     """Value, status and reason of one call; only a MeasureError is raised."""
     try:
         result = compute()
+        if isinstance(result, MeasureValues):
+            reason = result.notes[0].reason if result.notes else ""
+            return float(result.values), int(result.status), reason
         value = np.asarray(result)
     except MeasureError:
         raise

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +16,7 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback, refuse_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
-from zwidth.show.output import DATA, FIGURES, OutputError, printable, write_text
+from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import number, typed
 
 if TYPE_CHECKING:
@@ -60,6 +62,8 @@ class OptimiseCommand(Command):
 
     def check(self, case: CommandLine) -> None:
         check_workers(case.options)
+        if case["designs"] is not None:
+            _make_folder(Path(case["designs"]))
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return circumstances_of_study(case)
@@ -110,16 +114,15 @@ class OptimiseCommand(Command):
         return reason
 
     def write_others(self, case: CommandLine, result: Optimisation) -> dict[str, Path]:
-        if case["designs"] is None or not len(result.front):
+        if case["designs"] is None:
+            return {}
+        if not len(result.front):
+            with suppress(OSError):  # it holds something else
+                Path(case["designs"]).rmdir()
             return {}
         from zwidth.study.optimise.device_files import device_files
 
         folder = Path(case["designs"])
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            why = error.strerror or str(error)
-            raise OutputError(f"{printable(str(folder))}: cannot be made: {why[:1].lower() + why[1:]}") from None
         for name, text in device_files(result):
             write_text(folder / name, text)
         return {"designs_folder": folder}
@@ -134,6 +137,17 @@ class OptimiseCommand(Command):
         from zwidth.show.figures.optimise import front_figure
 
         return front_figure(result, *self.size)
+
+
+def _make_folder(folder: Path) -> None:
+    """Make the folder of designs before anything is computed. Raises BadInput where it cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise BadInput(f"{printable(str(folder))}: cannot be made: {why[:1].lower() + why[1:]}") from None
+    if not os.access(folder, os.W_OK):
+        raise BadInput(f"{printable(str(folder))}: cannot be written into; name another folder")
 
 
 def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:

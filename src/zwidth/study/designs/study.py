@@ -21,7 +21,7 @@ from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
 from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
-from zwidth.study.designs.task import DEMANDS, Task, task_of
+from zwidth.study.designs.task import Task, task_of
 from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of
 
 MOST_ALONG: Final = 10**6  # values of one axis that has a range and a count
@@ -282,9 +282,8 @@ def _task(
         faults.append((("workspace",), "and [task] exclude each other; remove one of them"))
     if not bounds:
         given = table(document, "task")
-        for key in ("operators", *DEMANDS):
-            if key in given:
-                faults.append((("task", key), "is for an optimiser; remove it, or vary operator by an axis"))
+        if "operators" in given:
+            faults.append((("task", "operators"), "is for an optimiser; remove it, or vary operator by an axis"))
         if columns and not any(column.statistic for column in columns):
             message = f"is used only by measures over it, such as worst({columns[0].measure.name}); remove it"
             faults.append((("task",), message))

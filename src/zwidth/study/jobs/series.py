@@ -7,7 +7,7 @@ again, and finds those answered that were.
 from __future__ import annotations
 
 import os
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from time import perf_counter
 from types import TracebackType
@@ -18,6 +18,8 @@ from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.executor_interface import Executor, open_executor
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.store import Store, StoreError
+from zwidth.study.jobs.store_lock import FILE as LOCK
+from zwidth.study.jobs.store_lock import FolderLock, owner_of
 from zwidth.study.jobs.workers import cores
 
 PATIENCE: Final = 5.0  # s of computation after which processes are started, which takes some seconds
@@ -49,6 +51,7 @@ class JobSeries:
             raise StoreError(f"{self.folder.name}: holds the store of another study; name another folder")
         self.progress, self.workers, self.cluster, self.time_limit = progress, workers, cluster, time_limit
         self._stack, self._executor, self._spent = ExitStack(), None, 0.0
+        self._lock = FolderLock()
         self.store: Store | None = None  # of the job that was computed last
 
     _executor: Executor | None
@@ -68,6 +71,9 @@ class JobSeries:
 
         if self.folder is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
+            if not self._lock.acquire(self.folder):
+                owner = owner_of(self.folder)
+                raise StoreError(f"{self.folder}: {owner} is computing into it; wait, or name another folder")
             self.store = Store(self.folder / name, job)
         began = perf_counter()
         executor = self._executor_in_time()
@@ -100,3 +106,7 @@ class JobSeries:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stack.close()
+        self._lock.release()
+        if self.folder is not None:
+            with suppress(OSError):
+                (self.folder / LOCK).unlink()

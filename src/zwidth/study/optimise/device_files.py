@@ -2,26 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any, Final
 
+from zwidth.device.address import UNSET
 from zwidth.device.edit_file import edited_text
-from zwidth.study.designs.sampling import CIRCUMSTANCES
+from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
 from zwidth.study.optimise.optimisation import Optimisation
+
+# Circumstance -> where a device file has it.
+PLACES: Final = {
+    "at": "mechanism.reference.position_m",
+    "direction": "mechanism.reference.direction",
+    "assembly": "mechanism.reference.assembly",
+}
+NO_PLACE: Final = ("model", *WANTED)  # circumstances that no device file has
 
 
 def device_files(found: Optimisation) -> Iterator[tuple[str, str]]:
     """Name and text of a file for each design of the front, in its order: the study's device file with its
     comments, the changes of `set`, and the design's numbers, whose sources say where they come from.
 
-    Circumstances that are varied, such as an assembly or a direction, have no place in a device file.
+    Position, direction, assembly and operator, of the study or of the design, go into the file too. What has no
+    place there, such as a model, is said in a comment at its beginning.
     """
     study = found.problem.study
     stem = Path(study.device.label).name.removesuffix(".toml")
     width = len(str(len(found.front)))
     for place in range(len(found.front)):
-        numbers = {key: value for key, value in found.settings(place).items() if key not in CIRCUMSTANCES}
-        text = f"optimised, study {Path(study.label).name}, seed {found.problem.seed}, design {place + 1}"
-        changes = [*study.document.get("set", ()), *numbers.items()]
-        sources = dict.fromkeys(numbers, text)
-        yield f"{stem}-{place + 1:0{width}d}.toml", edited_text(study.device.label, changes, sources)
+        settings = found.settings(place)
+        numbers = {key: value for key, value in settings.items() if key not in CIRCUMSTANCES}
+        source = f"optimised, study {Path(study.label).name}, seed {found.problem.seed}, design {place + 1}"
+        given = {key: study.document[key] for key in CIRCUMSTANCES if key in study.document} | settings
+        changes: list[str | tuple[str, Any]] = [*study.document.get("set", ())]
+        changes += [(path, _plain(given[key])) for key, path in PLACES.items() if key in given]
+        changes += _operator(found, settings)
+        text = edited_text(study.device.label, [*changes, *numbers.items()], dict.fromkeys(numbers, source))
+        missing = [f"{key} = {given[key]}" for key in NO_PLACE if key in given]
+        head = (
+            f"# The design was judged with {', '.join(missing)}, which no device file holds.\n" if missing else ""
+        )
+        yield f"{stem}-{place + 1:0{width}d}.toml", head + text
+
+
+def _operator(found: Optimisation, settings: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The changes that give a device file the operator of a design or of the study; none of those of a task."""
+    study = found.problem.study
+    if "operator" in settings:
+        table = study.operators[settings["operator"]]
+    elif "operator" in study.document:
+        table = study.device.document.get("operator")
+    else:
+        return
+    yield "operator", UNSET
+    for key, value in (table or {}).items():
+        yield f"operator.{key}", value
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -22,6 +22,7 @@ from zwidth.study.optimise.problem import Problem
 from zwidth.study.tolerances.draws import MemberChanges, member_changes
 
 Floats = NDArray[np.float64]
+LARGEST: Final = 1e150  # of a cost; its square is finite
 MOST_VIOLATED: Final = 10.0  # a demand is violated by more only where there is no value
 
 
@@ -85,8 +86,10 @@ class Judgement:
         return Judgement(self.values[index], self.status[index], self.absent[index], self.cells[index])
 
     def costs(self, problem: Problem) -> Floats:
-        """Each objective (k, m) with the sign that makes less better; nan where it has no value."""
-        return np.stack([self.values[:, one.column] * one.sign for one in problem.objectives], axis=1)
+        """Each objective (k, m) with the sign that makes less better; nan where it has no value. Infinite ones are
+        large numbers, so that they can be compared and subtracted."""
+        costs = np.stack([self.values[:, one.column] * one.sign for one in problem.objectives], axis=1)
+        return np.clip(costs, -LARGEST, LARGEST)
 
     def violations(self, problem: Problem) -> Floats:
         """By how much each demand (k, d) is violated, as a share of its bound, and last whether an objective has

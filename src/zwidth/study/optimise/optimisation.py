@@ -103,6 +103,10 @@ class Optimisation(Result):
     def reason(self) -> str | None:
         """Why there is no front: an objective without a value, or the demands that designs fail; None where there
         is one."""
+        for objective in self.problem.objectives:
+            column = self.problem.columns[objective.column]
+            if len(self.front) and np.isinf(self.values[:, objective.column]).all():
+                return f"{column.name} is infinite, so that there is nothing to optimise; leave it out"
         if len(self.front):
             return None
         for objective in self.problem.objectives:
@@ -159,7 +163,9 @@ class Optimisation(Result):
         """What holds a design of the front back: variables at a bound, and demands kept exactly."""
         held = []
         for axis, share in zip(self.problem.variables, self.shares[self.front[place]].tolist(), strict=True):
-            if pieces(axis) == 0 and min(share, 1.0 - share) <= AT_BOUND:
+            many = pieces(axis)
+            ordered = many == 0 or axis.whole
+            if ordered and min(share, 1.0 - share) <= (0.5 / many if many else 0.0) + AT_BOUND:
                 held.append(f"{axis.key} at its {'upper' if share > 0.5 else 'lower'} bound")
         for demand in self.problem.demands:
             if margins(self.values[place, demand.column], demand.bound, demand.at_least) <= AT_BOUND:

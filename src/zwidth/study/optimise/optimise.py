@@ -21,7 +21,7 @@ from zwidth.study.designs.study_file import read_study
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.notes import merge_notes
 from zwidth.study.jobs.series import JobSeries
-from zwidth.study.optimise.evaluation import EvaluationJob, Judge, Judgement
+from zwidth.study.optimise.evaluation import LARGEST, EvaluationJob, Judge, Judgement
 from zwidth.study.optimise.front import ranges, spread_out, undominated
 from zwidth.study.optimise.optimisation import Optimisation
 from zwidth.study.optimise.polish import polish
@@ -90,7 +90,7 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
             break
     searched = spent
     best = archive.front()
-    if len(best):
+    if len(best) and (np.abs(archive.judgement.costs(problem)[best]) < LARGEST).all():
         costs = archive.judgement.costs(problem)[best]
         chosen = archive.best_apart() if alone else best[spread_out(costs, problem.front)]
         weights = ranges(costs)[1] if len(best) > 1 else np.maximum(np.abs(costs[0]), 1e-300)
@@ -103,8 +103,8 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
             problem.budget - spent,
         )
         best = archive.front()
-        costs = archive.judgement.costs(problem)[best]
-        best = best[spread_out(costs, problem.front)]
+    if len(best):
+        best = best[spread_out(archive.judgement.costs(problem)[best], problem.front)]
     return archive.result(best, baseline, searched, spent - searched)
 
 
