@@ -176,4 +176,7 @@ def test_each_direction_lies_within_its_sector(dimensions, parts):
         share = u / u[face]
         assert (own.min(axis=0) <= share).all()
         assert (share <= own.max(axis=0)).all()
+        (place,), within = sectors.places(u[None])
+        assert place == sector
+        np.testing.assert_allclose(sectors.directions(sector, within)[0], share, rtol=0.0, atol=1e-12)
     assert seen == set(range(sectors.count))

@@ -208,6 +208,26 @@ class Sectors:
             out[:, (face + k) % d] = 2.0 * (piece + wide) / self.parts - 1.0
         return out
 
+    def places(self, directions: Floats) -> tuple[NDArray[np.int64], Floats]:
+        """Sectors (n,) of vectors (n, d), none of them zero, and their shares (n, d - 1) of the sectors' size: the
+        inverse of `directions`.
+
+        >>> sectors = Sectors(2, 1)
+        >>> sectors.places(sectors.directions(1, np.array([[0.25]])))
+        (array([1]), array([[0.25]]))
+        """
+        d, rows = self.dimensions, np.arange(len(directions))
+        face = np.abs(directions).argmax(axis=1)
+        place, stride = np.zeros(len(directions), dtype=np.int64), 1
+        shares = np.empty((len(directions), d - 1))
+        for k in range(1, d):
+            across = directions[rows, (face + k) % d] / directions[rows, face]
+            scaled = 0.5 * (across + 1.0) * self.parts
+            piece = np.minimum(scaled.astype(np.int64), self.parts - 1)
+            shares[:, k - 1] = np.clip((scaled - piece + OVERLAP) / (1.0 + 2.0 * OVERLAP), 0.0, 1.0)
+            place, stride = place + stride * piece, stride * self.parts
+        return face * stride + place, shares
+
     def sector_of(self, direction: Sequence[float]) -> int | None:
         """The sector of a direction (d,), by the exported program's rule; None for one that is zero, or has a
         component that is no number or beyond LONGEST."""

@@ -14,8 +14,9 @@ from zwidth.device.device import Device
 from zwidth.measures.definition import NO_VALUE, OK, STATUS
 from zwidth.result import Result
 from zwidth.study.jobs.job import Cells
-from zwidth.study.safe_walls.cell_walls import NONE, CellQuestion
+from zwidth.study.safe_walls.cell_walls import CellQuestion
 from zwidth.study.safe_walls.grid import CellGrid, Sectors
+from zwidth.study.safe_walls.limits import NONE
 
 if TYPE_CHECKING:
     import xarray as xr
