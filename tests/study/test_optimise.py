@@ -90,9 +90,8 @@ def test_the_stiffest_wall_of_a_mass_and_a_period_lies_at_both_bounds():
     assert found.active(0) == ["plant.mass_kg at its upper bound", "loop.sampling_period_s at its lower bound"]
 
 
-@pytest.fixture(scope="module")
-def front():
-    study = problem_study(
+def front_study(**more):
+    return problem_study(
         LENGTH,
         RATIO,
         objectives={"stiffness_max": "max", "isotropy": "min"},
@@ -100,8 +99,13 @@ def front():
         task=TASK,
         budget=400,
         front=8,
+        **more,
     )
-    return optimise(study, workers=1)
+
+
+@pytest.fixture(scope="module")
+def front():
+    return optimise(front_study(), workers=1)
 
 
 def test_stiffness_and_dexterity_cannot_be_had_together(front):
@@ -181,19 +185,7 @@ def test_equal_studies_give_equal_bits_and_another_seed_nearly_the_same(front):
     again = optimise(front.study, workers=1)
     assert again.shares.tobytes() == front.shares.tobytes()
     assert again.values.tobytes() == front.values.tobytes()
-    other = optimise(
-        problem_study(
-            LENGTH,
-            RATIO,
-            objectives={"stiffness_max": "max", "isotropy": "min"},
-            constraints={"rigid_mass": "<= 0.36"},
-            task=TASK,
-            budget=400,
-            front=8,
-            seed=2,
-        ),
-        workers=1,
-    )
+    other = optimise(front_study(seed=2), workers=1)
     assert other.shares.tobytes() != front.shares.tobytes()
     reference = np.array([0.0, 3.0])
     assert other.hypervolume(reference) == pytest.approx(front.hypervolume(reference), rel=2e-3)

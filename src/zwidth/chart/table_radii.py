@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -53,43 +54,41 @@ def slowest_roots(
     Raises  ValueError  for chained sections, see `state_spaces`
     """
     found = np.full((len(which), count), np.nan, dtype=np.complex128)
-    for first in range(0, len(which), BATCH_SIZE):
-        batch = np.arange(first, min(first + BATCH_SIZE, len(which)))
-        alike, place = np.unique(which[batch], return_inverse=True)
-        for of_one_structure, space in state_spaces(loops, alike):
-            row = np.full(len(alike), -1)
-            row[of_one_structure] = np.arange(len(of_one_structure))
-            walls = batch[row[place] >= 0]
-            matrices = space[row[place[row[place] >= 0]]].transition_matrix(
-                wall_stiffness[walls], wall_damping[walls]
-            )
-            z = np.linalg.eigvals(matrices).astype(np.complex128)
-            upper = np.where(z.imag >= 0.0, z, 0.0)
-            order = np.argsort(-np.abs(upper), axis=1, kind="stable")[:, :count]
-            largest = np.take_along_axis(upper, order, axis=1)
-            found[walls, : largest.shape[1]], found[walls, largest.shape[1] :] = largest, 0.0
+    for walls, states in _batches(loops, which):
+        matrices = states.transition_matrix(wall_stiffness[walls], wall_damping[walls])
+        z = np.linalg.eigvals(matrices).astype(np.complex128)
+        upper = np.where(z.imag >= 0.0, z, 0.0)
+        order = np.argsort(-np.abs(upper), axis=1, kind="stable")[:, :count]
+        largest = np.take_along_axis(upper, order, axis=1)
+        found[walls, : largest.shape[1]], found[walls, largest.shape[1] :] = largest, 0.0
     return found
 
 
 def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
     """Radii (p,), and leverages (p,) if these are wanted, else nan."""
     radii, leverages = np.full((2, len(which)), np.nan)
+    for walls, states in _batches(loops, which):
+        with np.errstate(over="ignore", invalid="ignore"):
+            L = states.transition_matrix(K[walls], B[walls])
+        finite = np.isfinite(L).all(axis=(-2, -1))
+        z = np.linalg.eigvals(L[finite]).astype(np.complex128)
+        radii[walls[finite]] = np.abs(z).max(axis=-1)
+        if leverage:
+            leverages[walls[finite]] = _leverages(z, states[np.flatnonzero(finite)])
+    return radii, leverages
+
+
+def _batches(loops: LoopTable, which: Whole) -> Iterator[tuple[Whole, StateSpace]]:
+    """Walls of loops of one structure, and the states of each one's loop; walls of loops without sections are in
+    none. Raises ValueError for chained sections."""
     for first in range(0, len(which), BATCH_SIZE):
         batch = np.arange(first, min(first + BATCH_SIZE, len(which)))
         alike, place = np.unique(which[batch], return_inverse=True)
         for of_one_structure, space in state_spaces(loops, alike):
             row = np.full(len(alike), -1)
             row[of_one_structure] = np.arange(len(of_one_structure))
-            walls = np.flatnonzero(row[place] >= 0)
-            states = space[row[place[walls]]]
-            with np.errstate(over="ignore", invalid="ignore"):
-                L = states.transition_matrix(K[batch[walls]], B[batch[walls]])
-            finite = np.isfinite(L).all(axis=(-2, -1))
-            z = np.linalg.eigvals(L[finite]).astype(np.complex128)
-            radii[batch[walls[finite]]] = np.abs(z).max(axis=-1)
-            if leverage:
-                leverages[batch[walls[finite]]] = _leverages(z, states[np.flatnonzero(finite)])
-    return radii, leverages
+            known = np.flatnonzero(row[place] >= 0)
+            yield batch[known], space[row[place[known]]]
 
 
 def _leverages(z: NDArray[np.complex128], states: StateSpace) -> Floats:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import secrets
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -45,9 +46,20 @@ def write_zarr(path: Path, dataset: xr.Dataset) -> None:
     path    where nothing is yet
     Raises  OutputError  where it cannot be written
     """
+    with new_folder(path) as draft:
+        dataset.to_zarr(draft, mode="w", zarr_format=2, consolidated=True)
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """A folder to be filled inside this block, which then gets its name; nothing is left of it where that fails.
+
+    path    where nothing is yet
+    Raises  OutputError  where it cannot be written
+    """
     draft = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}")
     try:
-        dataset.to_zarr(draft, mode="w", zarr_format=2, consolidated=True)
+        yield draft
         draft.rename(path)
     except OSError as error:
         reason = error.strerror or str(error)

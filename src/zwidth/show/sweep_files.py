@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import prod
 from pathlib import Path
@@ -11,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.show.output import OutputError, csv_text, replacing
+from zwidth.show.dataset import new_folder
+from zwidth.show.output import csv_text, replacing
 from zwidth.study.designs.sweep_data import (
     DESIGN,
     column_attributes,
@@ -54,8 +53,7 @@ def write_sweep_zarr(path: Path, sweep: Sweep) -> None:
     import xarray as xr
     import zarr
 
-    draft = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}")
-    try:
+    with new_folder(path) as draft:
         listed = sweep.job.sampling.kind == "grid"
         along = coordinates(sweep, 0, 0 if not listed else sweep.job.count) if listed else {}
         xr.Dataset(coords=along, attrs=dataset_attributes(sweep)).to_zarr(
@@ -66,12 +64,6 @@ def write_sweep_zarr(path: Path, sweep: Sweep) -> None:
             _write_coordinates(group, sweep)
         _write_columns(group, sweep)
         zarr.consolidate_metadata(str(draft), zarr_format=2)
-        draft.rename(path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"{path}: cannot be written: {reason[:1].lower() + reason[1:]}; name another") from None
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def _write_columns(group: Any, sweep: Sweep) -> None:

@@ -15,6 +15,7 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, refuse_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
+from zwidth.show.cli.sweep import circumstances_of_study
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.tolerance_text import (
     advice_sentence,
@@ -108,16 +109,7 @@ class ToleranceCommand(Command):
         return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        device = case.device
-        return {
-            "name": device.name,
-            "device": device.label,
-            "study": case.question.name,
-            "operator": device.operator_name,
-            **({} if device.load is None else {"load": device.document["load"]}),
-            "sampling_period_s": device.controller.sampling_period,
-            "left_out": list(device.linear_omissions),
-        }
+        return circumstances_of_study(case)
 
     def check(self, case: CommandLine) -> None:
         check_workers(case.options)

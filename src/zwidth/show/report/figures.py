@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Final
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.measures.felt_chart import FeltChart
@@ -73,14 +74,9 @@ def _load_path(facts: Facts) -> str:
     path = facts.load_path
     if path is None:
         return ""
-    drawings = []
-    for kind, width in WIDTHS.items():
-        with context():
-            made = load_path_figure(path, width, 4.6)
-            write_caption(made, caption_of_result(path))
-            description = "Charts under pushes of the hand to both sides"
-            drawings.append(f'<div class="{kind}">{inline_svg(made, f"load-{kind}", description)}</div>')
-    return "\n".join(drawings)
+    description = "Charts under pushes of the hand to both sides"
+    caption = caption_of_result(path)
+    return both_drawings("load", description, lambda width: load_path_figure(path, width, 4.6), caption)
 
 
 def _felt(facts: Facts, felt: FeltChart | None) -> str:
@@ -129,12 +125,25 @@ def _svg(
 ) -> str:
     """Both drawings of a figure; the style sheet shows the one that suits the screen."""
     caption = caption_of_facts(facts_of_point(facts.point), facts.point.controller)
+    heights = {WIDTHS["wide"]: height, WIDTHS["narrow"]: narrow_height or height}
+
+    def drawn(width: float) -> Figure:
+        made, ax = figure(width, heights[width])
+        draw(ax)
+        return made
+
+    return both_drawings(name, description, drawn, caption)
+
+
+def both_drawings(name: str, description: str, draw: Callable[[float], Figure], caption: Sequence[str]) -> str:
+    """Both drawings of a figure as HTML; the style sheet shows the one that suits the screen.
+
+    draw  makes the figure of a width [inches]
+    """
     drawings = []
-    heights = {"wide": height, "narrow": narrow_height or height}
     for kind, width in WIDTHS.items():
         with context():
-            made, ax = figure(width, heights[kind])
-            draw(ax)
+            made = draw(width)
             write_caption(made, caption)
             drawings.append(f'<div class="{kind}">{inline_svg(made, f"{name}-{kind}", description)}</div>')
     return "\n".join(drawings)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from zwidth._version import __version__
 from zwidth.chart.chart import stability_chart
 from zwidth.device.faults import DeviceError
-from zwidth.show.figures.caption import caption_of_facts, facts_of_point, facts_of_study, write_caption
+from zwidth.show.figures.caption import caption_of_facts, facts_of_point, facts_of_study
 from zwidth.show.figures.optimise import front_figure
 from zwidth.show.figures.stability import draw_models
-from zwidth.show.figures.style import context, figure, inline_svg
+from zwidth.show.figures.style import context, figure
 from zwidth.show.moment_units import speaking_of_moments
-from zwidth.show.report.figures import WIDTHS
+from zwidth.show.report.figures import both_drawings
 from zwidth.show.report.optimisation_text import sentences, short_names
-from zwidth.show.report.report import keep_units
+from zwidth.show.report.report import page_template
 from zwidth.show.units import percent, quantity
 from zwidth.study.designs.sweep_data import axis_value_text
 from zwidth.study.optimise.optimisation import Optimisation
@@ -32,16 +30,8 @@ NONE: Final = "–"
 
 def optimisation_page(found: Optimisation) -> str:
     """The page as HTML; the same text for the same result."""
-    environment = Environment(
-        loader=PackageLoader("zwidth.show.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        finalize=keep_units,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     with speaking_of_moments(found.study.turns):
-        return environment.get_template("optimisation.html.j2").render(
+        return page_template("optimisation.html.j2").render(
             found=found,
             problem=found.problem,
             word="best" if len(found.problem.objectives) == 1 else "knee",
@@ -109,7 +99,7 @@ def _front_drawing(found: Optimisation) -> str:
     if not len(found.front):
         return ""
     caption = caption_of_facts(facts_of_study(found.study), None)
-    return _both("front", "The front", lambda width: front_figure(found, width, 3.9), caption)
+    return both_drawings("front", "The front", lambda width: front_figure(found, width, 3.9), caption)
 
 
 def _charts(found: Optimisation) -> str:
@@ -142,15 +132,4 @@ def _charts(found: Optimisation) -> str:
             draw_models(ax, charts, window)
         return made
 
-    return _both("charts", "Stability charts before and after", draw, caption)
-
-
-def _both(name: str, description: str, draw: Callable[[float], Figure], caption: list[str]) -> str:
-    """Both drawings of a figure; the style sheet shows the one that suits the screen."""
-    drawings = []
-    for kind, width in WIDTHS.items():
-        made = draw(width)
-        with context():
-            write_caption(made, caption)
-            drawings.append(f'<div class="{kind}">{inline_svg(made, f"{name}-{kind}", description)}</div>')
-    return "\n".join(drawings)
+    return both_drawings("charts", "Stability charts before and after", draw, caption)

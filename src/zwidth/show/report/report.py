@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from zwidth._version import __version__
@@ -57,15 +57,7 @@ def write_report(
 
 def page(facts: Facts) -> str:
     """The page as HTML, in the units spoken now; the same text for the same device."""
-    environment = Environment(
-        loader=PackageLoader("zwidth.show.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        finalize=keep_units,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html.j2").render(
+    return page_template("page.html.j2").render(
         facts=facts,
         device=facts.device,
         say=sentences,
@@ -75,6 +67,19 @@ def page(facts: Facts) -> str:
         picture={name: Markup(svg) for name, svg in svg_figures(facts).items()},
         version=__version__,
     )
+
+
+def page_template(name: str) -> Template:
+    """A template of this folder; texts are escaped, and numbers stay beside their units."""
+    environment = Environment(
+        loader=PackageLoader("zwidth.show.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=keep_units,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(name)
 
 
 def keep_units(value: Any) -> Any:

@@ -80,6 +80,13 @@ class Column:
             return self.measure.key
         return f"{self.statistic}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
 
+    def without_value(self, values: MeasureValues) -> tuple[float, int, str]:
+        """What a column is that needs a value at each cell and has none at some: nan, their commonest status
+        and its reason."""
+        kinds, counts = np.unique(values.status[values.status != OK], return_counts=True)
+        status = int(kinds[np.argmax(counts)])
+        return float("nan"), status, next((note.reason for note in values.notes if note.status == status), "")
+
     def reduce(
         self, values: MeasureValues, point: OperatingPoint, weights: NDArray[np.float64] | None = None
     ) -> tuple[float, int, str]:

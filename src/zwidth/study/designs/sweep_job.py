@@ -280,9 +280,7 @@ class SweepJob:
         if one.statistic is None:
             return float(found.values), int(found.status), found.notes[0].reason if found.notes else ""
         if self.complete and (found.status != OK).any():
-            kinds, counts = np.unique(found.status[found.status != OK], return_counts=True)
-            status = int(kinds[np.argmax(counts)])
-            return np.nan, status, next((note.reason for note in found.notes if note.status == status), "")
+            return one.without_value(found)
         return one.reduce(found, point, self.weights)
 
     def _column_value(self, one: Column, measure: Measure, point: OperatingPoint) -> Found:

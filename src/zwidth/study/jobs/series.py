@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Final
 
 from zwidth.progress import Progress
-from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.executor import SMALL, run
 from zwidth.study.jobs.executor_interface import Executor, open_executor
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.store import Store, StoreError
@@ -50,11 +50,9 @@ class JobSeries:
         if self.folder is not None and (self.folder / "zarr.json").exists():
             raise StoreError(f"{self.folder.name}: holds the store of another study; name another folder")
         self.progress, self.workers, self.cluster, self.time_limit = progress, workers, cluster, time_limit
-        self._stack, self._executor, self._spent = ExitStack(), None, 0.0
-        self._lock = FolderLock()
-        self.store: Store | None = None  # of the job that was computed last
-
-    _executor: Executor | None
+        self._stack, self._lock = ExitStack(), FolderLock()
+        self._executor: Executor | None = None
+        self._spent = 0.0  # s of computation
 
     def compute(self, name: str, job: Job, stage: str, done: int = 0, of: int | None = None) -> CellValues:
         """Compute a job, and keep it under a name.
@@ -69,22 +67,23 @@ class JobSeries:
             if self.progress is not None:
                 self.progress(said, min(done + now, whole), whole)
 
+        store = None
         if self.folder is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not self._lock.acquire(self.folder):
                 owner = owner_of(self.folder)
                 raise StoreError(f"{self.folder}: {owner} is computing into it; wait, or name another folder")
-            self.store = Store(self.folder / name, job)
+            store = Store(self.folder / name, job)
         began = perf_counter()
         executor = self._executor_in_time()
         slots = 1 if executor is None else executor.slots
         batch = -(-job.count // (BATCHES * slots))
         cells = run(
             job,
-            self.store,
+            store,
             told,
             1 if executor is None else None,
-            batch=batch if batch < 4096 else None,
+            batch=batch if batch < SMALL else None,
             stage=stage,
             executor=executor,
         )

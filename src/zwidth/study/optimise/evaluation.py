@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device import address
-from zwidth.measures.definition import NO_VALUE, OK, Note
+from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, Note
 from zwidth.measures.overall import global_conditioning_index, overall
 from zwidth.study.designs.column import Column
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
@@ -84,6 +84,11 @@ class Judgement:
 
     def __getitem__(self, index: Any) -> Judgement:
         return Judgement(self.values[index], self.status[index], self.absent[index], self.cells[index])
+
+    def followed_by(self, other: Judgement) -> Judgement:
+        """These designs and then others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Judgement(*(np.concatenate(pair) for pair in pairs))
 
     def costs(self, problem: Problem) -> Floats:
         """Each objective (k, m) with the sign that makes less better; nan where it has no value. Infinite ones are
@@ -219,10 +224,8 @@ class Judge:
         """Value and status of a column from its values (members, w) at all points."""
         if column.statistic is None:
             cells, status = cells[:, :1], status[:, :1]
-        wrong = status != OK
-        if wrong.any() and (self._sweep.complete or column.statistic is None):
-            kinds, counts = np.unique(status[wrong], return_counts=True)
-            return float("nan"), int(kinds[np.argmax(counts)])
+        if (status != OK).any() and (self._sweep.complete or column.statistic is None):
+            return column.without_value(MeasureValues(cells, status))[:2]
         better = column.measure.better
         if column.statistic is None:
             return float(cells.max() if better == "lower" else cells.min()), OK

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device import address
+from zwidth.device.faults import DeviceError
 from zwidth.measures.definition import Note
 from zwidth.progress import Progress
 from zwidth.study.designs.study import Study
@@ -112,38 +113,19 @@ class _Archive:
     """All designs judged, in their order.
 
     shares     (n, v)
-    judgement  of them
+    judgement  of them, from the first that is judged on
+    notes      column -> why designs have no value in it
     """
+
+    judgement: Judgement
 
     def __init__(self, problem: Problem, series: JobSeries) -> None:
         self.problem, self.series, self.progress = problem, series, series.progress
         self.judging = Judge(problem)
-        self._shares: list[Floats] = []
-        self._judged: list[Judgement] = []
+        self.shares = np.zeros((0, len(problem.variables)))
         self._places: dict[bytes, int] = {}  # of a design's shares
         self._jobs = 0
         self.notes: dict[str, list[Note]] = {column.name: [] for column in problem.columns}
-
-    @property
-    def count(self) -> int:
-        """Number of designs."""
-        return sum(map(len, self._shares))
-
-    @property
-    def shares(self) -> Floats:
-        """Of all designs (n, v)."""
-        return np.concatenate(self._shares)
-
-    @property
-    def judgement(self) -> Judgement:
-        """Of all designs."""
-        each = self._judged
-        return Judgement(
-            *(
-                np.concatenate([getattr(one, name) for one in each])
-                for name in ("values", "status", "absent", "cells")
-            )
-        )
 
     @property
     def hopeless(self) -> bool:
@@ -160,11 +142,12 @@ class _Archive:
                 new.append(n)
             places.append(self._places[key])
         if new:
-            found = self._run(values_at(self.problem.variables, shares[new]), stage, self.count, of)
+            found = self._run(values_at(self.problem.variables, shares[new]), stage, len(self.shares), of)
             for name, notes in self.judging.reasons(found).items():
                 self.notes[name] += notes
-            self._shares.append(shares[new])
-            self._judged.append(self.judging.judge(found))
+            judged = self.judging.judge(found)
+            self.judgement = self.judgement.followed_by(judged) if len(self.shares) else judged
+            self.shares = np.concatenate([self.shares, shares[new]])
         return self.judgement[places]
 
     def _run(self, designs: list[tuple[Any, ...]], stage: str, done: int, of: int) -> CellValues:
@@ -184,11 +167,10 @@ class _Archive:
 
     def front(self) -> NDArray[np.int64]:
         """Designs that keep all demands and that no other dominates."""
-        if not self._shares:
+        if not len(self.shares):
             return np.zeros(0, dtype=np.int64)
-        judgement = self.judgement
-        costs = judgement.costs(self.problem)
-        costs[judgement.violations(self.problem).any(axis=1)] = np.nan
+        costs = self.judgement.costs(self.problem)
+        costs[self.judgement.violations(self.problem).any(axis=1)] = np.nan
         return undominated(costs)
 
     def best_apart(self) -> NDArray[np.int64]:
@@ -207,9 +189,8 @@ class _Archive:
         self, best: NDArray[np.int64], baseline: Judgement | None, searched: int, polished: int
     ) -> Optimisation:
         """The front's designs and how they were found."""
-        judgement = self.judgement
         notes = {name: merge_notes(each) for name, each in self.notes.items()}
-        found = Optimisation(self.problem, self.shares, judgement, best, baseline, searched, polished, notes)
+        found = Optimisation(self.problem, self.shares, self.judgement, best, baseline, searched, polished, notes)
         return replace(found, finer=self._finer(best), bars=self._bars(best), contacts=self._contacts(found))
 
     def _bars(self, best: NDArray[np.int64]) -> Bars | None:
@@ -254,7 +235,7 @@ def own_values(problem: Problem) -> list[Any]:
 def _has(document: dict[str, Any], key: str) -> bool:
     try:
         return address.exists(document, key)
-    except Exception:
+    except DeviceError:  # a circumstance, or a path that leads nowhere yet
         return False
 
 

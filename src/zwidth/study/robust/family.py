@@ -24,9 +24,9 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.plant import Plant
+from zwidth.study.advice import Advice
 from zwidth.study.designs.built_designs import BuiltDesigns, build_at_point
 from zwidth.study.designs.design_groups import DesignColumn, DesignGrouping
-from zwidth.study.sensitivity.advice import Advice
 
 # Advice of two of the faults; arguments are spelled as in Python.
 BY_VALUE: Final = Advice("compute it for each value with {}", "Device.with_")

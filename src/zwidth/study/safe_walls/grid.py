@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.device.device import Device
 from zwidth.model.mechanism import ORIENTATION
-from zwidth.study.sensitivity.advice import Advice
+from zwidth.study.advice import Advice
 from zwidth.study.workspace.plane_grid import FLAT, PlaneError, plane_of, reachable_set, rounded_outwards
 
 Floats = NDArray[np.float64]

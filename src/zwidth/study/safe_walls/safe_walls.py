@@ -9,16 +9,15 @@ from typing import Final
 
 from zwidth.device.device import Device
 from zwidth.device.operator_choice import NOBODY
-from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
+from zwidth.study.advice import Advice, AdvisedError
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.safe_walls.cell_walls import CellQuestion
 from zwidth.study.safe_walls.grid import Sectors, cells_of
 from zwidth.study.safe_walls.job import SafeWallsJob
 from zwidth.study.safe_walls.table import SafeWalls, table_of_cells, table_size
-from zwidth.study.sensitivity.advice import Advice
 
 LEVELS: Final = 12
 MOST_LEVELS: Final = 255  # what a byte of the exported program counts
@@ -26,23 +25,8 @@ MOST_PARTS: Final = 16
 BATCH: Final = 4  # cells
 
 
-class SafeWallsError(ValueError):
-    """A table of safe walls that cannot be made.
-
-    reason  why not
-    advice  what to ask for instead; None where the reason says it
-    """
-
-    def __init__(self, reason: str, advice: Advice | None = None) -> None:
-        super().__init__(reason, advice)
-        self.reason, self.advice = reason, advice
-
-    def __str__(self) -> str:
-        return self.spelled(as_argument)
-
-    def spelled(self, spelling: Spelling) -> str:
-        """The message, with arguments spelled as in Python, or as options."""
-        return self.reason if self.advice is None else f"{self.reason}; {self.advice.spelled(spelling)}"
+class SafeWallsError(AdvisedError):
+    """A table of safe walls that cannot be made."""
 
 
 def safe_walls(

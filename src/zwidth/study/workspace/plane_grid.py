@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
-from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.argument_checks import require
 from zwidth.model.mechanism import ORIENTATION, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import reachable_positions
 from zwidth.model.reach_shells import Shell, shells
-from zwidth.study.sensitivity.advice import Advice
+from zwidth.study.advice import Advice, AdvisedError
 
 Floats = NDArray[np.float64]
 
@@ -31,23 +30,8 @@ ROUND: Final = 20  # ranges are rounded outwards to a power of ten over this
 DIGITS: Final = 14  # significant digits of coordinates, counted from the largest
 
 
-class PlaneError(ValueError):
-    """A plane on which no map can be drawn.
-
-    reason  why not, and what can be reached
-    advice  what to ask for instead; None where the reason says it
-    """
-
-    def __init__(self, reason: str, advice: Advice | None = None) -> None:
-        super().__init__(reason, advice)
-        self.reason, self.advice = reason, advice
-
-    def __str__(self) -> str:
-        return self.spelled(as_argument)
-
-    def spelled(self, spelling: Spelling) -> str:
-        """The message, with arguments spelled as in Python, as options or as keys of a file."""
-        return self.reason if self.advice is None else f"{self.reason}; {self.advice.spelled(spelling)}"
+class PlaneError(AdvisedError):
+    """A plane on which no map can be drawn, and what can be reached."""
 
 
 @dataclass(frozen=True)

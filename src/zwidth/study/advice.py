@@ -27,3 +27,22 @@ class Advice:
         "ask for axes='xy'"
         """
         return self.text.format(spelling(self.name, self.value))
+
+
+class AdvisedError(ValueError):
+    """An error that may end in advice.
+
+    reason  what is wrong
+    advice  what to ask for instead; None where the reason says it
+    """
+
+    def __init__(self, reason: str, advice: Advice | None = None) -> None:
+        super().__init__(reason, advice)
+        self.reason, self.advice = reason, advice
+
+    def __str__(self) -> str:
+        return self.spelled(as_argument)
+
+    def spelled(self, spelling: Spelling) -> str:
+        """The message, with arguments spelled as in Python, as options or as keys of a file."""
+        return self.reason if self.advice is None else f"{self.reason}; {self.advice.spelled(spelling)}"
