@@ -6,6 +6,8 @@ import pytest
 from tests.study.study_cases import axis, study_document
 from zwidth.device.faults import DeviceError
 from zwidth.device.read import OPERATORS, bundled_names
+from zwidth.show.report.optimisation_text import sentences
+from zwidth.show.units import percent
 from zwidth.study.designs.study_file import study_of
 from zwidth.study.jobs.executor import run
 from zwidth.study.optimise.evaluation import Judge
@@ -42,6 +44,7 @@ def test_bars_are_those_of_the_closed_form():
     expected = np.quantile(STIFFEST * m / T**2, [0.05, 0.95])
     np.testing.assert_allclose([found.bars.low[0, 0], found.bars.high[0, 0]], expected, rtol=1e-9)
     assert found.bars.kept.tolist() == [1.0]
+    assert "64 devices were drawn within the tolerances of the best design" in sentences(found)
     assert found.values[0, 0] == pytest.approx(STIFFEST * 0.3 / 1e-6, rel=1e-9)
 
 
@@ -52,6 +55,8 @@ def test_the_share_that_keeps_a_demand_is_that_of_the_closed_form():
     m = changes.of({"plant.mass_kg": 0.3})[:, 0]
     assert found.bars.kept[0] == (m >= 0.295).mean()
     assert 0.2 < found.bars.kept[0] < 0.8
+    said = f"{percent(found.bars.kept[0])} of 64 devices within the tolerances of the best design keep all demands"
+    assert said in sentences(found)
 
 
 def test_a_design_is_judged_by_the_worst_of_those_that_are_drawn():

@@ -98,6 +98,8 @@ def _produced(found: Optimisation) -> list[str]:
     chosen = "the best design" if len(problem.objectives) == 1 else "the knee"
     kept = percent(float(bars.kept[knee]))
     said = [f"{kept} of {bars.devices} devices within the tolerances of {chosen} keep all demands"]
+    if not problem.demands:
+        said = [f"{bars.devices} devices were drawn within the tolerances of {chosen}"]
     for objective in problem.objectives:
         one = problem.columns[objective.column]
         low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
