@@ -17,7 +17,7 @@ from zwidth.chart.arcs import PAIR
 from zwidth.chart.chart_numbers import fill_nodes
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
 from zwidth.chart.edge_memory import ARCS, EdgeMemory
-from zwidth.compiled import compiled_apart, compiled_lean
+from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
 from zwidth.loop.circle_factors import (
     CircleFactors,
     fill_computer,
@@ -235,6 +235,20 @@ def _insert(nodes: EdgeNodes, at: int, K: float, B: float, t: float, loop: int) 
     return True
 
 
+@compiled_inline
+def _piece_between(
+    k0: float, k1: float, b0: float, b1: float, low: float, high: float
+) -> tuple[float, float, float]:
+    """Cut a piece from (k0, b0) to (k1, b1) to the stiffnesses from low to high, some of which it meets.
+
+    Returns its first stiffness there, and the damping at its first and at its last stiffness there.
+    """
+    x0, x1 = min(max(k0, low), high), min(max(k1, low), high)
+    y0 = b0 if x0 == k0 else b0 + (b1 - b0) * ((x0 - k0) / (k1 - k0))
+    y1 = b1 if x1 == k1 else b0 + (b1 - b0) * ((x1 - k0) / (k1 - k0))
+    return x0, y0, y1
+
+
 @compiled_apart
 def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: float) -> bool:
     """Whether there is a damping B >= 0 such that no edge meets the walls from K / factor to K factor and from
@@ -247,9 +261,7 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
         k0, k1, b0, b1 = nodes.K[i], nodes.K[i + 1], nodes.B[i], nodes.B[i + 1]
         if max(k0, k1) < low or min(k0, k1) > high:
             continue
-        x0, x1 = min(max(k0, low), high), min(max(k1, low), high)
-        y0 = b0 if x0 == k0 else b0 + (b1 - b0) * ((x0 - k0) / (k1 - k0))
-        y1 = b1 if x1 == k1 else b0 + (b1 - b0) * ((x1 - k0) / (k1 - k0))
+        x0, y0, y1 = _piece_between(k0, k1, b0, b1, low, high)
         least, largest = min(y0, y1), max(y0, y1)
         if last == i - 1 and x0 == k0 and m > 0:
             parts[m - 1, 0], parts[m - 1, 1] = min(parts[m - 1, 0], least), max(parts[m - 1, 1], largest)
@@ -310,9 +322,7 @@ def fits_about(close: EdgeNodes, K: float, factor: float, damping_factor: float,
         k0, k1, b0, b1 = close.K[i], close.K[i + 1], close.B[i], close.B[i + 1]
         if max(k0, k1) < low or min(k0, k1) > high:
             continue
-        x0, x1 = min(max(k0, low), high), min(max(k1, low), high)
-        y0 = b0 if x0 == k0 else b0 + (b1 - b0) * ((x0 - k0) / (k1 - k0))
-        y1 = b1 if x1 == k1 else b0 + (b1 - b0) * ((x1 - k0) / (k1 - k0))
+        _, y0, y1 = _piece_between(k0, k1, b0, b1, low, high)
         if min(y0, y1) <= middle <= max(y0, y1):
             return False
         if y0 < middle:

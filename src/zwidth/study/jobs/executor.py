@@ -234,9 +234,7 @@ def stored_cells(store: Store) -> Cells:
     from zwidth.study.jobs.store import StoredCells
 
     cells = StoredCells(store)
-    if store.count * len(store.measures) > MOST_IN_MEMORY:
-        return cells
-    return CellValues(cells.values, cells.status, cells.notes)
+    return cells if store.count * len(store.measures) > MOST_IN_MEMORY else cells.in_memory()
 
 
 class _CellCollection:

@@ -33,6 +33,10 @@ class Cells(Protocol):
         """First cell and values of consecutive pieces that fit into memory, in the order of the cells."""
         ...
 
+    def in_memory(self) -> CellValues:
+        """All cells in memory. Raises TooLarge."""
+        ...
+
 
 @dataclass(frozen=True)
 class CellValues:
@@ -45,6 +49,10 @@ class CellValues:
     def pieces(self) -> Iterator[tuple[int, CellValues]]:
         """All cells, as one piece."""
         yield 0, self
+
+    def in_memory(self) -> CellValues:
+        """These cells."""
+        return self
 
 
 class Job(Protocol):

@@ -88,7 +88,7 @@ class JobSeries:
             executor=executor,
         )
         self._spent += perf_counter() - began
-        return cells if isinstance(cells, CellValues) else CellValues(cells.values, cells.status, cells.notes)
+        return cells.in_memory()
 
     def _executor_in_time(self) -> Executor | None:
         """Processes or the cluster; None while this process alone is faster."""

@@ -292,6 +292,10 @@ class StoredCells:
                 summary.add(notes)
         return tuple(summary.notes() for summary in summaries)
 
+    def in_memory(self) -> CellValues:
+        """All cells in memory. Raises TooLarge."""
+        return CellValues(self.values, self.status, self.notes)
+
     def _check(self) -> None:
         count, measures = self.store.count, len(self.store.measures)
         check_memory(
