@@ -137,6 +137,7 @@ def test_outside_the_table_are_the_walls_that_all_cells_have(table):
         ranges = table.ranges[cell, 0, : band + 1]
         assert (ranges[:, 0] <= low).all()
         assert (ranges[:, 1] >= high).all()
+    assert min(table.rectangles[table.level > 0, 0]) >= K  # no stiffer than the walls of any cell
     assert table.damping_at((9.0, 9.0), K) == (1, low, high)
     assert table.damping_at((9.0, 9.0), 1.01 * K) == (1, 0.0, -1.0)
 
@@ -254,6 +255,8 @@ def test_questions_differ_where_cells_do():
         ({"directions": 17}, "directions must be a whole number from 1 to 16, got 17"),
         ({"margin": 1.0}, "margin must be at least 0 and below 1, got 1"),
         ({"margin": float("nan")}, "margin must be at least 0 and below 1, got nan"),
+        ({"margin": "0.1"}, "margin must be at least 0 and below 1, got the text '0.1'"),
+        ({"levels": 2.5}, "levels must be a whole number from 1 to 255, got 2.5"),
         ({"span": 0.0}, "span of damping must be positive, got 0"),
         (
             {"cells": (20, 20), "size_limit": 1000},
@@ -278,6 +281,22 @@ def test_arguments_that_are_not_allowed_are_named(arguments, message):
 )
 def test_cells_that_cannot_be_are_named(arguments, message):
     with pytest.raises(PlaneError, match=message):
+        safe_walls(load(MECHANISM), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"hands": "none"}, r"hands must be a list of operators, got the text 'none'; write \['none'\]"),
+        ({"hands": 3}, "hands must be a list of operators, got 3"),
+        ({"cells": 3}, r"cells must be whole numbers such as \(20, 10\), got 3"),
+        ({"cells": (2.5, 1)}, r"cells must be whole numbers such as \(20, 10\), got a tuple"),
+        ({"x": 0.1}, r"x must be two numbers such as \(-0.1, 0.1\), got 0.1"),
+        ({"y": (0.1, 0.2, 0.3)}, r"y must be two numbers such as \(-0.1, 0.1\), got a tuple"),
+    ],
+)
+def test_arguments_of_another_kind_are_named(arguments, message):
+    with pytest.raises(TypeError, match=message):
         safe_walls(load(MECHANISM), **arguments)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -175,11 +176,8 @@ class ExportCommand(Command):
         check_workers(case.options)
         if case["hands"] is not None and case.question.operator is not None:
             raise BadInput("--operator and --hands exclude each other; leave out --operator")
-        folder = None if case["arduino"] is None else Path(case["arduino"])
-        if folder is not None and not (folder.is_dir() or (not folder.exists() and folder.parent.is_dir())):
-            raise BadInput(
-                f"--arduino: {printable(str(folder))} is no folder and cannot be made one; name a new folder"
-            )
+        if case["arduino"] is not None:
+            _check_folder(Path(case["arduino"]))
 
     def parse(self, case: CommandLine) -> Mapping[str, Any]:
         if case["hands"] is None:
@@ -289,6 +287,17 @@ class ExportCommand(Command):
             yield f"linear: leaves out {', '.join(document['left_out'])}; `zwidth simulate` has them"
         yield two_columns(list(_rows(result)))
         yield from (printable(reason) for reason in result.reasons)
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise BadInput for a folder that cannot be made, or written into, before anything is computed."""
+    where = folder if folder.exists() else folder.parent
+    if not where.is_dir():
+        raise BadInput(
+            f"--arduino: {printable(str(folder))} is no folder and cannot be made one; name a new folder"
+        )
+    if not os.access(where, os.W_OK):
+        raise BadInput(f"--arduino: {printable(str(where))} cannot be written into; name a folder elsewhere")
 
 
 def _for_whom(table: SafeWalls) -> str:

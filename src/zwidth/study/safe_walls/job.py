@@ -14,7 +14,7 @@ from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.safe_walls.cell_walls import CellQuestion, cell_walls
 
-METHOD: Final = 2  # changes with the way in which cells are searched, so that no table is made of two
+METHOD: Final = 3  # changes with the way in which cells are searched, so that no table is made of two
 
 
 @dataclass(frozen=True, repr=False)

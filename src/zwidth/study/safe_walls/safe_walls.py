@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from math import isfinite
-from typing import Final
+from numbers import Integral, Real
+from typing import Any, Final
+
+import numpy as np
 
 from zwidth.device.device import Device
 from zwidth.device.operator_choice import NOBODY
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import describe_value, require, wrong_type
 from zwidth.progress import Progress
 from zwidth.study.advice import Advice, AdvisedError
 from zwidth.study.jobs.executor import run
@@ -105,6 +108,7 @@ def safe_walls_job(
 ) -> SafeWallsJob:
     """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made."""
     require("device", device, Device)
+    _check_kinds(hands, cells, ranges)
     _check_numbers(levels, directions, margin)
     if device.response is not None:
         raise SafeWallsError(
@@ -150,8 +154,8 @@ def compute_table(
     time_limit: float | None = None,
 ) -> SafeWalls:
     """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
-    if span is not None and not (isfinite(span) and span > 0.0):
-        raise SafeWallsError(f"the span of damping must be positive, got {span:g}")
+    if span is not None and not (isinstance(span, Real) and isfinite(span) and span > 0.0):
+        raise SafeWallsError(f"the span of damping must be positive, got {describe_value(span)}")
     cells = run(job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit)
     asked = job.cell_question
     return table_of_cells(device, hand_names(asked), asked, cells, span)
@@ -162,13 +166,31 @@ def hand_names(question: CellQuestion) -> tuple[str, ...]:
     return tuple(device.operator_name or NOBODY for device in question.devices)
 
 
+def _check_kinds(hands: object, cells: object, ranges: Sequence[object]) -> None:
+    """Raise TypeError for arguments that are no sequences of what they should be."""
+    if isinstance(hands, str):
+        raise wrong_type("hands", "a list of operators", hands, f"write [{hands!r}]")
+    if hands is not None and not isinstance(hands, Sequence):
+        raise wrong_type("hands", "a list of operators", hands)
+    if cells is not None and not _all(cells, Integral):
+        raise wrong_type("cells", "whole numbers such as (20, 10)", cells)
+    for name, given in zip("xyz", ranges, strict=True):
+        if given is not None and not (_all(given, Real) and len(given) == 2):  # type: ignore[arg-type]
+            raise wrong_type(name, "two numbers such as (-0.1, 0.1)", given)
+
+
+def _all(values: object, kind: Any) -> bool:
+    """Whether these are a sequence, or an array, of numbers of this kind."""
+    whole = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
+    return whole and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
+
+
 def _check_numbers(levels: int, directions: int, margin: float) -> None:
-    if not 1 <= levels <= MOST_LEVELS:
-        raise SafeWallsError(f"levels must be a whole number from 1 to {MOST_LEVELS}, got {levels}")
-    if not 1 <= directions <= MOST_PARTS:
-        raise SafeWallsError(f"directions must be a whole number from 1 to {MOST_PARTS}, got {directions}")
-    if not 0.0 <= margin < 1.0:
-        raise SafeWallsError(f"margin must be at least 0 and below 1, got {margin:g}")
+    for name, value, most in (("levels", levels, MOST_LEVELS), ("directions", directions, MOST_PARTS)):
+        if not (isinstance(value, Integral) and 1 <= value <= most):
+            raise SafeWallsError(f"{name} must be a whole number from 1 to {most}, got {describe_value(value)}")
+    if not (isinstance(margin, Real) and 0.0 <= margin < 1.0):
+        raise SafeWallsError(f"margin must be at least 0 and below 1, got {describe_value(margin)}")
 
 
 def _check_point(question: CellQuestion) -> None:

@@ -288,7 +288,7 @@ def table_of_cells(
         wide = "" if span is None else f" of {span:g} N s/m or more"
         reasons.append(f"{_cells(int(none.sum()))} {STATUS[NO_VALUE]}: no range of damping{wide} is safe")
     good = level > 0
-    outside = _common_rectangle(top[good, 0], ranges[good, 0], span)
+    outside = _common_rectangle(top[good, 0], ranges[good, 0], level[good], span)
     return SafeWalls(
         device=device,
         hands=tuple(hands),
@@ -331,16 +331,18 @@ def _level(top: float, ranges: Floats, span: float | None) -> int:
     return int(area.argmax()) + 1
 
 
-def _common_rectangle(top: Floats, ranges: Floats, span: float | None) -> Rectangle:
-    """The rectangle that is safe in all cells, chosen as in a cell; of zeros where there is none.
+def _common_rectangle(top: Floats, ranges: Floats, level: NDArray[np.int64], span: float | None) -> Rectangle:
+    """The rectangle that is safe in all cells, chosen as in a cell but no stiffer than the rectangle of any; of
+    zeros where there is none.
 
     top     (cells,)
     ranges  (cells, levels, 2)
+    level   (cells,)  of the cells' rectangles
     """
     if not len(top):
         return Rectangle(0.0, 0.0, 0.0)
     levels = ranges.shape[1]
-    least = float(top.min())
+    least = float((top * level).min()) / levels
     common = np.empty((levels, 2))
     for j in range(levels):
         # the band of each cell that holds this stiffness, and all below
@@ -349,11 +351,11 @@ def _common_rectangle(top: Floats, ranges: Floats, span: float | None) -> Rectan
         empty = any((part[:, 0] > part[:, 1]).any() for part in parts)
         limits = max(part[:, 0].max() for part in parts), min(part[:, 1].min() for part in parts)
         common[j] = NONE if empty or limits[0] > limits[1] else limits
-    level = _level(least, common, span)
-    if level == 0:
+    taken = _level(least, common, span)
+    if taken == 0:
         return Rectangle(0.0, 0.0, 0.0)
-    stiffness = float(rounded(np.array(least * level / levels), -np.inf))
-    return Rectangle(stiffness, float(common[:level, 0].max()), float(common[:level, 1].min()))
+    stiffness = float(rounded(np.array(least * taken / levels), -np.inf))
+    return Rectangle(stiffness, float(common[:taken, 0].max()), float(common[:taken, 1].min()))
 
 
 def _cells(count: int) -> str:
