@@ -179,7 +179,7 @@ def _check_kinds(hands: object, cells: object, ranges: Sequence[object]) -> None
             raise wrong_type(name, "two numbers such as (-0.1, 0.1)", given)
 
 
-def _all(values: object, kind: Any) -> bool:
+def _all(values: Any, kind: type[Any]) -> bool:
     """Whether these are a sequence, or an array, of numbers of this kind."""
     whole = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
     return whole and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
