@@ -1,4 +1,4 @@
-"""A command as a process, stopped by ctrl-C at a known place of its work and not after some time."""
+"""A command as a process, stopped at a known place of its work and not after some time."""
 
 from __future__ import annotations
 
@@ -43,13 +43,14 @@ def interruptible() -> None:
 
 
 def stopped_by_ctrl_c(
-    words: list[str], where: str, calls: int = 1, folder: Path | None = None
+    words: list[str], where: str, calls: int = 1, folder: Path | None = None, by: signal.Signals = signal.SIGINT
 ) -> tuple[int, str, str]:
     """Exit code, output and messages of a command line that ctrl-C stops after a certain call.
 
     where  the function or method, as "module:function" or "module:Class.method"
     calls  after which of its calls; the command must get that far by itself, or the test fails
     folder in which the command runs
+    by     another signal, such as SIGKILL
     The signal goes to the whole group of processes, as a terminal sends it.
     """
     module, _, attribute = where.partition(":")
@@ -72,7 +73,7 @@ def stopped_by_ctrl_c(
     with open(ready, "rb") as pipe:
         reached = pipe.read(1) == b"."  # empty where the process ended without getting there
     if reached:
-        os.killpg(running.pid, signal.SIGINT)
+        os.killpg(running.pid, by)
     out, err = running.communicate(timeout=HANG_TIMEOUT_S)
     assert reached, f"ended before it got to {where}: {err}"
     return running.returncode, out, err

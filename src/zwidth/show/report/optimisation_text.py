@@ -85,8 +85,9 @@ def _finer(found: Optimisation) -> list[str]:
     for demand in problem.demands:
         with np.errstate(invalid="ignore"):
             kept = margins(found.finer.values[:, demand.column], demand.bound, demand.at_least) >= 0.0
-        if not kept.all():
-            said.append(f"on a grid twice as fine {plural(int((~kept).sum()), 'design')} breaks {demand.text}")
+        if broken := int((~kept).sum()):
+            verb = "breaks" if broken == 1 else "break"
+            said.append(f"on a grid twice as fine {plural(broken, 'design')} {verb} {demand.text}")
     return said or ["a grid twice as fine gives the same values"]
 
 
