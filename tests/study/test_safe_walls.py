@@ -9,9 +9,10 @@ import pytest
 
 from tests.study.safe_wall_cases import largest_radii, random_device, search_table, try_table
 from zwidth.device.load import load
-from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH
+from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH, UNDECIDED
 from zwidth.study import SafeWallsError, Store, safe_walls
 from zwidth.study.jobs.executor import run
+from zwidth.study.safe_walls.cell_walls import cell_walls
 from zwidth.study.safe_walls.job import SafeWallsJob
 from zwidth.study.safe_walls.safe_walls import compute_table, safe_walls_job
 from zwidth.study.safe_walls.table import rounded
@@ -318,6 +319,17 @@ def test_a_device_that_is_never_stable_has_no_cell():
     assert found.at((0.0, 0.21)) == (1, found.outside)
     assert found.outside.stiffness == found.outside.high == 0.0
     assert found.reasons == ("1 cell no value: no wall is stable in all of the cell's postures and directions",)
+
+
+def test_cells_whose_edge_rounding_hides_say_what_helps():
+    """Without damping a mode that hardly moves the handle has next to no effect on the loop."""
+    device = random_device("five-bar", 22)
+    job = job_of(device, cells=(12, 10))
+    cell = cell_walls(job.cell_question, 38)
+    assert (cell.status, cell.top) == (UNDECIDED, None)
+    assert "give these modes some damping" in cell.reason
+    damped = job_of(device.with_({"mechanism.damping": {"mode_ratio": 0.02}}), cells=(12, 10))
+    assert cell_walls(damped.cell_question, 38).status == OK
 
 
 # --- longer -------------------------------------------------------------------------------------------

@@ -63,6 +63,10 @@ NEARBY: Final = 0.15  # share of a cell, or a sector, by which samples beside th
 NOTHING: Final = 1e-9
 BAND_OVERLAP: Final = 1e-6  # share by which a band of stiffnesses reaches into its neighbours
 DIFFERENT: Final = "the walls differ too much within the cell; use smaller cells"
+UNTOLD: Final = (
+    "rounding hides a part of the edge of the stable walls (undamped modes, or one that the wall hardly moves); "
+    "give these modes some damping, or leave them out"
+)
 
 
 @dataclass(frozen=True)
@@ -182,7 +186,7 @@ class _Slot:
             parts = [edges_of_points(point) for point in self._points(samples)]
             edges = EdgeChords.joined(parts)
         if not edges.known.all():
-            raise _Failed(UNDECIDED, "double precision does not tell the edge of the stable walls")
+            raise _Failed(UNDECIDED, UNTOLD)
         return edges
 
     def _points(self, samples: Samples) -> list[OperatingPoint]:
