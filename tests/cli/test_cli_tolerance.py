@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from scipy import stats
 
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from zwidth.show.figures.caption import caption_of_result
@@ -140,6 +141,28 @@ def test_devices_without_a_stable_wall_are_told(folder):
         in told
     )
     assert found["outcomes"] == {"with a stable wall": 100 - none, "without a stable wall": none}
+
+
+def test_a_distribution_is_cut_off_where_no_device_can_be_and_what_is_left_of_it_is_said(folder):
+    wide = '[[tolerance]]\nkey = "plant.mass_kg"\ndistribution = "normal"\nstandard_deviation = 0.06\n'
+    told = lines(study(folder, wide, indices=0))
+    assert "plant.mass_kg normal about 0.1 kg, standard deviation 0.06 kg, cut off below 1e-12 and" in told
+    assert "above 0.34 (4.782 %)" in told
+    left = stats.truncnorm(-0.1 / 0.06, 4.0, 0.1, 0.06)
+    assert (
+        f"plant.mass_kg: 4.782 % of its distribution is cut off; what is drawn has a mean of {left.mean():.3g} kg "
+        f"and a standard deviation of {left.std():.3g} kg"
+    ) in told
+    assert not any("could not be built" in line for line in told)
+    assert not any("is cut off" in line for line in lines(study(folder, wide.replace("0.06", "0.02"), indices=0)))
+
+
+def test_a_distribution_that_no_device_can_have_is_refused_before_any_is_drawn(folder):
+    (line,) = refusal_lines("tolerance", study(folder, MASS.replace("20", "200"), indices=0))
+    assert line == (
+        "series.toml: tolerance.0.plus_minus_percent: leads to values of 'plant.mass_kg' from -0.1 to 0.3; it "
+        "must be greater than 0, got -0.1; give plus_minus_percent = 99.99 or less"
+    )
 
 
 def test_a_band_without_a_wall_is_none(folder):

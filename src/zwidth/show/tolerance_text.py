@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from zwidth.show.output import printable
 from zwidth.show.units import amount, number, percent, typed
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from zwidth.study.tolerances.intervals import Interval
     from zwidth.study.tolerances.result import ToleranceStudy
     from zwidth.study.tolerances.tolerance import Tolerance
+
+MUCH_CUT: Final = 0.01  # share of a distribution that is cut off, and said to be
 
 WORDS = {
     "failed": "could not be built",
@@ -46,6 +48,19 @@ def tolerance_text(one: Tolerance) -> str:
 
 def _written(value: float) -> str:
     return f"{value:.4g}"
+
+
+def cut_sentences(tolerances: Sequence[Tolerance]) -> Iterator[str]:
+    """Which distributions lose so much by being cut off that what is drawn differs from what was given."""
+    for one in tolerances:
+        law = one.distribution
+        if law.cut_off > MUCH_CUT:
+            mean, deviation = law.moments
+            unit = f" {one.unit}" if one.unit else ""
+            yield (
+                f"{one.key}: {typed(percent(law.cut_off))} of its distribution is cut off; what is drawn has a "
+                f"mean of {mean:.3g}{unit} and a standard deviation of {deviation:.3g}{unit}"
+            )
 
 
 def wall_sentence(result: ToleranceStudy) -> str:

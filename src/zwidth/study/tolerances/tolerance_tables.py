@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf, isfinite, log
 from typing import Any, Final
 
@@ -21,6 +22,8 @@ from zwidth.study.designs.axis_tables import (
     unit_of,
 )
 from zwidth.study.designs.sampling import CIRCUMSTANCES
+from zwidth.study.tolerances.beyond import beyond_faults, leads_to, narrower_advice
+from zwidth.study.tolerances.buildable import FaultsOf, faults_with, obstacle
 from zwidth.study.tolerances.distribution import (
     CUT,
     SPAN_OF_95,
@@ -115,10 +118,29 @@ def _tolerance(
     distribution, relative = made
     drawn = {"key": key, "values": [distribution.low, distribution.high], "tie": table.get("tie")}
     ties = tuple(ties_of(drawn, key, device, taken, faults, KIND))
-    steps = address.resolve(device.document, key)
-    return Tolerance(
-        key, dotted(steps, device.document), distribution, relative, unit_of(device.document, key), ties
-    )
+    if faults:
+        return None
+    path = dotted(address.resolve(device.document, key), device.document)
+    faults_at = faults_with(device.document, key, ties)
+    within = _cut_at_obstacles(distribution, path, faults_at)
+    faults += beyond_faults(key, path, _width_key(table), within, faults_at)
+    return Tolerance(key, path, within, relative, unit_of(device.document, key), ties)
+
+
+def _cut_at_obstacles(law: Distribution, path: str, faults_at: FaultsOf) -> Distribution:
+    """The distribution, cut off besides where the number alone is too small or too large for any device.
+
+    path  of the number in full
+    """
+    if law.kind not in WITH_TAILS or faults_at(law.middle):
+        return law
+    ends = [law.low, law.high]
+    for n, end in enumerate(ends):
+        found = obstacle(faults_at, law.middle, end)
+        if found is not None and found.is_of(path):
+            ends[n] = found.last
+    low, high = ends
+    return replace(law, low=low, high=high) if low < high else law
 
 
 def _key_fault(document: dict[str, Any], key: str) -> str:
@@ -144,7 +166,7 @@ def _distribution(
     value  the number in the device file; None: it has none
     """
     kind = table.get("distribution")
-    width_key = next((one for one in WIDTH_KEYS if one in table), "")
+    width_key = _width_key(table)
     numbers = [table[one] for one in (*WIDTH_KEYS, "cut_at_deviations") if one in table]
     if kind not in WIDTHS or not width_key or not all(is_number(one) and isfinite(one) for one in numbers):
         return None
@@ -172,6 +194,11 @@ def _distribution(
     return None if made is None else (made, width_key in PERCENT or kind == "lognormal")
 
 
+def _width_key(table: dict[str, Any]) -> str:
+    """The first of the keys that give the width; "" for none."""
+    return next((one for one in WIDTH_KEYS if one in table), "")
+
+
 def _with_tails(
     table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: Faults
 ) -> Distribution | None:
@@ -196,7 +223,8 @@ def _with_tails(
         deviation = table["standard_deviation"] if percent is None else abs(value) * percent / 100.0
     made = (lognormal if kind == "lognormal" else normal)(middle, deviation, limits, cut)
     if not made.low <= middle <= made.high or not made.low < made.high:
-        faults.append((("low",), f"and high have their middle at {middle:.6g}, which '{key}' may not be"))
+        message = f"and high have their middle at {middle:.6g}, which '{key}' may not be; {_allowed(limits)}"
+        faults.append((("low",), message))
         return None
     return made
 
@@ -222,10 +250,14 @@ def _bounded(
             faults.append((("low",), message))
             return None
     low, high = float(low), float(high)
+    made = Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
     if low < limits.lowest or high > limits.highest:
-        faults.append(((shown,), f"leads to values of '{key}' from {low:.6g} to {high:.6g}; {_allowed(limits)}"))
+        ends = [limits.least] * (low < limits.lowest) + [limits.most] * (high > limits.highest)
+        excluded = limits.without_least if low < limits.lowest else limits.without_most
+        advice = narrower_advice(made, shown, ends, exact=True, excluded=excluded)
+        faults.append(((shown,), f"{leads_to(key, made)}; {_allowed(limits)}; {advice}"))
         return None
-    return Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
+    return made
 
 
 def _allowed(limits: Limits) -> str:
