@@ -237,7 +237,7 @@ class Finished:
 
 
 def test_the_same_question_has_the_same_answer_bit_for_bit_whoever_computes_and_from_where(tmp_path):
-    question = tolerance(free_mass(), BOTH, **WALL, samples=72, index_samples=16).question
+    question = tolerance(free_mass(), BOTH, **WALL, samples=72, index_samples=32).question
     whole = json.dumps(run_tolerances(question).document())
     compute = JobSeries(tmp_path / "kept").compute
 
