@@ -5,14 +5,18 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from scipy import stats
 
 from tests.cli.command_runner import document_of, refusal_lines, run_command
+from zwidth.measures.definition import OK, UNDECIDED
 from zwidth.show.figures.caption import caption_of_result
+from zwidth.show.tolerance_text import wall_sentence
 from zwidth.study.tolerances.tolerance_study import run_tolerances
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tolerance.md").read_text(encoding="utf-8")
@@ -88,6 +92,42 @@ def test_a_wall_that_all_render_or_none(folder):
     place = "the wall 300.0 kN/m at 30.00 Ns/m"
     assert f"{place} is stable in none of them, so in at most 3.622 % of all that are produced" in told
     assert told[-1].startswith("no narrower tolerance helps this wall, for it is unstable in the middle")
+
+
+ON_THE_LIMIT = "within rounding of the stability limit"  # which passes through the wall without stiffness
+
+
+def test_a_wall_that_is_undecided_is_said_to_be(folder):
+    told = lines(study(folder, MASS, wall="stiffness_N_per_m = 0\ndamping_Ns_per_m = 1\n"))
+    place = "the wall 0 N/m at 1.000 Ns/m"
+    assert f"{place} is undecided in all of them, {ON_THE_LIMIT}: its probability is not known" in told
+    assert "no index of wall_is_stable: 192 of 192 verdicts are undecided" in told
+    assert told[-1].startswith("which tolerance to tighten first is not known, for the wall lies on the stability")
+    assert not any("none of them" in line or "not stable" in line for line in told)
+
+
+UNDECIDED_IN_SOME = [
+    (4, 0, 96, "stable in 4 of 100 devices and undecided in 96", "at least 1.100 %"),
+    (40, 50, 10, "stable in 40 of 100 devices and undecided in 10", "30.33 to 60.17 %"),
+    (0, 90, 10, "stable in none of 100 devices and undecided in 10", "at most 17.62 %"),
+]
+
+
+@pytest.mark.parametrize(("stable", "unstable", "undecided", "known", "part"), UNDECIDED_IN_SOME)
+def test_a_wall_that_is_undecided_in_some_devices_says_in_how_many(
+    folder, stable, unstable, undecided, known, part
+):
+    found = run_tolerances(study(folder, MASS, indices=0))
+    n = [one.name for one in found.question.columns].index("wall_is_stable")
+    values, status = found.cells.values.copy(), found.cells.status.copy()
+    values[:, n] = np.repeat([1.0, 0.0, np.nan], [stable, unstable, undecided])
+    status[:, n] = np.repeat([OK, OK, UNDECIDED], [stable, unstable, undecided])
+    some = replace(found, cells=replace(found.cells, values=values, status=status))
+    place = "the wall 62.00 kN/m at 90.00 Ns/m"
+    assert wall_sentence(some) == f"{place} is {known}, {ON_THE_LIMIT}: in {part} of those that are produced"
+    assert f"undecided in {undecided} devices" in repr(some)
+    labels = [text.get_text() for text in some.plot().get_legend().get_texts()]
+    assert any(label.endswith(f"undecided in {undecided} of 100 devices") for label in labels)
 
 
 def test_without_a_wall_the_spread_of_the_stiffness_says_what_to_tighten(folder):
