@@ -56,7 +56,8 @@ WRONG = [
     ),
     (
         one("damping.mode_ratio", "uniform", low=0.1, high=3.0),
-        "high: leads to values of 'damping.mode_ratio' from 0.1 to 3; it must be at least 0 and at most 2",
+        "high: leads to values of 'damping.mode_ratio' from 0.1 to 3; it must be at most 2, got 3; give high = "
+        "2 or less",
     ),
     (
         one("damping.mode_ratio", low=-3.0, high=-2.0),

@@ -17,12 +17,13 @@ from zwidth.study.designs.axis_tables import (
     Faults,
     SetNumbers,
     key_faults,
+    mirrored,
     overlap_faults,
     ties_of,
     unit_of,
 )
-from zwidth.study.designs.sampling import CIRCUMSTANCES
-from zwidth.study.tolerances.beyond import beyond_faults, leads_to, narrower_advice
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Tie
+from zwidth.study.tolerances.beyond import beyond_faults
 from zwidth.study.tolerances.buildable import FaultsOf, faults_with, obstacle
 from zwidth.study.tolerances.distribution import (
     CUT,
@@ -112,19 +113,24 @@ def _tolerance(
     if faults:
         return None
     value = address.get(device.document, key) if address.exists(device.document, key) else None
-    made = _distribution(table, key, float(value) if is_number(value) else None, device.document, faults)
+    own = float(value) if is_number(value) else None
+    made = _distribution(table, key, own, device.document, faults)
     if made is None or faults:
         return None
     distribution, relative = made
-    drawn = {"key": key, "values": [distribution.low, distribution.high], "tie": table.get("tie")}
-    ties = tuple(ties_of(drawn, key, device, taken, faults, KIND))
+    path = dotted(address.resolve(device.document, key), device.document)
+    mirror = mirrored(device.document, key)  # an element of a symmetric matrix has no value of its own
+    alone = faults_with(device.document, key, () if mirror is None else (Tie(mirror),))
+    distribution = _cut_at_obstacles(distribution, path, alone)
+    faults += beyond_faults(key, path, own, _width_key(table), distribution, alone)
     if faults:
         return None
-    path = dotted(address.resolve(device.document, key), device.document)
-    faults_at = faults_with(device.document, key, ties)
-    within = _cut_at_obstacles(distribution, path, faults_at)
-    faults += beyond_faults(key, path, _width_key(table), within, faults_at)
-    return Tolerance(key, path, within, relative, unit_of(device.document, key), ties)
+    drawn = {"key": key, "values": [distribution.low, distribution.high], "tie": table.get("tie")}
+    ties = tuple(ties_of(drawn, key, device, taken, faults, KIND))
+    if ties and not faults:
+        together = faults_with(device.document, key, ties)
+        faults += beyond_faults(key, path, own, _width_key(table), distribution, together)
+    return Tolerance(key, path, distribution, relative, unit_of(device.document, key), ties)
 
 
 def _cut_at_obstacles(law: Distribution, path: str, faults_at: FaultsOf) -> Distribution:
@@ -190,7 +196,7 @@ def _distribution(
     if kind in WITH_TAILS:
         made = _with_tails(table, kind, key, middle, limits, faults)
     else:
-        made = _bounded(table, kind, key, middle, limits, faults)
+        made = _bounded(table, kind, key, middle, faults)
     return None if made is None else (made, width_key in PERCENT or kind == "lognormal")
 
 
@@ -229,19 +235,15 @@ def _with_tails(
     return made
 
 
-def _bounded(
-    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: Faults
-) -> Distribution | None:
-    """A uniform or triangular distribution, whose ends are values that the number may have."""
+def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: Faults) -> Distribution | None:
+    """A uniform or triangular distribution."""
     low, high = table.get("low"), table.get("high")
     percent = table.get("plus_minus_percent")
     middle = value
     if low is None or high is None:
         width = table["plus_minus"] if percent is None else abs(value) * percent / 100.0
         low, high = value - width, value + width
-        shown = "plus_minus" if percent is None else "plus_minus_percent"
     else:
-        shown = "low" if low < limits.lowest else "high"
         middle = value if kind == "triangular" else 0.5 * (low + high)
         if not low <= middle <= high:
             message = (
@@ -250,14 +252,7 @@ def _bounded(
             faults.append((("low",), message))
             return None
     low, high = float(low), float(high)
-    made = Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
-    if low < limits.lowest or high > limits.highest:
-        ends = [limits.least] * (low < limits.lowest) + [limits.most] * (high > limits.highest)
-        excluded = limits.without_least if low < limits.lowest else limits.without_most
-        advice = narrower_advice(made, shown, ends, exact=True, excluded=excluded)
-        faults.append(((shown,), f"{leads_to(key, made)}; {_allowed(limits)}; {advice}"))
-        return None
-    return made
+    return Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
 
 
 def _allowed(limits: Limits) -> str:
