@@ -5,13 +5,18 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 from tests.cli.command_runner import document_of, refusal_lines, run_command
+from zwidth.measures.definition import OK, UNDECIDED
 from zwidth.show.figures.caption import caption_of_result
+from zwidth.show.tolerance_text import wall_sentence
 from zwidth.study.tolerances.tolerance_study import run_tolerances
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tolerance.md").read_text(encoding="utf-8")
@@ -89,6 +94,42 @@ def test_a_wall_that_all_render_or_none(folder):
     assert told[-1].startswith("no narrower tolerance helps this wall, for it is unstable in the middle")
 
 
+ON_THE_LIMIT = "within rounding of the stability limit"  # which passes through the wall without stiffness
+
+
+def test_a_wall_that_is_undecided_is_said_to_be(folder):
+    told = lines(study(folder, MASS, wall="stiffness_N_per_m = 0\ndamping_Ns_per_m = 1\n"))
+    place = "the wall 0 N/m at 1.000 Ns/m"
+    assert f"{place} is undecided in all of them, {ON_THE_LIMIT}: its probability is not known" in told
+    assert "no index of wall_is_stable: 192 of 192 verdicts are undecided" in told
+    assert told[-1].startswith("which tolerance to tighten first is not known, for the wall lies on the stability")
+    assert not any("none of them" in line or "not stable" in line for line in told)
+
+
+UNDECIDED_IN_SOME = [
+    (4, 0, 96, "stable in 4 of 100 devices and undecided in 96", "at least 1.100 %"),
+    (40, 50, 10, "stable in 40 of 100 devices and undecided in 10", "30.33 to 60.17 %"),
+    (0, 90, 10, "stable in none of 100 devices and undecided in 10", "at most 17.62 %"),
+]
+
+
+@pytest.mark.parametrize(("stable", "unstable", "undecided", "known", "part"), UNDECIDED_IN_SOME)
+def test_a_wall_that_is_undecided_in_some_devices_says_in_how_many(
+    folder, stable, unstable, undecided, known, part
+):
+    found = run_tolerances(study(folder, MASS, indices=0))
+    n = [one.name for one in found.question.columns].index("wall_is_stable")
+    values, status = found.cells.values.copy(), found.cells.status.copy()
+    values[:, n] = np.repeat([1.0, 0.0, np.nan], [stable, unstable, undecided])
+    status[:, n] = np.repeat([OK, OK, UNDECIDED], [stable, unstable, undecided])
+    some = replace(found, cells=replace(found.cells, values=values, status=status))
+    place = "the wall 62.00 kN/m at 90.00 Ns/m"
+    assert wall_sentence(some) == f"{place} is {known}, {ON_THE_LIMIT}: in {part} of those that are produced"
+    assert f"undecided in {undecided} devices" in repr(some)
+    labels = [text.get_text() for text in some.plot().get_legend().get_texts()]
+    assert any(label.endswith(f"undecided in {undecided} of 100 devices") for label in labels)
+
+
 def test_without_a_wall_the_spread_of_the_stiffness_says_what_to_tighten(folder):
     told = lines(study(folder, wall="", indices=512))
     assert (
@@ -140,6 +181,28 @@ def test_devices_without_a_stable_wall_are_told(folder):
         in told
     )
     assert found["outcomes"] == {"with a stable wall": 100 - none, "without a stable wall": none}
+
+
+def test_a_distribution_is_cut_off_where_no_device_can_be_and_what_is_left_of_it_is_said(folder):
+    wide = '[[tolerance]]\nkey = "plant.mass_kg"\ndistribution = "normal"\nstandard_deviation = 0.06\n'
+    told = lines(study(folder, wide, indices=0))
+    assert "plant.mass_kg normal about 0.1 kg, standard deviation 0.06 kg, cut off below 1e-12 and" in told
+    assert "above 0.34 (4.782 %)" in told
+    left = stats.truncnorm(-0.1 / 0.06, 4.0, 0.1, 0.06)
+    assert (
+        f"plant.mass_kg: 4.782 % of its distribution is cut off; what is drawn has a mean of {left.mean():.3g} kg "
+        f"and a standard deviation of {left.std():.3g} kg"
+    ) in told
+    assert not any("could not be built" in line for line in told)
+    assert not any("is cut off" in line for line in lines(study(folder, wide.replace("0.06", "0.02"), indices=0)))
+
+
+def test_a_distribution_that_no_device_can_have_is_refused_before_any_is_drawn(folder):
+    (line,) = refusal_lines("tolerance", study(folder, MASS.replace("20", "200"), indices=0))
+    assert line == (
+        "series.toml: tolerance.0.plus_minus_percent: leads to values of 'plant.mass_kg' from -0.1 to 0.3; it "
+        "must be greater than 0, got -0.1; give plus_minus_percent = 99.99 or less"
+    )
 
 
 def test_a_band_without_a_wall_is_none(folder):

@@ -97,7 +97,7 @@ def function_results(point, arms):
             stiffness=1000.0,
             damping=5.0,
             samples=72,
-            index_samples=16,
+            index_samples=32,
         ),
         "best designs": zwidth.study.optimise(study_of(BEST_DESIGNS, bounds=True), workers=1),
         "designs": zwidth.run_study(study_over(device(), designs, "stiffness_max")),

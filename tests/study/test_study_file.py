@@ -109,6 +109,13 @@ def test_an_element_of_a_symmetric_matrix_takes_its_mirror_image_along():
     assert design(found, 0) == {"plant.stiffness_N_per_m.0.1": -15000.0, "plant.stiffness_N_per_m.1.0": -15000.0}
 
 
+def test_a_coordinate_of_a_point_takes_no_other_along():
+    for key in ("points_m.0.1", "points_m.1.2", "points_m.1.0"):
+        path = f"legs.leg.loops.parallelogram.{key}"
+        found = study(axis(path, 0.01), device="novint-falcon")
+        assert design(found, 0) == {path: 0.01}
+
+
 def test_keys_that_the_file_leaves_out_can_be_varied():
     assert "delay_samples" not in load(FIVE_BAR).document["loop"]
     assert study(DELAY).sampling.count == 2

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from zwidth.chart.verdict import judge
+from zwidth.device import address
 from zwidth.device.load import from_document, load
 from zwidth.study.robust.family import Family, FamilyMember, Range, RangeError
 from zwidth.study.robust.robust_study import RobustError, robust_study, sample_walls
@@ -168,6 +169,14 @@ def test_a_number_off_the_diagonal_moves_with_its_mirror_image():
     one = Range("plant.stiffness_N_per_m.0.1", -16000.0, -15620.0)
     document = family(load("published-two-mass"), one).document(FamilyMember(0, (0.5,)))
     assert document["plant"]["stiffness_N_per_m"][0][1] == document["plant"]["stiffness_N_per_m"][1][0] == -15810.0
+
+
+def test_a_coordinate_of_a_loops_point_moves_alone():
+    device = load("novint-falcon")
+    path = "mechanism.legs.leg.loops.parallelogram.points_m.0.1"
+    value = address.get(device.document, path)
+    document = family(device, Range(path, value, value + 1e-4)).document(FamilyMember(0, (1.0,)))
+    assert document == address.assign(device.document, path, value + 1e-4)
 
 
 @pytest.mark.parametrize(

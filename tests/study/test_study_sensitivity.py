@@ -250,6 +250,12 @@ def test_a_symmetric_matrix_stays_symmetric():
     assert found["plant.mass_kg.0.1"] == pytest.approx(np.log(moved[0] / moved[1]) / 0.002, abs=1e-6)
 
 
+def test_points_of_a_loop_are_no_symmetric_matrix():
+    numbers = sensitivities_of("phantom-premium-1.5").numbers
+    points = {one.path.partition("parallelogram.points_m.")[2] for one in numbers}
+    assert {"0.1", "1.0", "1.2"} <= points
+
+
 def test_numbers_that_say_where_are_left_out_and_named():
     found = sensitivities_of("five-bar")
     assert not any("reference" in n.path or "assemblies" in n.path for n in found.numbers)

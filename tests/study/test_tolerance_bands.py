@@ -48,6 +48,17 @@ def test_devices_are_counted_where_their_intervals_overlap():
     assert refined_dampings(coverage, [1], 5)[0] == 2.0
 
 
+def test_a_band_that_begins_above_the_first_line_is_followed_down_to_where_it_begins():
+    late = THREE.copy()
+    late[:, 0] = 0.0
+    coverage = Coverage(LINES, late)
+    assert [coverage.lowest(n) for n in (1, 3, 4)] == [1, 1, -1]
+    assert refined_dampings(coverage, [3], 2).tolist() == [5.0, 15.0]
+    much = np.concatenate([LINES[:1], LINES + 10.0])  # stiffest on the line above that where it begins
+    coverage = Coverage(much, np.concatenate([late[:, :1], THREE], axis=1))
+    assert refined_dampings(coverage, [3], 2).tolist() == [5.0, 15.0, 25.0]
+
+
 def test_a_device_stable_to_where_another_begins_counts_with_it():
     touching = np.array([[[(0.0, 1.0)]], [[(1.0, 2.0)]]])
     assert Coverage(LINES[:1], touching).pieces(0, 1) == ((0.0, 2.0),)

@@ -13,7 +13,9 @@ from zwidth.study.jobs.executor import run
 from zwidth.study.tolerances.band import Coverage
 from zwidth.study.tolerances.draws import drawn_values
 from zwidth.study.tolerances.edge_job import EdgeJob
+from zwidth.study.tolerances.indices import indices_of, sampled_shares
 from zwidth.study.tolerances.intervals import Interval, count_bounds
+from zwidth.study.tolerances.question import LEAST_INDEX_SAMPLES
 from zwidth.study.tolerances.question_arguments import question_over
 from zwidth.study.tolerances.result import ToleranceStudy
 from zwidth.study.tolerances.tolerance_study import _measured, _tightened
@@ -52,6 +54,30 @@ def share_above(T: np.ndarray, least: np.ndarray, narrow_mass: float = 1.0, narr
     inside = np.interp(PERIOD + narrow_period * (T - PERIOD), T, least)
     half = 0.2 * narrow_mass * MASS
     return float(np.clip((MASS + half - inside) / (2.0 * half), 0.0, 1.0).mean())
+
+
+def total_indices_held(samples: int, seeds: int = 200) -> np.ndarray:
+    """How often the interval of each total index holds it, of an outcome that is 1 where all of three numbers are
+    good, independently of each other with the probabilities p: T = (1 - p) / (1 - p1 p2 p3)."""
+    p = np.array([0.95, 0.9, 0.97])
+    truth = (1.0 - p) / (1.0 - p.prod())
+    held = np.zeros(len(p))
+    for seed in range(seeds):
+        outcome = (sampled_shares(len(p), samples, seed) < p).all(axis=1).astype(float)
+        found = indices_of("y", "", outcome, ["a", "b", "c"], seed)
+        held += [holds(one.total, T) for one, T in zip(found.indices, truth, strict=True)]
+    return held / seeds
+
+
+def test_the_fewest_base_samples_that_are_allowed_hold_indices_and_half_of_them_do_not():
+    assert total_indices_held(LEAST_INDEX_SAMPLES).min() > 0.9
+    assert total_indices_held(LEAST_INDEX_SAMPLES // 2).min() < 0.7
+
+
+def test_an_index_of_a_single_base_sample_is_a_point():
+    outcome = sampled_shares(2, 1, 3).sum(axis=1)
+    for one in indices_of("y", "", outcome, ["a", "b"], 3).indices:
+        assert one.total.high - one.total.low < 1e-12
 
 
 @pytest.mark.slow

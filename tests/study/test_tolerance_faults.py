@@ -56,7 +56,8 @@ WRONG = [
     ),
     (
         one("damping.mode_ratio", "uniform", low=0.1, high=3.0),
-        "high: leads to values of 'damping.mode_ratio' from 0.1 to 3; it must be at least 0 and at most 2",
+        "high: leads to values of 'damping.mode_ratio' from 0.1 to 3; it must be at most 2, got 3; give high = "
+        "2 or less",
     ),
     (
         one("damping.mode_ratio", low=-3.0, high=-2.0),
@@ -124,6 +125,17 @@ WRONG_STUDIES = [
     ({"draw": {"quantiles_percent": []}}, "draw.quantiles_percent: must have at least 1 element"),
     ({"draw": {"seed": -1}}, "draw.seed: must be at least 0, got -1"),
     ({"draw": {"index_samples": 100}}, "draw.index_samples: must be a power of 2, got 100; give 64 or 128"),
+    ({"draw": {"index_samples": 33}}, "draw.index_samples: must be a power of 2, got 33; give 32 or 64"),
+    *(
+        (
+            {"draw": {"index_samples": few}},
+            f"draw.index_samples: must be at least 32, or 0 for no indices, got {few}: intervals of so few do not "
+            "hold the truth",
+        )
+        for few in (1, 2, 3, 16, 31)
+    ),
+    ({"draw": {"index_samples": 32}}, None),
+    ({"draw": {"index_samples": 0}}, None),
     ({"draw": {"sample": 100}}, "draw.sample: is not a key of [draw]; did you mean 'samples'?"),
     ({"draw": 7}, "draw: must be a table, got 7"),
     ({"seed": 2}, "seed: is read with sampling = 'latin-hypercube' only"),
@@ -191,6 +203,10 @@ def test_too_many_devices_are_refused_before_any_is_drawn():
 
 def test_arguments_are_called_by_their_names():
     device = zwidth.load("five-bar")
+    with pytest.raises(
+        DeviceError, match=r"^index_samples: must be at least 32, or 0 for no indices, got 2: inter"
+    ):
+        tolerance(device, {LENGTH: uniform(3.0)}, index_samples=2)
     with pytest.raises(DeviceError) as raised:
         tolerance(device, {LENGTH: {"distribution": "normal"}, "nmae": uniform(3.0)}, stiffness=3.0, samples=10)
     assert list(map(str, raised.value.faults)) == [

@@ -9,6 +9,7 @@ import pytest
 
 import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least_mass, radius, uniform
+from zwidth.show.figures.tolerance import band_path
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.series import JobSeries
 from zwidth.study.tolerances.draws import UNSEEN, shares_of
@@ -67,6 +68,19 @@ def test_a_band_is_the_chart_of_the_mass_that_so_many_devices_exceed(found):
                 assert low < size or radius(mass, PERIOD, low + size, B) < 1.0
                 inside += 1
         assert inside > 10
+
+
+def test_bands_of_a_free_mass_are_drawn_down_to_where_they_begin(found):
+    masses = np.sort(drawn_masses(400))[::-1]
+    for band in found.bands:
+        path, mass = band_path(band), masses[band.members - 1]
+        for B in np.array([5e-4, 1e-3, 1e-2, 1e-1]) * band.dampings[-1]:
+            low, high = 0.0, STIFFEST * mass / PERIOD**2
+            for _ in range(60):
+                K = 0.5 * (low + high)
+                low, high = (K, high) if radius(mass, PERIOD, K, B) < 1.0 else (low, K)
+            assert path.contains_point((0.97 * low, B)), (band.probability, B)
+            assert not path.contains_point((1.03 * low, B)), (band.probability, B)
 
 
 def test_a_band_counts_devices_by_eigenvalues_where_regions_are_not_nested():
@@ -237,7 +251,7 @@ class Finished:
 
 
 def test_the_same_question_has_the_same_answer_bit_for_bit_whoever_computes_and_from_where(tmp_path):
-    question = tolerance(free_mass(), BOTH, **WALL, samples=72, index_samples=16).question
+    question = tolerance(free_mass(), BOTH, **WALL, samples=72, index_samples=32).question
     whole = json.dumps(run_tolerances(question).document())
     compute = JobSeries(tmp_path / "kept").compute
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from zwidth.show.output import printable
 from zwidth.show.units import amount, number, percent, typed
+from zwidth.study.tolerances.outcomes import STABLE
 
 if TYPE_CHECKING:
     from zwidth.study.tolerances.band import BandWall
@@ -15,11 +16,12 @@ if TYPE_CHECKING:
     from zwidth.study.tolerances.result import ToleranceStudy
     from zwidth.study.tolerances.tolerance import Tolerance
 
+MUCH_CUT: Final = 0.01  # share of a distribution that is cut off, and said to be
+
 WORDS = {
     "failed": "could not be built",
     "out of reach": "do not get to the handle's position",
     "singular": "are singular there",
-    "undecided": "lie on the stability limit as far as rounding tells",
     "no value": "have no value",
 }
 
@@ -48,6 +50,19 @@ def _written(value: float) -> str:
     return f"{value:.4g}"
 
 
+def cut_sentences(tolerances: Sequence[Tolerance]) -> Iterator[str]:
+    """Which distributions lose so much by being cut off that what is drawn differs from what was given."""
+    for one in tolerances:
+        law = one.distribution
+        if law.cut_off > MUCH_CUT:
+            mean, deviation = law.moments
+            unit = f" {one.unit}" if one.unit else ""
+            yield (
+                f"{one.key}: {typed(percent(law.cut_off))} of its distribution is cut off; what is drawn has a "
+                f"mean of {mean:.3g}{unit} and a standard deviation of {deviation:.3g}{unit}"
+            )
+
+
 def wall_sentence(result: ToleranceStudy) -> str:
     """The probability of the wanted wall; or what to give for it."""
     share, wall = result.probability, result.question.study.wall
@@ -56,6 +71,8 @@ def wall_sentence(result: ToleranceStudy) -> str:
             "no wall is wanted: give stiffness_N_per_m and damping_Ns_per_m for the probability that it is stable"
         )
     shown = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    if result.undecided:
+        return _undecided_sentence(result, shown, share)
     if share.value == 1.0:
         least = typed(percent(share.low))
         return f"the wall {shown} is stable in all of them, so in at least {least} of all that are produced"
@@ -65,9 +82,26 @@ def wall_sentence(result: ToleranceStudy) -> str:
     return f"the wall {shown} is stable in {share_text(share)} of those that are produced"
 
 
+def _undecided_sentence(result: ToleranceStudy, shown: str, share: Interval) -> str:
+    """The sentence of a wall that lies on the stability limit of some devices, as far as rounding tells."""
+    count, many = result.question.samples, result.undecided
+    within = "within rounding of the stability limit"
+    if many == count:
+        return f"the wall {shown} is undecided in all of them, {within}: its probability is not known"
+    stable = result.outcomes.get(STABLE, 0)
+    known = f"stable in {stable or 'none'} of {count} devices and undecided in {many}, {within}"
+    low, high = typed(percent(share.low)), typed(percent(share.high))
+    between = f"{typed(number(100.0 * share.low))} to {high}" if stable else f"at most {high}"
+    part = f"at least {low}" if share.high == 1.0 else between
+    return f"the wall {shown} is {known}: in {part} of those that are produced"
+
+
 def outcome_sentences(result: ToleranceStudy) -> Iterator[str]:
     """Devices that are neither stable nor unstable, and those without any stable wall."""
     count = result.question.samples
+    if result.undecided and not result.question.has_wall:  # of a wall its own sentence tells it
+        charts = f"{result.undecided} of {count} devices have a chart that rounding leaves undecided"
+        yield f"{charts}; they are left out of the largest stiffness"
     for name, many in result.outcomes.items():
         if name in WORDS or name in result.without_answer:
             what = WORDS.get(name, f"have the status {name}")
@@ -136,6 +170,11 @@ def advice_sentence(result: ToleranceStudy) -> str:
             f"every one of {result.question.samples} devices renders the wall: nothing is to be tightened for it"
         )
     best = result.best_to_tighten
+    if not best and result.undecided:
+        return (
+            "which tolerance to tighten first is not known, for the wall lies on the stability limit: want one "
+            "that lies away from it"
+        )
     if not best:
         if result.tightened[0].gain.high < 0.0 or all(one.gain.value <= 0.0 for one in result.tightened):
             return (

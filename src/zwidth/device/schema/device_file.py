@@ -136,6 +136,19 @@ def may_be_zero(path: tuple[str | int, ...]) -> bool:
     return any(one.get("ge", one.get("minimum")) == 0 for one in numbers)
 
 
+def in_symmetric_matrix(path: tuple[str | int, ...]) -> bool:
+    """Whether a path leads to an element of a symmetric matrix: of a list of lists for which one number may stand.
+
+    >>> in_symmetric_matrix(("plant", "mass_kg", 0, 1))
+    True
+    >>> in_symmetric_matrix(("mechanism", "loops", 0, "points_m", 0, 1))
+    False
+    """
+    if len(path) < 3 or not isinstance(path[-1], int) or not isinstance(path[-2], int):
+        return False
+    return any(kind.get("type") == "number" for kind in subschemas(path[:-2]))
+
+
 def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
     if isinstance(part, int):
         if isinstance(subschema.get("items"), dict):

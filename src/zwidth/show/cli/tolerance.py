@@ -20,6 +20,7 @@ from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.tolerance_text import (
     advice_sentence,
     band_rows,
+    cut_sentences,
     index_rows,
     narrower_rows,
     no_index_sentences,
@@ -148,6 +149,7 @@ class ToleranceCommand(Command):
             [one.key, tolerance_text(one), ", ".join(tie.key for tie in one.ties)] for one in question.tolerances
         ]
         yield table(["tolerance", "distribution", "goes with it"], rows)
+        yield from cut_sentences(question.tolerances)
         yield from outcome_sentences(result)
         if result.reason is not None:
             return

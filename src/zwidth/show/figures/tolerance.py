@@ -70,6 +70,8 @@ def draw_bands(ax: Axes, result: ToleranceStudy) -> None:
     wall = result.question.study.wall
     if wall.stiffness is not None and wall.damping is not None and result.probability is not None:
         text = f"wanted wall: stable in {_share(result.probability)}"
+        if result.undecided:
+            text += f", undecided in {result.undecided} of {result.question.samples} devices"
         _mark(ax, wall.stiffness, wall.damping, "D", VERMILION, text)
     frame(ax, _view(result), empty=not any(any(band.pieces) for band in bands))
     legend_above(ax)

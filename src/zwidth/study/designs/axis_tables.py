@@ -333,18 +333,13 @@ def ties_of(
 
 
 def mirrored(document: dict[str, Any], key: str) -> str | None:
-    """Path of an element's mirror image in a matrix; None for the diagonal, and for what stands in none.
+    """Path of an element's mirror image in a symmetric matrix; None for the diagonal, and for what stands in none.
 
     >>> mirrored({"plant": {"mass_kg": [[1.0, 0.0], [0.0, 1.0]]}}, "plant.mass_kg.0.1")
     'plant.mass_kg.1.0'
     """
     steps = address.resolve(document, key)
-    if (
-        len(steps) < 3
-        or not isinstance(steps[-1], int)
-        or not isinstance(steps[-2], int)
-        or steps[-1] == steps[-2]
-    ):
+    if not schema.in_symmetric_matrix(steps) or steps[-1] == steps[-2]:
         return None
     return dotted((*steps[:-2], steps[-1], steps[-2]), document)
 

@@ -117,7 +117,7 @@ class DrawSection(Section):
 
     samples: WholeNumber | None = documented_key("devices drawn; left out: 1000", ge=1, le=MOST, default=None)
     index_samples: WholeNumber | None = documented_key(
-        "base samples of the sensitivity indices, a power of 2, 0 for none; left out: 512",
+        "base samples of the sensitivity indices, a power of 2 from 32 on, 0 for none; left out: 512",
         ge=0,
         le=MOST_INDEX_SAMPLES,
         default=None,

@@ -185,7 +185,7 @@ class Family:
         for k, one in enumerate(self.ranges):
             steps = address.resolve(document, one.path)
             yield steps, k
-            if len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int):
+            if schema.in_symmetric_matrix(steps):
                 yield (*steps[:-2], steps[-1], steps[-2]), k
 
     def _columns(self, members: Sequence[FamilyMember], document: dict[str, Any]) -> list[DesignColumn]:

@@ -22,6 +22,7 @@ from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import device_of_point
+from zwidth.device.schema.device_file import in_symmetric_matrix
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
@@ -185,18 +186,18 @@ def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]])
     """Each number that can be varied, by its path; and the matrices and vectors of a plant, scaled as wholes."""
     for path, steps, value in varied:
         if not number_obstacle(steps, value):
-            yield path, Change(tuple(_places(document, steps, 1.0)), value, abs(value) or _scale(document, steps))
+            yield path, Change(tuple(_places(steps, 1.0)), value, abs(value) or _scale(document, steps))
     known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
     for name, paths in _groups(document).items():
         if name.startswith("plant."):
             parts = [known[path] for path in paths if path in known]
-            yield name, Change(tuple(place for part in parts for place in _places(document, *part)), 1.0, 1.0)
+            yield name, Change(tuple(place for part in parts for place in _places(*part)), 1.0, 1.0)
 
 
-def _places(document: dict[str, Any], steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
+def _places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
     """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
     yield steps, multiple
-    if _is_matrix(document, steps) and steps[-1] != steps[-2]:
+    if in_symmetric_matrix(steps) and steps[-1] != steps[-2]:
         yield (*steps[:-2], steps[-1], steps[-2]), multiple
 
 
@@ -204,7 +205,7 @@ def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
     """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
     and above the diagonal."""
     for steps, value in address.numbers(document):
-        if not _no_property(steps) and not _mirrored(document, steps):
+        if not _no_property(steps) and not _mirrored(steps):
             yield dotted(steps, document), steps, float(value)
     if not {"delay_samples", "delay_s"} & document.get("loop", {}).keys():
         yield "loop.delay_samples", ("loop", "delay_samples"), 0.0
@@ -224,13 +225,9 @@ def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield dotted(steps, document), reason
 
 
-def _mirrored(document: dict[str, Any], steps: KeyPath) -> bool:
-    """Whether the path is an element below the diagonal of a matrix."""
-    return _is_matrix(document, steps) and int(steps[-2]) > int(steps[-1])
-
-
-def _is_matrix(document: dict[str, Any], steps: KeyPath) -> bool:
-    return len(steps) > 2 and isinstance(steps[-1], int) and isinstance(steps[-2], int)
+def _mirrored(steps: KeyPath) -> bool:
+    """Whether the path is an element below the diagonal of a symmetric matrix."""
+    return in_symmetric_matrix(steps) and int(steps[-2]) > int(steps[-1])
 
 
 def _scale(document: dict[str, Any], steps: KeyPath) -> float:

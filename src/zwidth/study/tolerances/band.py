@@ -127,13 +127,18 @@ class Coverage:
         stiffness, at = self.largest(members)
         return BandWall(stiffness, float(self.dampings[at])) if at >= 0 else None
 
+    def lowest(self, members: int) -> int:
+        """The first of the dampings at which so many devices have a wall in common; -1 for none."""
+        return min((d for d in range(len(self.dampings)) if (self._depths[d] >= members).any()), default=-1)
+
     def topmost(self, members: int) -> int:
         """The last of the dampings at which so many devices have a wall in common; -1 for none."""
         return max((d for d in range(len(self.dampings)) if (self._depths[d] >= members).any()), default=-1)
 
 
 def refined_dampings(coverage: Coverage, counts: Sequence[int], pieces: int) -> Floats:
-    """Dampings between those of the lines: more about the largest stiffness of each count, and at the band's end.
+    """Dampings between those of the lines: more about the largest stiffness of each count, and at both ends of its
+    band, which would begin and end flat otherwise. Bands of a free mass begin in a point, with no damping.
 
     counts  numbers of devices whose bands are wanted
     pieces  into which each step is divided
@@ -141,9 +146,9 @@ def refined_dampings(coverage: Coverage, counts: Sequence[int], pieces: int) -> 
     B, steps = coverage.dampings, set[int]()
     for count in counts:
         _, at = coverage.largest(count)
-        top = coverage.topmost(count)
+        bottom, top = coverage.lowest(count), coverage.topmost(count)
         steps |= {at - 1, at} if at >= 0 else set()
-        steps |= {top} if top >= 0 else set()
+        steps |= {bottom - 1, top} if top >= 0 else set()
     inside = [step for step in sorted(steps) if 0 <= step < len(B) - 1]
     shares = np.arange(1, pieces) / pieces
     return np.concatenate([B[step] + shares * (B[step + 1] - B[step]) for step in inside] or [np.empty(0)])

@@ -129,7 +129,7 @@ def all_indices(columns: Sequence[Column], cells: CellValues, keys: Sequence[str
 
     Devices without an answer are never a nan among the outcomes, which would make every index nan: of the wall and
     the largest stiffness they are outcomes of their own, 0; of other measures there is then no index but one of
-    having a value, for leaving such devices out would bias it.
+    having a value, for leaving such devices out would bias it. A wall with undecided verdicts has none either.
     """
     return [
         indices_of(name, words, outcome, keys, seed) if not reason else Indices(name, words, (), reason)
@@ -146,7 +146,8 @@ def _outcomes(columns: Sequence[Column], cells: CellValues) -> Iterator[tuple[st
         undecided = int((status == UNDECIDED).sum())
         if column.name == WALL_IS_STABLE.name:
             words = "1 where the wanted wall is stable, else 0, also for devices that cannot be built or asked"
-            yield column.name, words, np.where(status == OK, values, 0.0), ""
+            none = f"{undecided} of {len(status)} verdicts are undecided" if undecided else ""
+            yield column.name, words, np.where(status == OK, values, 0.0), none
         elif column.name == STIFFNESS:
             has_wall = np.where(status == OK, 1.0, 0.0)
             none = f"{undecided} charts are undecided" if undecided else ""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.point_chart import chart_at
 from zwidth.device.faults import plural
-from zwidth.measures.definition import NO_VALUE, OK, STATUS
+from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
 from zwidth.result import Result
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.sweep import Sweep
@@ -37,7 +37,13 @@ if TYPE_CHECKING:
 
     from zwidth.chart.chart_base import Chart
 
-ASKED: Final = (STABLE, UNSTABLE, WITH_WALL, WITHOUT_WALL, "undecided")  # outcomes of devices that could be asked
+ASKED: Final = (
+    STABLE,
+    UNSTABLE,
+    WITH_WALL,
+    WITHOUT_WALL,
+    STATUS[UNDECIDED],
+)  # outcomes of devices that could be asked
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,6 +77,7 @@ class ToleranceStudy(Result):
             lines.append(
                 f"the wall {wall.stiffness:.6g} N/m, {wall.damping:.6g} N s/m is stable in {share.value:.1%} "
                 f"({share.low:.1%} to {share.high:.1%})"
+                f"{f', undecided in {self.undecided} devices' if self.undecided else ''}"
             )
         for band in self.bands[:1]:
             if band.stiffest is not None:
@@ -92,9 +99,12 @@ class ToleranceStudy(Result):
         """
         if not self.question.has_wall:
             return None
-        return share_interval(
-            self.outcomes.get(STABLE, 0), self.question.samples, self.outcomes.get("undecided", 0)
-        )
+        return share_interval(self.outcomes.get(STABLE, 0), self.question.samples, self.undecided)
+
+    @property
+    def undecided(self) -> int:
+        """Number of devices that render the wanted wall, or any wall, stably or not: rounding does not tell."""
+        return self.outcomes.get(STATUS[UNDECIDED], 0)
 
     @property
     def without_answer(self) -> dict[str, int]:

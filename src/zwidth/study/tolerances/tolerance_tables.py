@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf, isfinite, log
 from typing import Any, Final
 
@@ -16,11 +17,14 @@ from zwidth.study.designs.axis_tables import (
     Faults,
     SetNumbers,
     key_faults,
+    mirrored,
     overlap_faults,
     ties_of,
     unit_of,
 )
-from zwidth.study.designs.sampling import CIRCUMSTANCES
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Tie
+from zwidth.study.tolerances.beyond import beyond_faults
+from zwidth.study.tolerances.buildable import FaultsOf, faults_with, obstacle
 from zwidth.study.tolerances.distribution import (
     CUT,
     SPAN_OF_95,
@@ -109,16 +113,40 @@ def _tolerance(
     if faults:
         return None
     value = address.get(device.document, key) if address.exists(device.document, key) else None
-    made = _distribution(table, key, float(value) if is_number(value) else None, device.document, faults)
+    own = float(value) if is_number(value) else None
+    made = _distribution(table, key, own, device.document, faults)
     if made is None or faults:
         return None
     distribution, relative = made
+    path = dotted(address.resolve(device.document, key), device.document)
+    mirror = mirrored(device.document, key)  # an element of a symmetric matrix has no value of its own
+    alone = faults_with(device.document, key, () if mirror is None else (Tie(mirror),))
+    distribution = _cut_at_obstacles(distribution, path, alone)
+    faults += beyond_faults(key, path, own, _width_key(table), distribution, alone)
+    if faults:
+        return None
     drawn = {"key": key, "values": [distribution.low, distribution.high], "tie": table.get("tie")}
     ties = tuple(ties_of(drawn, key, device, taken, faults, KIND))
-    steps = address.resolve(device.document, key)
-    return Tolerance(
-        key, dotted(steps, device.document), distribution, relative, unit_of(device.document, key), ties
-    )
+    if ties and not faults:
+        together = faults_with(device.document, key, ties)
+        faults += beyond_faults(key, path, own, _width_key(table), distribution, together)
+    return Tolerance(key, path, distribution, relative, unit_of(device.document, key), ties)
+
+
+def _cut_at_obstacles(law: Distribution, path: str, faults_at: FaultsOf) -> Distribution:
+    """The distribution, cut off besides where the number alone is too small or too large for any device.
+
+    path  of the number in full
+    """
+    if law.kind not in WITH_TAILS or faults_at(law.middle):
+        return law
+    ends = [law.low, law.high]
+    for n, end in enumerate(ends):
+        found = obstacle(faults_at, law.middle, end)
+        if found is not None and found.is_of(path):
+            ends[n] = found.last
+    low, high = ends
+    return replace(law, low=low, high=high) if low < high else law
 
 
 def _key_fault(document: dict[str, Any], key: str) -> str:
@@ -144,7 +172,7 @@ def _distribution(
     value  the number in the device file; None: it has none
     """
     kind = table.get("distribution")
-    width_key = next((one for one in WIDTH_KEYS if one in table), "")
+    width_key = _width_key(table)
     numbers = [table[one] for one in (*WIDTH_KEYS, "cut_at_deviations") if one in table]
     if kind not in WIDTHS or not width_key or not all(is_number(one) and isfinite(one) for one in numbers):
         return None
@@ -168,8 +196,13 @@ def _distribution(
     if kind in WITH_TAILS:
         made = _with_tails(table, kind, key, middle, limits, faults)
     else:
-        made = _bounded(table, kind, key, middle, limits, faults)
+        made = _bounded(table, kind, key, middle, faults)
     return None if made is None else (made, width_key in PERCENT or kind == "lognormal")
+
+
+def _width_key(table: dict[str, Any]) -> str:
+    """The first of the keys that give the width; "" for none."""
+    return next((one for one in WIDTH_KEYS if one in table), "")
 
 
 def _with_tails(
@@ -196,24 +229,21 @@ def _with_tails(
         deviation = table["standard_deviation"] if percent is None else abs(value) * percent / 100.0
     made = (lognormal if kind == "lognormal" else normal)(middle, deviation, limits, cut)
     if not made.low <= middle <= made.high or not made.low < made.high:
-        faults.append((("low",), f"and high have their middle at {middle:.6g}, which '{key}' may not be"))
+        message = f"and high have their middle at {middle:.6g}, which '{key}' may not be; {_allowed(limits)}"
+        faults.append((("low",), message))
         return None
     return made
 
 
-def _bounded(
-    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: Faults
-) -> Distribution | None:
-    """A uniform or triangular distribution, whose ends are values that the number may have."""
+def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: Faults) -> Distribution | None:
+    """A uniform or triangular distribution."""
     low, high = table.get("low"), table.get("high")
     percent = table.get("plus_minus_percent")
     middle = value
     if low is None or high is None:
         width = table["plus_minus"] if percent is None else abs(value) * percent / 100.0
         low, high = value - width, value + width
-        shown = "plus_minus" if percent is None else "plus_minus_percent"
     else:
-        shown = "low" if low < limits.lowest else "high"
         middle = value if kind == "triangular" else 0.5 * (low + high)
         if not low <= middle <= high:
             message = (
@@ -222,9 +252,6 @@ def _bounded(
             faults.append((("low",), message))
             return None
     low, high = float(low), float(high)
-    if low < limits.lowest or high > limits.highest:
-        faults.append(((shown,), f"leads to values of '{key}' from {low:.6g} to {high:.6g}; {_allowed(limits)}"))
-        return None
     return Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
 
 
