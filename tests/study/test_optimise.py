@@ -168,6 +168,28 @@ def test_two_runs_into_one_folder_are_not_mixed(tmp_path):
     assert optimise(study, tmp_path / "kept", workers=1).values.tobytes() == first.values.tobytes()
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"budget": 21},
+        {"seed": 2},
+        {"front": 3},
+        {"constraints": {"rigid_mass": "<= 9"}},
+        {"set": ["loop.delay_samples=1"]},
+    ],
+)
+def test_another_study_is_refused_before_anything_is_computed(tmp_path, change):
+    given = {"objectives": {"stiffness_max": "max"}, "budget": 20}
+    first = optimise(problem_study(RATIO, **given), tmp_path / "kept", workers=1)
+    wider = axis(RATIO["key"], range=[8.0, 31.0], tie=RATIO["tie"])
+    told = []
+    for other in (problem_study(RATIO, **(given | change)), problem_study(wider, **given)):
+        with pytest.raises(StoreError, match=rf"^{tmp_path}/kept: keeps the finished work of another study; name"):
+            optimise(other, tmp_path / "kept", lambda *now: told.append(now), workers=1)
+    assert told == []
+    assert optimise(problem_study(RATIO, **given), tmp_path / "kept").values.tobytes() == first.values.tobytes()
+
+
 def test_random_designs_nearby_and_anywhere_do_not_dominate_the_front(front):
     random = np.random.default_rng(11)
     costs = front.judgement.costs(front.problem)[front.front]

@@ -20,6 +20,7 @@ from zwidth.progress import Progress
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_file import read_study
 from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.notes import merge_notes
 from zwidth.study.jobs.series import JobSeries
 from zwidth.study.optimise.evaluation import LARGEST, EvaluationJob, Judge, Judgement
@@ -77,6 +78,8 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
     """The same, computed by a series of jobs."""
     problem = problem_of(study)
     archive = _Archive(problem, series)
+    if series.folder is not None:
+        series.begin(archive.question)
     baseline = archive.baseline()
     start = _start(problem)
     alone = len(problem.objectives) == 1
@@ -126,6 +129,25 @@ class _Archive:
         self._places: dict[bytes, int] = {}  # of a design's shares
         self._jobs = 0
         self.notes: dict[str, list[Note]] = {column.name: [] for column in problem.columns}
+
+    @property
+    def question(self) -> str:
+        """Fingerprint of all that the jobs follow from: the variables with their bounds, what the designs are
+        judged by, and how they are searched."""
+        problem = self.problem
+        (middle,) = values_at(problem.variables, np.full((1, len(problem.variables)), 0.5))
+        return fingerprint(
+            "optimisation",
+            self.judging.job([middle]).question,
+            problem.variables,
+            problem.objectives,
+            problem.demands,
+            problem.members,
+            problem.tolerances,
+            problem.budget,
+            problem.seed,
+            problem.front,
+        )
 
     @property
     def hopeless(self) -> bool:
