@@ -93,6 +93,43 @@ def test_files_and_keys(folder):
         assert sources["plant.mass_kg"] == f"optimised, study plant.toml, seed 1, design {n}"
 
 
+def names(of: str) -> list[str]:
+    return sorted(path.name for path in Path(of).iterdir())
+
+
+def test_designs_take_the_place_of_those_of_the_same_study_alone(folder):
+    document_of("optimise", "plant.toml", "--designs", "better")
+    assert len(names("better")) > 2
+    Path("better/notes.txt").write_text("mine")
+    (folder / "plant.toml").write_text(WALL + changed(PLANT, "front = 5", "front = 2"))
+    document_of("optimise", "plant.toml", "--designs", "better")
+    assert names("better") == ["hapkit-course-1.toml", "hapkit-course-2.toml", "notes.txt"]
+    before = {path: path.read_bytes() for path in Path("better").iterdir()}
+    (folder / "other.toml").write_text(WALL + PLANT)
+    (line,) = refusal_lines("optimise", "other.toml", "--designs", "better")
+    said = "which this study has not written; name another folder, or move them away"
+    assert line == f"better: holds hapkit-course-1.toml, hapkit-course-2.toml, {said}"
+    assert {path: path.read_bytes() for path in Path("better").iterdir()} == before
+
+
+def test_designs_without_a_number_are_known_again(folder):
+    (folder / "assemblies.toml").write_text(
+        'device = "five-bar"\n[[axis]]\nkey = "assembly"\nvalues = ["elbows-in", "elbows-out"]\n'
+        '[optimise]\nobjectives = { stiffness_max = "max" }\n'
+    )
+    for _ in range(2):
+        document_of("optimise", "assemblies.toml", "--designs", "better")
+        assert names("better") == ["five-bar-1.toml"]
+
+
+def test_a_device_file_of_one_s_own_is_not_written_over(folder):
+    own = Path("hapkit-course-4.toml")
+    own.write_text("# by hand\n")
+    (line,) = refusal_lines("optimise", "plant.toml", "--designs", ".")
+    assert line == f".: holds {own}, which this study has not written; name another folder, or move it away"
+    assert own.read_text() == "# by hand\n"
+
+
 @pytest.mark.parametrize("kind", ["csv", "svg", "html"])
 def test_other_files(folder, kind):
     ran = run_command("optimise", "plant.toml", "--output", f"front.{kind}")
