@@ -34,7 +34,7 @@ def _designs_option(command: Callback) -> Callback:
         "--designs",
         metavar="FOLDER",
         callback=refuse_empty,
-        help="Write a device file for each design of the front into this folder; replaces those of an earlier run.",
+        help="Write a device file for each design of the front into this folder, replacing earlier ones.",
     )
     decorated: Callback = option(command)
     return decorated
