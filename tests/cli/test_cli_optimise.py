@@ -223,9 +223,23 @@ def test_finished_work_of_another_study_is_refused_at_the_start(folder):
         ('stiffness_max = "max"', 'stifness_max = "max"', "optimise.objectives.stifness_max: no measure is named"),
         ("budget = 60", "budget = 6", "budget: must be at least 20 designs, got 6"),
         ("[optimise]", "[optimize]", "optimize: is not a key of a study file; did you mean 'optimise'?"),
-        (WALL, "", "optimise: spectral_radius needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m"),
+        (
+            WALL,
+            "",
+            "optimise.objectives.spectral_radius: spectral_radius needs a wanted wall; give stiffness_N_per_m and ",
+        ),
         ('{ stiffness_max = "max", spectral_radius = "min" }', "{}", "objectives"),
-        ('stiffness_max = "max"', 'isotropy = "min"', "optimise: isotropy needs a [mechanism]"),
+        (
+            'stiffness_max = "max"',
+            'isotropy = "min"',
+            "optimise.objectives.isotropy: isotropy needs a [mechanism]",
+        ),
+        (
+            "[optimise]",
+            "[task]\nclearance_m = 0.01\n[optimise]",
+            "plant.toml: task.clearance_m: worst(link_cl",
+        ),
+        ("front = 5", "constraints = { reach = '<= 1' }", "plant.toml: optimise.constraints.reach: reach needs a"),
     ],
 )
 def test_what_is_refused(folder, old, new, line):

@@ -119,11 +119,11 @@ class Optimisation(Result):
         first = records[0]
         column = self.problem.columns[first.demand.column]
         if np.isnan(first.best):
-            return self._nowhere(first.demand.column, f"no design keeps {first.demand.text}: it has no value")
+            return self._nowhere(first.demand.column, f"no design keeps {first.demand.full_text}: it has no value")
         if not first.kept:
             best = f"{first.best:.6g} {column.unit}".rstrip()
-            return f"no design keeps {first.demand.text}, the best of {len(self.shares)} has {best}"
-        each = "; ".join(f"{one.demand.text} is kept by {one.kept:.1%}" for one in records)
+            return f"no design keeps {first.demand.full_text}, the best of {len(self.shares)} has {best}"
+        each = "; ".join(f"{one.demand.full_text} is kept by {one.kept:.1%}" for one in records)
         return f"no design keeps all demands together: {each}"
 
     def _nowhere(self, column: int, sentence: str) -> str:

@@ -65,8 +65,7 @@ def optimise(
     cluster   address of a dask scheduler, or "local"
     time_limit  s that a design may take; one that takes longer has no values
     Returns   the front, the baseline and how they were found; equal for equal studies, however it was divided
-    Raises    DeviceError   with all faults of the study
-              MeasureError  for measures that do not exist for this device
+    Raises    DeviceError  with all faults of the study, measures that do not exist for this device among them
               what `executor.run` and `Store` raise
     """
     read = study if isinstance(study, Study) else read_study(study, bounds=True)

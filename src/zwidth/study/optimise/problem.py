@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from zwidth.device.faults import DeviceError
+from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.load import in_order
 from zwidth.device.toml_access import table
 from zwidth.measures.definition import Better
@@ -48,6 +48,7 @@ class Demand:
     """A bound that a column has to keep.
 
     key       as it stands in the study: a key of [task], or a measure of [optimise.constraints]
+    of_task   whether it is the former
     column    its place among the problem's columns
     at_least  whether it is a lower bound
     """
@@ -56,6 +57,7 @@ class Demand:
     column: int
     at_least: bool
     bound: float
+    of_task: bool = False
 
     @property
     def sign(self) -> float:
@@ -67,6 +69,11 @@ class Demand:
         """The demand as a reader writes it: "rigid_mass <= 0.3"."""
         return f"{self.key} {'>=' if self.at_least else '<='} {self.bound:g}"
 
+    @property
+    def full_text(self) -> str:
+        """The same with the table that the key stands in: "task.apparent_mass_kg <= 0.3"."""
+        return f"task.{self.text}" if self.of_task else self.text
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -74,6 +81,7 @@ class Problem:
 
     study       device, variables, task and circumstances
     columns     what each design is judged by
+    paths       key of the study that asks for each of them, the first that does
     budget      designs to try
     front       designs of the front to keep, at most
     members     the circumstances in which each design is judged, such as who holds it: path -> value of each
@@ -83,6 +91,7 @@ class Problem:
 
     study: Study
     columns: tuple[Column, ...]
+    paths: tuple[KeyPath, ...]
     objectives: tuple[Objective, ...]
     demands: tuple[Demand, ...]
     budget: int
@@ -117,9 +126,10 @@ def problem_of(study: Study) -> Problem:
     ):
         study = replace(study, wall=replace(study.wall, force=held))
     columns: list[Column] = []
+    paths: list[KeyPath] = []
     overall = study.task is not None
 
-    def place(name: str, better: Better, path: tuple[str | int, ...]) -> int | None:
+    def place(name: str, better: Better, path: KeyPath) -> int | None:
         try:
             column = column_named(name, study.user_measures, better)
         except ValueError as error:
@@ -140,6 +150,7 @@ def problem_of(study: Study) -> Problem:
             column = replace(column, measure=column.measure.about_moments())
         if column not in columns:
             columns.append(column)
+            paths.append(path)
         return columns.index(column)
 
     objectives = []
@@ -151,7 +162,7 @@ def problem_of(study: Study) -> Problem:
     for key, bound in (study.task.demands if study.task is not None else {}).items():
         measure, at_least = DEMANDS[key]
         at = place(measure, "higher" if at_least else "lower", ("task", key))
-        demands += [] if at is None else [Demand(key, at, at_least, bound)]
+        demands += [] if at is None else [Demand(key, at, at_least, bound, True)]
     for name, text in table(given, "constraints").items():
         path = ("optimise", "constraints", name)
         parts = _BOUND.fullmatch(text) if isinstance(text, str) else None
@@ -177,6 +188,7 @@ def problem_of(study: Study) -> Problem:
     return Problem(
         study,
         tuple(columns),
+        tuple(paths),
         tuple(objectives),
         tuple(demands),
         int(budget),
