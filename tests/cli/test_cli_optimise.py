@@ -170,6 +170,63 @@ def test_sentences_follow_the_study(folder, old, new, before, after):
     assert after is None or after in second
 
 
+HEAVY = """
+import time
+from zwidth import measure
+
+@measure(unit="kg", better="lower")
+def felt(place):
+    mass = float(place.measure("rigid_mass"))
+    if mass > 0.08:
+        {}
+    return mass
+"""
+
+
+def heavy_study(folder, what: str, **changes: str) -> None:
+    """A study of which a measure does something where the mass is large."""
+    (folder / "own.py").write_text(HEAVY.format(what))
+    text = 'measures_file = "own.py"\n' + changed(WALL + PLANT, 'spectral_radius = "min"', 'felt = "min"')
+    text = changed(text, "budget = 60", "budget = 20")
+    for old, new in changes.items():
+        text = changed(text, old, new)
+    (folder / "plant.toml").write_text(text)
+
+
+def test_designs_that_fail_are_counted_with_the_reason(folder):
+    heavy_study(folder, "raise OverflowError('too heavy')")
+    document = document_of("optimise", "plant.toml")
+    (lost,) = document["not_judged"]
+    assert lost["status"] == "failed"
+    assert lost["reason"] == "raised OverflowError: too heavy"
+    said = f"{lost['designs']} of 15 designs failed: raised OverflowError: too heavy"
+    assert 1 <= lost["designs"] < 15
+    assert said in run_command("optimise", "plant.toml", "--output", "page.html").out
+    assert said in Path("page.html").read_text()
+    heavy_study(folder, "raise OverflowError('too heavy')", **{"=unset": '=unset", "plant.mass_kg=0.09'})
+    assert "the device as it is failed" in run_command("optimise", "plant.toml").out
+    heavy_study(folder, "raise OverflowError('too heavy')", **{"[0.02, 0.1]": "[0.02, 0.07]"})
+    assert "failed" not in run_command("optimise", "plant.toml").out
+    heavy_study(folder, "raise OverflowError('too heavy')", **{"[0.02, 0.1]": "[0.081, 0.1]"})
+    ran = run_command("optimise", "plant.toml")
+    assert ran.code == 1
+    assert ran.out.endswith("felt has no value in any design tried (20 failed: raised OverflowError: too heavy)\n")
+
+
+def test_a_time_limit_is_kept_and_designs_given_up_stay_so(folder):
+    heavy_study(folder, "time.sleep(1.7)")
+    words = ["optimise", "plant.toml", "--workers", "2", "--resume", "kept"]
+    document = document_of(*words, "--time-limit", "0.2")
+    (lost,) = document["not_judged"]
+    assert lost["status"] == "out of time"
+    assert lost["reason"] == "took longer than 0.2 s"
+    assert all(design["plant.mass_kg"] <= 0.08 for design in document["designs"])
+    assert document_of(*words, "--time-limit", "100") == document
+    assert document_of(*words) == document
+    said = f"{lost['designs']} of 15 designs ran out of time: took longer than 0.2 s"
+    assert said in run_command(*words).out
+
+
 def test_an_unstable_wanted_wall_is_not_stable_in_simulation(folder):
     (folder / "plant.toml").write_text(WALL.replace("500.0", "90000.0") + PLANT)
     out = run_command("optimise", "plant.toml").out
@@ -226,7 +283,7 @@ def test_finished_work_of_another_study_is_refused_at_the_start(folder):
         (
             WALL,
             "",
-            "optimise.objectives.spectral_radius: spectral_radius needs a wanted wall; give stiffness_N_per_m and ",
+            "optimise.objectives.spectral_radius: spectral_radius needs a wanted wall; give stiffness_N_per_m",
         ),
         ('{ stiffness_max = "max", spectral_radius = "min" }', "{}", "objectives"),
         (

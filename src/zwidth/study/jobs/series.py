@@ -68,15 +68,19 @@ class JobSeries:
         self._stack, self._lock = ExitStack(), FolderLock()
         self._executor: Executor | None = None
         self._spent = 0.0  # s of computation
+        self._following = False  # whether jobs follow from the answers of those before, see `begin`
 
     def begin(self, question: str) -> None:
-        """Take the folder for one question, before its first job is computed; nothing where there is no folder.
+        """Take the folder for one question whose jobs follow from the answers of those before them; to be called
+        before the first. Cells that are out of time there stay so under any limit, or other jobs would follow than
+        those that are there.
 
         question  fingerprint of all that the jobs follow from
         Raises    StoreError  where the folder keeps finished work of another question or release, or another run
                               computes into it
                   OSError     where it cannot be written
         """
+        self._following = True
         if self.folder is None:
             return
         own = {"question": fingerprint(question, __version__), "study": question, "release": __version__}
@@ -156,6 +160,7 @@ class JobSeries:
             batch=batch if batch < SMALL else None,
             stage=stage,
             executor=executor,
+            again=not self._following,
         )
         self._spent += perf_counter() - began
         return cells.in_memory()

@@ -129,7 +129,7 @@ class Store:
         """Which batches are done, (batches,).
 
         time_limit  of this run [s]; None: none. Batches of which cells were given up after a shorter time are not
-                    done
+                    done; 0: all are done that are there
         """
         assert self.batch is not None
         found = np.zeros(-(-self.count // self.batch), dtype=bool)

@@ -57,6 +57,11 @@ class EvaluationJob:
         """Fingerprint that stored results are recognised by."""
         return fingerprint("evaluation", self.sweep.question, self.members)
 
+    @property
+    def code(self) -> str:
+        """The same for all designs of a study; see `Job`."""
+        return f"evaluation of {self.sweep.label}: {', '.join(one.name for one in self.sweep.columns)}"
+
     def compute(self, first: int, last: int) -> CellValues:
         """Designs first to last - 1."""
         found = self.sweep.compute(first * self.members, last * self.members)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.faults import plural
-from zwidth.measures.definition import OK, STATUS, Note
+from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note
 from zwidth.result import Result
 from zwidth.study.designs.study import Study
 from zwidth.study.optimise.evaluation import Judgement, margins
@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 
 AT_BOUND: Final = 1e-6  # share of a range, or of a bound's size, within which a design lies at it
 SHOWN: Final = 3  # designs of a repr
+GIVEN_UP: Final = (FAILED, OUT_OF_TIME)
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,20 @@ class DemandRecord:
     demand: Demand
     kept: float
     best: float
+
+
+@dataclass(frozen=True)
+class NotJudged:
+    """Designs tried that have no values for a reason that is none of their merits.
+
+    status   FAILED or OUT_OF_TIME
+    designs  their number
+    reason   the commonest
+    """
+
+    status: int
+    designs: int
+    reason: str
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,6 +162,19 @@ class Optimisation(Result):
             records.append(DemandRecord(demand, kept, float(extreme(known)) if len(known) else float("nan")))
         return tuple(records)
 
+    @cached_property
+    def not_judged(self) -> tuple[NotJudged, ...]:
+        """Designs that failed or ran out of time, by which; they keep no demand."""
+        lost = []
+        for status in GIVEN_UP:
+            count = int((self.judgement.status == status).any(axis=1).sum())
+            notes = [
+                note for each in self.notes.values() for note in each if note.status == status and note.reason
+            ]
+            reason = max(notes, key=lambda note: note.count).reason if notes else ""
+            lost += [NotJudged(status, count, reason)] if count else []
+        return tuple(lost)
+
     def settings(self, place: int) -> dict[str, Any]:
         """Path -> value of each number and circumstance that a design of the front sets."""
         (values,) = values_at(self.problem.variables, self.shares[self.front[place], None])
@@ -209,6 +237,10 @@ class Optimisation(Result):
                     "best": one.best,
                 }
                 for one in self.demands
+            ],
+            "not_judged": [
+                {"status": STATUS[one.status], "designs": one.designs, "reason": one.reason or None}
+                for one in self.not_judged
             ],
             "finer": None
             if self.finer is None
