@@ -90,6 +90,22 @@ def test_the_stiffest_wall_of_a_mass_and_a_period_lies_at_both_bounds():
     assert found.active(0) == ["plant.mass_kg at its upper bound", "loop.sampling_period_s at its lower bound"]
 
 
+def test_an_end_of_a_list_of_numbers_holds_a_design_back():
+    given = {"device": "hapkit-course", "objectives": {"stiffness_max": "max"}, "budget": 20}
+    for values, held in (
+        ((0.2, 0.3, 0.1), ["plant.mass_kg at the largest of its values"]),
+        ((0.3, 0.2, 0.1), ["plant.mass_kg at the largest of its values"]),
+        ((0.2,), []),
+    ):
+        study = problem_study(axis("plant.mass_kg", *values), **given)
+        assert optimise(study, workers=1).active(0) == held, values
+    light = problem_study(axis("plant.mass_kg", 0.2, 0.3), **(given | {"objectives": {"stiffness_max": "min"}}))
+    assert optimise(light, workers=1).active(0) == ["plant.mass_kg at the smallest of its values"]
+    # names of parts, and texts, have no ends
+    method = axis("loop.velocity.method", "backward-difference", "central-difference")
+    assert optimise(problem_study(method, **given), workers=1).active(0) == []
+
+
 def front_study(**more):
     return problem_study(
         LENGTH,

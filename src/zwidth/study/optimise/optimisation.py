@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from zwidth.device.faults import plural
 from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note
 from zwidth.result import Result
+from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.study import Study
 from zwidth.study.optimise.evaluation import Judgement, margins
 from zwidth.study.optimise.front import hypervolume, knee
 from zwidth.study.optimise.problem import Demand, Problem
 from zwidth.study.optimise.recheck import Bars, Contact
-from zwidth.study.optimise.variables import pieces, values_at
+from zwidth.study.optimise.variables import pieces, value_at, values_at
 
 Floats = NDArray[np.float64]
 
@@ -188,13 +189,11 @@ class Optimisation(Result):
         return {axis.key: value for axis, value in pairs if axis.parts} | self.settings(place)
 
     def active(self, place: int) -> list[str]:
-        """What holds a design of the front back: variables at a bound, and demands kept exactly."""
+        """What holds a design of the front back: variables at a bound, or at an end of their list of numbers, and
+        demands kept exactly."""
         held = []
         for axis, share in zip(self.problem.variables, self.shares[self.front[place]].tolist(), strict=True):
-            many = pieces(axis)
-            ordered = many == 0 or axis.whole
-            if ordered and min(share, 1.0 - share) <= (0.5 / many if many else 0.0) + AT_BOUND:
-                held.append(f"{axis.key} at its {'upper' if share > 0.5 else 'lower'} bound")
+            held += _end_of(axis, share)
         for demand in self.problem.demands:
             if margins(self.values[place, demand.column], demand.bound, demand.at_least) <= AT_BOUND:
                 held.append(demand.text)
@@ -290,3 +289,21 @@ class Optimisation(Result):
         held = ["; ".join(self.active(place)) for place in places]
         knee = [place == self.knee for place in places]
         return settings | columns | {"knee": knee, "active": held}
+
+
+def _end_of(axis: Axis, share: float) -> list[str]:
+    """Which end of its range, or of its listed numbers, a variable has; [] between them, or for what has no order.
+
+    >>> _end_of(Axis("a", (3.0, 1.0, 2.0)), 0.1), _end_of(Axis("a", (), (0.0, 1.0)), 0.5)
+    (['a at the largest of its values'], [])
+    """
+    many = pieces(axis)
+    if axis.span is not None:
+        if min(share, 1.0 - share) > (0.5 / many if many else 0.0) + AT_BOUND:
+            return []
+        return [f"{axis.key} at its {'upper' if share > 0.5 else 'lower'} bound"]
+    if not axis.numeric or many < 2:
+        return []
+    value = value_at(axis, share)
+    ends = {max(axis.values): "largest", min(axis.values): "smallest"}
+    return [f"{axis.key} at the {ends[value]} of its values"] if value in ends else []
