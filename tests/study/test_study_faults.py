@@ -300,6 +300,24 @@ def test_a_task_names_at_least_one_operator():
         study_of(document, "my.toml", bounds=True)
 
 
+@pytest.mark.parametrize(
+    ("low", "said"),
+    [
+        (float("nan"), "must be finite, got nan"),
+        (float("inf"), "must be finite, got inf"),
+        ("short", "must be a number, got the text 'short'"),
+        (True, "must be a number, got true"),
+        ([0.1], "must be a number, got the list [0.1]"),
+    ],
+)
+@pytest.mark.parametrize("key", [RIGHT_LENGTH, "loop.sampling_period_s", "frequency_Hz"])
+@pytest.mark.parametrize("more", [{}, {"scale": "log"}, {"tie": [{"key": COM, "power": 1}]}])
+def test_one_fault_of_a_range_is_one_line(low, said, key, more):
+    if "tie" in more and key != RIGHT_LENGTH:
+        more = {}
+    assert faults(study_document(axis(key, range=[low, 2.0], count=3, **more))) == [f"axis.0.range.0: {said}"]
+
+
 def test_a_measured_device_has_no_numbers_to_vary(tmp_path):
     (tmp_path / "sweep.csv").write_text(
         "frequency_Hz,real_m_per_N,imag_m_per_N\n" + "".join(f"{f},{-1.0 / f**2},-0.001\n" for f in range(1, 400))
