@@ -14,7 +14,7 @@ from zwidth.study.jobs.store import StoreError
 from zwidth.study.optimise.evaluation import Judge
 from zwidth.study.optimise.optimise import optimise
 from zwidth.study.optimise.polish import gradients, neighbours
-from zwidth.study.optimise.problem import problem_of
+from zwidth.study.optimise.problem import problem_of, study_to_optimise
 from zwidth.study.optimise.variables import share_of, values_at
 
 TWO_MASS = "published-two-mass"
@@ -381,6 +381,86 @@ def test_faults_of_an_optimisation_have_their_lines():
         with pytest.raises(DeviceError) as caught:
             study_of(document, "my.toml", bounds=True)
         assert line in str(caught.value)
+
+
+GOOD = {"isotropy": "min"}
+
+
+def lines_of(document):
+    """All that is wrong with a study for an optimiser, one line each."""
+    try:
+        study_to_optimise(document, "my.toml")
+    except DeviceError as error:
+        return [str(fault).removeprefix("my.toml: ") for fault in error.faults]
+    return []
+
+
+def test_faults_of_optimise_come_together_with_all_others():
+    document = {
+        "device": "five-bar",
+        "model": "stiff",
+        "axis": [axis("links.upper-right.lenght_m", range=[0.1, 0.2])],
+        "tolerance": [{"key": "loop.sampling_period_s", "distribution": "normal"}],
+        "task": {"count": 3, "operators": ["no-one"]},
+        "optimise": {
+            "objectives": {"isotropi": "min", "stiffness_max": "most"},
+            "constraints": {"reach": "1"},
+            "budget": 2,
+            "fronts": 3,
+        },
+    }
+    keys = [line.split(": ")[0] for line in lines_of(document)]
+    assert keys == [
+        "model",
+        "axis.0.key",
+        "tolerance.0",
+        "task.count",
+        "task.operators.0",
+        "optimise.objectives.isotropi",
+        "optimise.objectives.stiffness_max",
+        "optimise.constraints.reach",
+        "optimise.budget",
+        "optimise.fronts",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"optimise": {}}, "optimise: has no objectives; add such as objectives = "),
+        ({"optimise": {"objectives": {}}}, "optimise.objectives: must have at least 1 element"),
+        ({"optimise": {"objectiv": GOOD}}, "optimise.objectiv: is not a key of [optimise]; did you mean"),
+        ({"optimise": 3}, "optimise: must be a table, got 3"),
+        ({"optimize": {"objectives": GOOD}}, "optimize: is not a key of a study file; did you mean"),
+        ({"optimise": {"objectives": GOOD, "budget": 0}}, "optimise.budget: must be at least 1, got 0"),
+        ({"optimise": {"objectives": {"isotropy": 3}}}, "optimise.objectives.isotropy: must be 'max' or "),
+        (
+            {"optimise": {"objectives": GOOD, "constraints": {"reach": 3}}},
+            "optimise.constraints.reach: must be text, got 3",
+        ),
+    ],
+)
+def test_one_fault_of_optimise_is_one_line(change, line):
+    (told,) = lines_of({"device": "five-bar", "axis": [LENGTH]} | change)
+    assert told.startswith(line)
+
+
+def test_statistics_are_taken_over_the_workspace_of_the_study():
+    document = {
+        "device": "five-bar",
+        "axis": [RATIO],
+        "workspace": {"x_m": [-0.03, 0.03], "y_m": [0.21, 0.27], "count": 3},
+        "optimise": {"objectives": {"average(rigid_mass)": "min"}, "budget": 20},
+    }
+    found = optimise(study_to_optimise(document), workers=1)
+    task = {"points_m": [[x, y] for x in (-0.03, 0.0, 0.03) for y in (0.21, 0.24, 0.27)]}
+    swept = optimise(
+        problem_study(RATIO, objectives={"average(rigid_mass)": "min"}, task=task, budget=20), workers=1
+    )
+    assert found.judgement.cells[0].shape == (1, 9)
+    assert sorted(found.judgement.cells[0, 0]) == pytest.approx(sorted(swept.judgement.cells[0, 0]), rel=1e-12)
+    (line,) = lines_of(document | {"optimise": {"objectives": {"rigid_mass": "min"}}})
+    assert line.startswith("workspace: is used only by measures over the workspace, such as average(rigid_mass)")
 
 
 def test_the_finer_grid_and_the_simulation_are_of_the_front(front):

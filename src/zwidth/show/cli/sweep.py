@@ -48,7 +48,11 @@ class StudyQuestion(Question):
         from zwidth.study.designs.study_file import read_study
 
         try:
-            return read_study(self.name, bounds=self.bounds)
+            if self.bounds:
+                from zwidth.study.optimise.problem import read_study_to_optimise
+
+                return read_study_to_optimise(self.name)
+            return read_study(self.name)
         except TooLarge as error:
             raise BadInput(f"{self.name}: {error}") from None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path as File
 from typing import Any, Final
@@ -57,6 +57,7 @@ def study_of(
     bounds: bool = False,
     needs: Sequence[str] | None = None,
     further: Callable[[Device | None, Faults], None] | None = None,
+    further_of_measures: Callable[[Device | None, Mapping[str, Measure], Faults], None] | None = None,
 ) -> Study:
     """The study that a document describes.
 
@@ -64,6 +65,8 @@ def study_of(
     bounds   whether it is read for an optimiser: ranges of axes are bounds, and measures those of [optimise]
     needs    keys that it must have, see `check_study`
     further  adds the faults of tables that a sweep leaves aside, such as [[tolerance]]
+    further_of_measures  the same of tables that name measures, given the user's own; not called where those could
+             not be loaded
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
     """
@@ -80,6 +83,8 @@ def study_of(
     study = check_study(document, label, device, operators, own_measures, faults, bounds=bounds, needs=needs)
     if further is not None:
         further(device, faults)
+    if further_of_measures is not None and own_measures is not None:
+        further_of_measures(device, own_measures, faults)
     faults += absent
     if study is None or faults or file_faults:
         raise DeviceError([*in_order(faults, document, label), *file_faults])

@@ -18,7 +18,6 @@ from zwidth.device.faults import DeviceError
 from zwidth.measures.definition import Note
 from zwidth.progress import Progress
 from zwidth.study.designs.study import Study
-from zwidth.study.designs.study_file import read_study
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.notes import merge_notes
@@ -27,7 +26,7 @@ from zwidth.study.optimise.evaluation import LARGEST, EvaluationJob, Judge, Judg
 from zwidth.study.optimise.front import ranges, spread_out, undominated
 from zwidth.study.optimise.optimisation import Optimisation
 from zwidth.study.optimise.polish import polish
-from zwidth.study.optimise.problem import Problem, problem_of
+from zwidth.study.optimise.problem import Problem, problem_of, read_study_to_optimise
 from zwidth.study.optimise.recheck import (
     PRODUCED,
     Bars,
@@ -68,7 +67,7 @@ def optimise(
     Raises    DeviceError  with all faults of the study, measures that do not exist for this device among them
               what `executor.run` and `Store` raise
     """
-    read = study if isinstance(study, Study) else read_study(study, bounds=True)
+    read = study if isinstance(study, Study) else read_study_to_optimise(study)
     with JobSeries(store, progress, workers, cluster, time_limit) as series:
         return optimise_by(read, series)
 
