@@ -227,6 +227,21 @@ def test_a_time_limit_is_kept_and_designs_given_up_stay_so(folder):
     assert said in run_command(*words).out
 
 
+def test_units_are_written_one_way(folder):
+    text = changed(WALL + PLANT, "stiffness_max", "damping_max")
+    (folder / "plant.toml").write_text(text)
+    out = run_command("optimise", "plant.toml", "--output", "page.html").out
+    written = out + Path("page.html").read_text()
+    (folder / "plant.toml").write_text(changed(text, "budget", "constraints = { damping_max = '>= 1e9' }\nbudget"))
+    written += run_command("optimise", "plant.toml").out
+    sweep = text.replace("]\n[[axis]]", "]\ncount = 3\n[[axis]]").replace("2.0]\n", "2.0]\ncount = 5\n")
+    for least in ("count = 3", "count = 1"):
+        (folder / "sweep.toml").write_text('measures = ["damping_max"]\n' + sweep.replace("count = 3", least))
+        written += run_command("sweep", "sweep.toml").out
+    assert written.count("Ns/m") > 10
+    assert "N s/m" not in written
+
+
 def test_an_unstable_wanted_wall_is_not_stable_in_simulation(folder):
     (folder / "plant.toml").write_text(WALL.replace("500.0", "90000.0") + PLANT)
     out = run_command("optimise", "plant.toml").out

@@ -22,6 +22,7 @@ from zwidth.show.figures.style import (
     label,
     legend_above,
 )
+from zwidth.show.units import printed
 from zwidth.study.designs.column import Column
 from zwidth.study.optimise.front import undominated
 from zwidth.study.optimise.optimisation import Optimisation
@@ -125,6 +126,6 @@ def _draw_approach(ax: Axes, found: Optimisation) -> None:
 def _name(axis: Axis, one: Column) -> None:
     """Name an axis by a column, in its unit if it has one."""
     if one.unit:
-        label(axis, one.title, one.unit)
+        label(axis, one.title, printed(one.unit))
     else:
         axis.set_label_text(one.title)

@@ -10,7 +10,7 @@ import numpy as np
 
 from zwidth.device.faults import comma_list, plural
 from zwidth.measures.definition import FAILED, OUT_OF_TIME
-from zwidth.show.units import percent, quantity
+from zwidth.show.units import percent, printed, quantity
 from zwidth.study.optimise.evaluation import margins
 from zwidth.study.optimise.optimisation import Optimisation
 
@@ -50,9 +50,9 @@ def _gain(found: Optimisation) -> str:
     parts = []
     for objective in problem.objectives:
         one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
-        part = f"{one.name} {quantity(value, one.unit)}"
+        part = f"{one.name} {quantity(value, printed(one.unit))}"
         if found.baseline is not None and np.isfinite(own := float(found.baseline.values[0, objective.column])):
-            part += f" instead of {quantity(own, one.unit)}"
+            part += f" instead of {quantity(own, printed(one.unit))}"
         parts.append(part)
     return f"{chosen} has {comma_list(parts)}"
 
@@ -120,7 +120,7 @@ def _produced(found: Optimisation) -> list[str]:
         one = problem.columns[objective.column]
         low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
         if np.isfinite(low):
-            span = f"{quantity(low, one.unit)} to {quantity(high, one.unit)}"
+            span = f"{quantity(low, printed(one.unit))} to {quantity(high, printed(one.unit))}"
             said.append(f"90 % of them have {one.name} {span}")
     return said
 

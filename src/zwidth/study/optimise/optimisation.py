@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from zwidth.device.faults import plural
 from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note
+from zwidth.measures.unit_text import unit_text
 from zwidth.result import Result
 from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.study import Study
@@ -137,7 +138,7 @@ class Optimisation(Result):
         if np.isnan(first.best):
             return self._nowhere(first.demand.column, f"no design keeps {first.demand.full_text}: it has no value")
         if not first.kept:
-            best = f"{first.best:.6g} {column.unit}".rstrip()
+            best = f"{first.best:.6g} {unit_text(column.unit)}".rstrip()
             return f"no design keeps {first.demand.full_text}, the best of {len(self.shares)} has {best}"
         each = "; ".join(f"{one.demand.full_text} is kept by {one.kept:.1%}" for one in records)
         return f"no design keeps all demands together: {each}"
