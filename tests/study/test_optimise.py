@@ -247,6 +247,21 @@ def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bits(front, tmp_p
     assert resumed.judgement.cells.tobytes() == front.judgement.cells.tobytes()
 
 
+def test_progress_counts_the_designs_of_the_budget_on_through_search_and_polish():
+    told = []
+    optimise(
+        problem_study(RATIO, objectives={"stiffness_max": "max"}, budget=40),
+        None,
+        lambda *now: told.append(now),
+        1,
+    )
+    designs = [(done, of) for stage, done, of in told if stage in ("searching", "polishing")]
+    assert {stage for stage, _, _ in told} >= {"searching", "polishing"}
+    assert designs == sorted(designs)
+    assert {of for _, of in designs} == {40}
+    assert told[-1] == ("simulating walls of the front", 1, 1)
+
+
 def test_a_design_is_judged_by_the_worst_of_all_operators():
     task = {**TASK, "operators": ["none", bundled_names(OPERATORS)[0]]}
     study = problem_study(RATIO, objectives={"stiffness_max": "max"}, task=task, budget=20)

@@ -234,13 +234,17 @@ class _Archive:
 
     def _contacts(self, found: Optimisation) -> tuple[Contact, ...]:
         """A wall of each design of the front, simulated."""
-        contacts = []
-        for place in range(len(found.front)):
-            if self.progress is not None:
-                self.progress("simulating walls of the front", place, len(found.front))
+        contacts, count = list[Contact](), len(found.front)
+        for place in range(count):
+            self._tell("simulating walls of the front", place, count)
             cells = found.judgement.cells[found.front[place]]
             contacts.append(simulate_contact(self.problem, found.settings(place), cells))
+        self._tell("simulating walls of the front", count, count)
         return tuple(contacts)
+
+    def _tell(self, stage: str, done: int, of: int) -> None:
+        if self.progress is not None:
+            self.progress(stage, done, of)
 
 
 def own_values(problem: Problem) -> list[Any]:
