@@ -50,7 +50,8 @@ def worker_options(command: Callback) -> Callback:
             "--time-limit",
             type=Finite(),
             metavar="SECONDS",
-            help="Give up a design or cell that takes longer: it is 'out of time', the others keep their values.",
+            help="Give up a design or cell that takes longer, to within a second: it is 'out of time', the others "
+            "keep their values.",
         ),
     ]
     for option in reversed(options):
