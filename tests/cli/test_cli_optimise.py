@@ -93,6 +93,43 @@ def test_files_and_keys(folder):
         assert sources["plant.mass_kg"] == f"optimised, study plant.toml, seed 1, design {n}"
 
 
+def names(of: str) -> list[str]:
+    return sorted(path.name for path in Path(of).iterdir())
+
+
+def test_designs_take_the_place_of_those_of_the_same_study_alone(folder):
+    document_of("optimise", "plant.toml", "--designs", "better")
+    assert len(names("better")) > 2
+    Path("better/notes.txt").write_text("mine")
+    (folder / "plant.toml").write_text(WALL + changed(PLANT, "front = 5", "front = 2"))
+    document_of("optimise", "plant.toml", "--designs", "better")
+    assert names("better") == ["hapkit-course-1.toml", "hapkit-course-2.toml", "notes.txt"]
+    before = {path: path.read_bytes() for path in Path("better").iterdir()}
+    (folder / "other.toml").write_text(WALL + PLANT)
+    (line,) = refusal_lines("optimise", "other.toml", "--designs", "better")
+    said = "which this study has not written; name another folder, or move them away"
+    assert line == f"better: holds hapkit-course-1.toml, hapkit-course-2.toml, {said}"
+    assert {path: path.read_bytes() for path in Path("better").iterdir()} == before
+
+
+def test_designs_without_a_number_are_known_again(folder):
+    (folder / "assemblies.toml").write_text(
+        'device = "five-bar"\n[[axis]]\nkey = "assembly"\nvalues = ["elbows-in", "elbows-out"]\n'
+        '[optimise]\nobjectives = { stiffness_max = "max" }\n'
+    )
+    for _ in range(2):
+        document_of("optimise", "assemblies.toml", "--designs", "better")
+        assert names("better") == ["five-bar-1.toml"]
+
+
+def test_a_device_file_of_one_s_own_is_not_written_over(folder):
+    own = Path("hapkit-course-4.toml")
+    own.write_text("# by hand\n")
+    (line,) = refusal_lines("optimise", "plant.toml", "--designs", ".")
+    assert line == f".: holds {own}, which this study has not written; name another folder, or move it away"
+    assert own.read_text() == "# by hand\n"
+
+
 @pytest.mark.parametrize("kind", ["csv", "svg", "html"])
 def test_other_files(folder, kind):
     ran = run_command("optimise", "plant.toml", "--output", f"front.{kind}")
@@ -133,6 +170,78 @@ def test_sentences_follow_the_study(folder, old, new, before, after):
     assert after is None or after in second
 
 
+HEAVY = """
+import time
+from zwidth import measure
+
+@measure(unit="kg", better="lower")
+def felt(place):
+    mass = float(place.measure("rigid_mass"))
+    if mass > 0.08:
+        {}
+    return mass
+"""
+
+
+def heavy_study(folder, what: str, **changes: str) -> None:
+    """A study of which a measure does something where the mass is large."""
+    (folder / "own.py").write_text(HEAVY.format(what))
+    text = 'measures_file = "own.py"\n' + changed(WALL + PLANT, 'spectral_radius = "min"', 'felt = "min"')
+    text = changed(text, "budget = 60", "budget = 20")
+    for old, new in changes.items():
+        text = changed(text, old, new)
+    (folder / "plant.toml").write_text(text)
+
+
+def test_designs_that_fail_are_counted_with_the_reason(folder):
+    heavy_study(folder, "raise OverflowError('too heavy')")
+    document = document_of("optimise", "plant.toml")
+    (lost,) = document["not_judged"]
+    assert lost["status"] == "failed"
+    assert lost["reason"] == "raised OverflowError: too heavy"
+    said = f"{lost['designs']} of 15 designs failed: raised OverflowError: too heavy"
+    assert 1 <= lost["designs"] < 15
+    assert said in run_command("optimise", "plant.toml", "--output", "page.html").out
+    assert said in Path("page.html").read_text()
+    heavy_study(folder, "raise OverflowError('too heavy')", **{"=unset": '=unset", "plant.mass_kg=0.09'})
+    assert "the device as it is failed" in run_command("optimise", "plant.toml").out
+    heavy_study(folder, "raise OverflowError('too heavy')", **{"[0.02, 0.1]": "[0.02, 0.07]"})
+    assert "failed" not in run_command("optimise", "plant.toml").out
+    heavy_study(folder, "raise OverflowError('too heavy')", **{"[0.02, 0.1]": "[0.081, 0.1]"})
+    ran = run_command("optimise", "plant.toml")
+    assert ran.code == 1
+    assert ran.out.endswith("felt has no value in any design tried (20 failed: raised OverflowError: too heavy)\n")
+
+
+def test_a_time_limit_is_kept_and_designs_given_up_stay_so(folder):
+    heavy_study(folder, "time.sleep(1.7)")
+    words = ["optimise", "plant.toml", "--workers", "2", "--resume", "kept"]
+    document = document_of(*words, "--time-limit", "0.2")
+    (lost,) = document["not_judged"]
+    assert lost["status"] == "out of time"
+    assert lost["reason"] == "took longer than 0.2 s"
+    assert all(design["plant.mass_kg"] <= 0.08 for design in document["designs"])
+    assert document_of(*words, "--time-limit", "100") == document
+    assert document_of(*words) == document
+    said = f"{lost['designs']} of 15 designs ran out of time: took longer than 0.2 s"
+    assert said in run_command(*words).out
+
+
+def test_units_are_written_one_way(folder):
+    text = changed(WALL + PLANT, "stiffness_max", "damping_max")
+    (folder / "plant.toml").write_text(text)
+    out = run_command("optimise", "plant.toml", "--output", "page.html").out
+    written = out + Path("page.html").read_text()
+    (folder / "plant.toml").write_text(changed(text, "budget", "constraints = { damping_max = '>= 1e9' }\nbudget"))
+    written += run_command("optimise", "plant.toml").out
+    sweep = text.replace("]\n[[axis]]", "]\ncount = 3\n[[axis]]").replace("2.0]\n", "2.0]\ncount = 5\n")
+    for least in ("count = 3", "count = 1"):
+        (folder / "sweep.toml").write_text('measures = ["damping_max"]\n' + sweep.replace("count = 3", least))
+        written += run_command("sweep", "sweep.toml").out
+    assert written.count("Ns/m") > 10
+    assert "N s/m" not in written
+
+
 def test_an_unstable_wanted_wall_is_not_stable_in_simulation(folder):
     (folder / "plant.toml").write_text(WALL.replace("500.0", "90000.0") + PLANT)
     out = run_command("optimise", "plant.toml").out
@@ -169,6 +278,15 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     assert resumed == expected
 
 
+def test_finished_work_of_another_study_is_refused_at_the_start(folder):
+    document_of("optimise", "plant.toml", "--resume", "kept")
+    (folder / "plant.toml").write_text(WALL + changed(PLANT, "budget = 60", "budget = 61"))
+    (line,) = refusal_lines("optimise", "plant.toml", "--resume", "kept")
+    assert line == "kept: keeps the finished work of another study; name another folder, or remove it"
+    assert run_command("optimise", "plant.toml", "--output", "front.csv").code == 0
+    assert not Path("front.csv.progress").exists()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
@@ -177,9 +295,23 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
         ('stiffness_max = "max"', 'stifness_max = "max"', "optimise.objectives.stifness_max: no measure is named"),
         ("budget = 60", "budget = 6", "budget: must be at least 20 designs, got 6"),
         ("[optimise]", "[optimize]", "optimize: is not a key of a study file; did you mean 'optimise'?"),
-        (WALL, "", "optimise: spectral_radius needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m"),
+        (
+            WALL,
+            "",
+            "optimise.objectives.spectral_radius: spectral_radius needs a wanted wall; give stiffness_N_per_m",
+        ),
         ('{ stiffness_max = "max", spectral_radius = "min" }', "{}", "objectives"),
-        ('stiffness_max = "max"', 'isotropy = "min"', "optimise: isotropy needs a [mechanism]"),
+        (
+            'stiffness_max = "max"',
+            'isotropy = "min"',
+            "optimise.objectives.isotropy: isotropy needs a [mechanism]",
+        ),
+        (
+            "[optimise]",
+            "[task]\nclearance_m = 0.01\n[optimise]",
+            "plant.toml: task.clearance_m: worst(link_cl",
+        ),
+        ("front = 5", "constraints = { reach = '<= 1' }", "plant.toml: optimise.constraints.reach: reach needs a"),
     ],
 )
 def test_what_is_refused(folder, old, new, line):

@@ -52,6 +52,19 @@ def test_a_short_run_says_nothing(clock, capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_what_remains_of_a_stage_that_goes_on_from_another_goes_by_its_own_speed(clock, capsys):
+    with show_progress() as tell:
+        tell("searching", 0, 300)
+        for done in range(200, 301):
+            tell("polishing", done, 300)
+            clock.now += 0.5
+    said = capsys.readouterr().err.splitlines()
+    assert said[:2] == [
+        "zwidth: polishing, 204 of 300, about 50 s left",
+        "zwidth: polishing, 212 of 300, about 45 s left",
+    ]
+
+
 def test_a_long_run_says_what_remains_and_ever_more_rarely(clock, capsys):
     with show_progress() as tell:
         for done in range(601):

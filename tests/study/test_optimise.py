@@ -14,7 +14,7 @@ from zwidth.study.jobs.store import StoreError
 from zwidth.study.optimise.evaluation import Judge
 from zwidth.study.optimise.optimise import optimise
 from zwidth.study.optimise.polish import gradients, neighbours
-from zwidth.study.optimise.problem import problem_of
+from zwidth.study.optimise.problem import problem_of, study_to_optimise
 from zwidth.study.optimise.variables import share_of, values_at
 
 TWO_MASS = "published-two-mass"
@@ -88,6 +88,22 @@ def test_the_stiffest_wall_of_a_mass_and_a_period_lies_at_both_bounds():
     assert found.design(0) == {"plant.mass_kg": 0.3, "loop.sampling_period_s": 0.0005}
     assert found.values[0, 0] == pytest.approx(4.0 * (3.0 - 2.0 * np.sqrt(2.0)) * 0.3 / 0.0005**2, rel=1e-9)
     assert found.active(0) == ["plant.mass_kg at its upper bound", "loop.sampling_period_s at its lower bound"]
+
+
+def test_an_end_of_a_list_of_numbers_holds_a_design_back():
+    given = {"device": "hapkit-course", "objectives": {"stiffness_max": "max"}, "budget": 20}
+    for values, held in (
+        ((0.2, 0.3, 0.1), ["plant.mass_kg at the largest of its values"]),
+        ((0.3, 0.2, 0.1), ["plant.mass_kg at the largest of its values"]),
+        ((0.2,), []),
+    ):
+        study = problem_study(axis("plant.mass_kg", *values), **given)
+        assert optimise(study, workers=1).active(0) == held, values
+    light = problem_study(axis("plant.mass_kg", 0.2, 0.3), **(given | {"objectives": {"stiffness_max": "min"}}))
+    assert optimise(light, workers=1).active(0) == ["plant.mass_kg at the smallest of its values"]
+    # names of parts, and texts, have no ends
+    method = axis("loop.velocity.method", "backward-difference", "central-difference")
+    assert optimise(problem_study(method, **given), workers=1).active(0) == []
 
 
 def front_study(**more):
@@ -168,6 +184,28 @@ def test_two_runs_into_one_folder_are_not_mixed(tmp_path):
     assert optimise(study, tmp_path / "kept", workers=1).values.tobytes() == first.values.tobytes()
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"budget": 21},
+        {"seed": 2},
+        {"front": 3},
+        {"constraints": {"rigid_mass": "<= 9"}},
+        {"set": ["loop.delay_samples=1"]},
+    ],
+)
+def test_another_study_is_refused_before_anything_is_computed(tmp_path, change):
+    given = {"objectives": {"stiffness_max": "max"}, "budget": 20}
+    first = optimise(problem_study(RATIO, **given), tmp_path / "kept", workers=1)
+    wider = axis(RATIO["key"], range=[8.0, 31.0], tie=RATIO["tie"])
+    told = []
+    for other in (problem_study(RATIO, **(given | change)), problem_study(wider, **given)):
+        with pytest.raises(StoreError, match=rf"^{tmp_path}/kept: keeps the finished work of another study; name"):
+            optimise(other, tmp_path / "kept", lambda *now: told.append(now), workers=1)
+    assert told == []
+    assert optimise(problem_study(RATIO, **given), tmp_path / "kept").values.tobytes() == first.values.tobytes()
+
+
 def test_random_designs_nearby_and_anywhere_do_not_dominate_the_front(front):
     random = np.random.default_rng(11)
     costs = front.judgement.costs(front.problem)[front.front]
@@ -207,6 +245,21 @@ def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bits(front, tmp_p
     )
     assert resumed.shares.tobytes() == front.shares.tobytes()
     assert resumed.judgement.cells.tobytes() == front.judgement.cells.tobytes()
+
+
+def test_progress_counts_the_designs_of_the_budget_on_through_search_and_polish():
+    told = []
+    optimise(
+        problem_study(RATIO, objectives={"stiffness_max": "max"}, budget=40),
+        None,
+        lambda *now: told.append(now),
+        1,
+    )
+    designs = [(done, of) for stage, done, of in told if stage in ("searching", "polishing")]
+    assert {stage for stage, _, _ in told} >= {"searching", "polishing"}
+    assert designs == sorted(designs)
+    assert {of for _, of in designs} == {40}
+    assert told[-1] == ("simulating walls of the front", 1, 1)
 
 
 def test_a_design_is_judged_by_the_worst_of_all_operators():
@@ -268,6 +321,15 @@ def test_a_task_that_no_design_meets_says_which_demand_fails_first():
     records = {one.demand.key: one for one in found.demands}
     assert records["rigid_mass"].kept == 0.0
     assert records["isotropy"].kept > 0.9
+
+
+def test_a_demand_of_the_task_that_no_design_keeps_is_named_by_its_key():
+    far = {**TASK, "apparent_mass_kg": 0.001, "footprint_radius_m": 1.0}
+    found = optimise(problem_study(LENGTH, objectives={"stiffness_max": "max"}, task=far, budget=20), workers=1)
+    assert found.reason.startswith("no design keeps task.apparent_mass_kg <= 0.001, the best of 20 has 0.")
+    near = far | {"apparent_mass_kg": 1.0, "footprint_radius_m": 1e-3}
+    found = optimise(problem_study(LENGTH, objectives={"stiffness_max": "max"}, task=near, budget=20), workers=1)
+    assert found.reason.startswith("no design keeps task.footprint_radius_m <= 0.001, the best of 20 has 0.")
 
 
 def test_demands_that_are_kept_apart_and_never_together():
@@ -334,6 +396,86 @@ def test_faults_of_an_optimisation_have_their_lines():
         with pytest.raises(DeviceError) as caught:
             study_of(document, "my.toml", bounds=True)
         assert line in str(caught.value)
+
+
+GOOD = {"isotropy": "min"}
+
+
+def lines_of(document):
+    """All that is wrong with a study for an optimiser, one line each."""
+    try:
+        study_to_optimise(document, "my.toml")
+    except DeviceError as error:
+        return [str(fault).removeprefix("my.toml: ") for fault in error.faults]
+    return []
+
+
+def test_faults_of_optimise_come_together_with_all_others():
+    document = {
+        "device": "five-bar",
+        "model": "stiff",
+        "axis": [axis("links.upper-right.lenght_m", range=[0.1, 0.2])],
+        "tolerance": [{"key": "loop.sampling_period_s", "distribution": "normal"}],
+        "task": {"count": 3, "operators": ["no-one"]},
+        "optimise": {
+            "objectives": {"isotropi": "min", "stiffness_max": "most"},
+            "constraints": {"reach": "1"},
+            "budget": 2,
+            "fronts": 3,
+        },
+    }
+    keys = [line.split(": ")[0] for line in lines_of(document)]
+    assert keys == [
+        "model",
+        "axis.0.key",
+        "tolerance.0",
+        "task.count",
+        "task.operators.0",
+        "optimise.objectives.isotropi",
+        "optimise.objectives.stiffness_max",
+        "optimise.constraints.reach",
+        "optimise.budget",
+        "optimise.fronts",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"optimise": {}}, "optimise: has no objectives; add such as objectives = "),
+        ({"optimise": {"objectives": {}}}, "optimise.objectives: must have at least 1 element"),
+        ({"optimise": {"objectiv": GOOD}}, "optimise.objectiv: is not a key of [optimise]; did you mean"),
+        ({"optimise": 3}, "optimise: must be a table, got 3"),
+        ({"optimize": {"objectives": GOOD}}, "optimize: is not a key of a study file; did you mean"),
+        ({"optimise": {"objectives": GOOD, "budget": 0}}, "optimise.budget: must be at least 1, got 0"),
+        ({"optimise": {"objectives": {"isotropy": 3}}}, "optimise.objectives.isotropy: must be 'max' or "),
+        (
+            {"optimise": {"objectives": GOOD, "constraints": {"reach": 3}}},
+            "optimise.constraints.reach: must be text, got 3",
+        ),
+    ],
+)
+def test_one_fault_of_optimise_is_one_line(change, line):
+    (told,) = lines_of({"device": "five-bar", "axis": [LENGTH]} | change)
+    assert told.startswith(line)
+
+
+def test_statistics_are_taken_over_the_workspace_of_the_study():
+    document = {
+        "device": "five-bar",
+        "axis": [RATIO],
+        "workspace": {"x_m": [-0.03, 0.03], "y_m": [0.21, 0.27], "count": 3},
+        "optimise": {"objectives": {"average(rigid_mass)": "min"}, "budget": 20},
+    }
+    found = optimise(study_to_optimise(document), workers=1)
+    task = {"points_m": [[x, y] for x in (-0.03, 0.0, 0.03) for y in (0.21, 0.24, 0.27)]}
+    swept = optimise(
+        problem_study(RATIO, objectives={"average(rigid_mass)": "min"}, task=task, budget=20), workers=1
+    )
+    assert found.judgement.cells[0].shape == (1, 9)
+    assert sorted(found.judgement.cells[0, 0]) == pytest.approx(sorted(swept.judgement.cells[0, 0]), rel=1e-12)
+    (line,) = lines_of(document | {"optimise": {"objectives": {"rigid_mass": "min"}}})
+    assert line.startswith("workspace: is used only by measures over the workspace, such as average(rigid_mass)")
 
 
 def test_the_finer_grid_and_the_simulation_are_of_the_front(front):

@@ -18,7 +18,7 @@ from zwidth.measures.definition import FAILED, OUT_OF_TIME, MeasureError
 from zwidth.study.jobs import recovery
 from zwidth.study.jobs.executor import RecoveredWarning, run
 from zwidth.study.jobs.executor_interface import open_executor
-from zwidth.study.jobs.recovery import CannotStart, WorkerLost, compute_range
+from zwidth.study.jobs.recovery import CannotStart, OutOfTime, WorkerLost, compute_range
 from zwidth.study.jobs.store import Store
 from zwidth.study.jobs.workers import WorkerProcess, pack_job
 
@@ -152,6 +152,50 @@ class CompilingJob(RootsJob):
         return super().compute(first, last)
 
 
+@dataclass
+class FollowingJob(RootsJob):
+    """One of several jobs that run the same code."""
+
+    code: str = "roots"
+
+
+def test_time_to_load_code_is_given_to_the_first_job_alone():
+    quick, slow = FollowingJob(3), FollowingJob(3, seconds=1.5)
+    worker = WorkerProcess(time_limit=0.3)
+    try:
+        worker.compute(pack_job(quick), 0, 1)
+        for _ in range(2):  # in the same process, and in the one that takes its place
+            with pytest.raises(OutOfTime, match=r"took longer than 0\.3 s"):
+                worker.compute(pack_job(slow), 0, 1)
+        assert worker.compute(pack_job(quick), 1, 2).values.shape == (1, 2)
+    finally:
+        worker.end()
+
+
+def test_the_first_cell_is_given_up_too_once_its_code_is_loaded():
+    worker = WorkerProcess(time_limit=0.3)
+    try:
+        with pytest.raises(OutOfTime):
+            worker.compute(pack_job(RootsJob(3, seconds=1.5)), 0, 1)
+    finally:
+        worker.end()
+
+
+def test_an_executor_s_limit_counts_where_a_store_is_gone_on_with(tmp_path, monkeypatch):
+    monkeypatch.setattr("zwidth.study.jobs.workers.LOADING", 1.0)
+    job = FaultyJob(8, endless=(5,), starter=os.getpid())
+    told = []
+    for _ in range(2):
+        told.clear()
+        with open_executor(1, time_limit=0.2) as executor:
+            found = run(job, Store(tmp_path / "cells", job), lambda *now: told.append(now[1]), executor=executor)
+        assert (found.status[5] == OUT_OF_TIME).all()
+    assert told == [8], "not tried again under the same limit"
+    mended = RootsJob(8)
+    run(mended, Store(tmp_path / "cells", mended), again=False)
+    assert mended.computed_ranges == []
+
+
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("inf"), float("nan")])
 def test_a_time_limit_that_is_none_is_refused(limit):
     with pytest.raises(ValueError, match="time_limit must be positive, got"):
@@ -164,6 +208,11 @@ def test_arguments_that_do_not_go_together_are_refused():
 
     with pytest.raises(ValueError, match="time_limit needs other processes, and a measure of this study exists"):
         run(Local(3), time_limit=1.0)
+    with (
+        open_executor(1, time_limit=1.0) as executor,
+        pytest.raises(ValueError, match="time_limit needs other processes, and a measure of this study exists"),
+    ):
+        run(Local(3), executor=executor)
     with open_executor(1) as executor, pytest.raises(ValueError, match="give either it or them"):
         run(RootsJob(3), executor=executor, workers=2)
 
@@ -183,7 +232,7 @@ def test_a_process_that_cannot_start_is_said():
     worker = WorkerProcess()
     packed = pack_job(RootsJob(3))
     assert packed is not None
-    unreadable = type(packed)("key", b"no pickle", 2)
+    unreadable = type(packed)("key", b"no pickle", 2, "key")
     with pytest.raises(CannotStart, match="cannot read the job: UnpicklingError"):
         worker.compute(unreadable, 0, 1)
     worker.end()

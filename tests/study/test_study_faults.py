@@ -19,12 +19,12 @@ from tests.study.study_cases import (
 from zwidth.device.faults import DeviceError
 from zwidth.device.new_device import new_device
 from zwidth.memory_limit import TooLarge
-from zwidth.study.designs.study_file import read_study
+from zwidth.study.designs.study_file import read_study, study_of
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)
 
 WRONG = [
-    ({"device": "no-such"}, "no-such: is neither a file nor a bundled device"),
+    ({"device": "no-such"}, "device: 'no-such' is neither a file nor a bundled device"),
     ({"device": 3}, "device: must be text, got 3"),
     ({"measures": []}, "measures: must have at least 1 element"),
     (
@@ -55,7 +55,7 @@ WRONG = [
     ({"direction": [0.0, 0.0]}, "direction: has zero length"),
     ({"assembly": "elbows-up"}, "assembly: 'elbows-up' is not an assembly of this device; did you mean 'elbows-"),
     ({"model": "stiff"}, "model: must be 'full', 'two-mass', 'motor-mass' or 'rigid', got the text 'stiff'"),
-    ({"operator": "no-one"}, "no-one: is neither a file nor a bundled operator"),
+    ({"operator": "no-one"}, "operator: 'no-one' is neither a file nor a bundled operator"),
     ({"set": 3}, 'set: must be a list, got 3 (changes of the device file, each "PATH=VALUE")'),
     ({"set": ["loop.delay=1"]}, "set.0: loop.delay: is not a key of a device file; did you mean 'loop.delay_s'?"),
     ({"set": ["loop.sampling_period_s=-1"]}, "loop.sampling_period_s: must be"),
@@ -143,7 +143,10 @@ WRONG_AXES = [
     ({"key": "model", "values": ["full", "stiff"]}, "axis.0.values.1: must be one of full, two-mass, motor-mass"),
     ({"key": "direction", "values": [[0, 0]]}, "axis.0.values.0: has zero length"),
     ({"key": "at", "values": [[0.1], 3]}, "axis.0.values.1: must be 2 or 3 numbers, got 3"),
-    ({"key": "operator", "values": ["no-one"]}, "no-one: is neither a file nor a bundled operator"),
+    (
+        {"key": "operator", "values": ["none", "no-one"]},
+        "axis.0.values.1: 'no-one' is neither a file nor a bundled operator",
+    ),
     ({"key": "frequency_Hz", "values": [0.0]}, "axis.0.values.0: must be a finite number, above 0, got 0"),
     (
         {"key": "assembly", "values": ["elbows-in"], "tie": [LEFT_LENGTH]},
@@ -272,6 +275,47 @@ def test_faults_of_the_device_file_are_told_with_its_name(tmp_path):
         ("bad.toml", "plant.mass_kg"),
         ("bad.toml", "loop.sampling_period_s"),
     }
+
+
+def test_operators_of_a_task_are_told_with_their_key_and_beside_its_other_faults(tmp_path):
+    task = {"operators": ["thesis-arm", "thesis-arms"], "count": 3}
+    document = study_document(DELAY, task=task, optimise={"objectives": {"stiffness_max": "max"}})
+    del document["measures"]
+    with pytest.raises(DeviceError) as caught:
+        study_of(document, str(tmp_path / "my.toml"), bounds=True)
+    first, second = sorted(map(str, caught.value.faults))
+    assert first == f"{tmp_path}/my.toml: task.count: is read with box_m or radius_m only; remove it"
+    said = "'thesis-arms' is neither a file nor a bundled operator; did you mean 'thesis-arm"
+    assert second.startswith(f"{tmp_path}/my.toml: task.operators.1: {said}")
+    # what is wrong within a file that is there is told with the file's name
+    (tmp_path / "thesis-arms").write_text("arm_mass_kg = -1.0\n")
+    with pytest.raises(DeviceError) as caught:
+        study_of(document, str(tmp_path / "my.toml"), bounds=True)
+    assert f"{tmp_path}/thesis-arms: operator.arm_mass_kg: must be" in str(caught.value)
+
+
+def test_a_task_names_at_least_one_operator():
+    document = study_document(DELAY, task={"operators": []}, optimise={"objectives": {"stiffness_max": "max"}})
+    with pytest.raises(DeviceError, match=r"my\.toml: task\.operators: must have at least 1 element"):
+        study_of(document, "my.toml", bounds=True)
+
+
+@pytest.mark.parametrize(
+    ("low", "said"),
+    [
+        (float("nan"), "must be finite, got nan"),
+        (float("inf"), "must be finite, got inf"),
+        ("short", "must be a number, got the text 'short'"),
+        (True, "must be a number, got true"),
+        ([0.1], "must be a number, got the list [0.1]"),
+    ],
+)
+@pytest.mark.parametrize("key", [RIGHT_LENGTH, "loop.sampling_period_s", "frequency_Hz"])
+@pytest.mark.parametrize("more", [{}, {"scale": "log"}, {"tie": [{"key": COM, "power": 1}]}])
+def test_one_fault_of_a_range_is_one_line(low, said, key, more):
+    if "tie" in more and key != RIGHT_LENGTH:
+        more = {}
+    assert faults(study_document(axis(key, range=[low, 2.0], count=3, **more))) == [f"axis.0.range.0: {said}"]
 
 
 def test_a_measured_device_has_no_numbers_to_vary(tmp_path):

@@ -144,7 +144,11 @@ WRONG = [
         "axes: assembly: 'elbow-in' is not an assembly of this device",
         "'elbows-in'?",
     ),
-    ({"axes": {"operator": ["nobody"]}}, "nobody: is neither a file nor a bundled operator", ""),
+    (
+        {"axes": {"operator": ["nobody"]}},
+        "axes: operator: 'nobody' is neither a file nor a bundled operator",
+        "",
+    ),
     ({"axes": {"frequency_Hz": [0.0]}}, "axes: frequency_Hz: must be a finite number, above 0, got 0", ""),
     ({"measures": "stifness_max"}, "measures: no measure is named 'stifness_max'", "did you mean stiffness_max?"),
     ({"measures": ["isotropy", "isotropy"]}, "measures: isotropy is listed twice", ""),

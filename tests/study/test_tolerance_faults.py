@@ -142,7 +142,7 @@ WRONG_STUDIES = [
     ({"stiffness_N_per_m": 100.0}, "stiffness_N_per_m: needs damping_Ns_per_m beside it"),
     ({"damping_Ns_per_m": 1.0}, "damping_Ns_per_m: needs stiffness_N_per_m beside it"),
     ({"measures": ["isotrpy"]}, "measures.0: no measure is named 'isotrpy'; did you mean isotropy?"),
-    ({"device": "no-such"}, "no-such: is neither a file nor a bundled device"),
+    ({"device": "no-such"}, "device: 'no-such' is neither a file nor a bundled device"),
 ]
 
 

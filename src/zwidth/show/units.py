@@ -15,6 +15,7 @@ from collections.abc import Iterable
 from math import floor, isfinite, isnan, log10
 from typing import Final
 
+from zwidth.measures.unit_text import unit_text
 from zwidth.show.moment_units import spoken_unit
 
 PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -169,10 +170,7 @@ def printed(unit: str) -> str:
     >>> printed("N^2 s/m^2"), printed("m^2/rad^2")
     ('N²s/m²', 'm²/rad²')
     """
-    unit = spoken_unit(unit)
-    for power, raised in (("^1", ""), ("^2", "²"), ("^3", "³")):
-        unit = unit.replace(power, raised)
-    return unit.replace(" s", "s")
+    return unit_text(spoken_unit(unit))
 
 
 def area_text(square_metres: float) -> str:

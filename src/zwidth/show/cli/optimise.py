@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.device.faults import comma_list
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
@@ -17,11 +18,12 @@ from zwidth.show.cli.options import Callback, refuse_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
 from zwidth.show.output import DATA, FIGURES, printable, write_text
-from zwidth.show.units import number, typed
+from zwidth.show.units import number, printed, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from zwidth.study.designs.study import Study
     from zwidth.study.optimise.optimisation import Optimisation
 
 PAGES: Final = (".html", ".htm")
@@ -32,7 +34,7 @@ def _designs_option(command: Callback) -> Callback:
         "--designs",
         metavar="FOLDER",
         callback=refuse_empty,
-        help="Write a device file for each design of the front into this folder.",
+        help="Write a device file for each design of the front into this folder, replacing earlier ones.",
     )
     decorated: Callback = option(command)
     return decorated
@@ -63,7 +65,8 @@ class OptimiseCommand(Command):
     def check(self, case: CommandLine) -> None:
         check_workers(case.options)
         if case["designs"] is not None:
-            _make_folder(Path(case["designs"]))
+            assert isinstance(case.question, StudyQuestion)
+            _check_designs(Path(case["designs"]), case.question.study)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         return circumstances_of_study(case)
@@ -120,11 +123,17 @@ class OptimiseCommand(Command):
             with suppress(OSError):  # it holds something else
                 Path(case["designs"]).rmdir()
             return {}
-        from zwidth.study.optimise.device_files import device_files
+        from zwidth.study.optimise.device_files import device_files, files_there
 
         folder = Path(case["designs"])
+        written = set[Path]()
         for name, text in device_files(result):
             write_text(folder / name, text)
+            written.add(folder / name)
+        earlier, _ = files_there(folder, result.study)
+        for path in earlier:
+            if path not in written:  # of a larger front
+                path.unlink(missing_ok=True)
         return {"designs_folder": folder}
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
@@ -139,15 +148,25 @@ class OptimiseCommand(Command):
         return front_figure(result, *self.size)
 
 
-def _make_folder(folder: Path) -> None:
-    """Make the folder of designs before anything is computed. Raises BadInput where it cannot be."""
+def _check_designs(folder: Path, study: Study) -> None:
+    """Make the folder of designs before anything is computed. Raises BadInput where it cannot be, and for files in
+    it, not of this study, that the designs would stand among or take the place of."""
+    from zwidth.study.optimise.device_files import files_there
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        _, others = files_there(folder, study)
     except OSError as error:
         why = error.strerror or str(error)
         raise BadInput(f"{printable(str(folder))}: cannot be made: {why[:1].lower() + why[1:]}") from None
     if not os.access(folder, os.W_OK):
         raise BadInput(f"{printable(str(folder))}: cannot be written into; name another folder")
+    if others:
+        names = comma_list([path.name for path in others], 3)
+        them = "it" if len(others) == 1 else "them"
+        raise BadInput(
+            f"{folder}: holds {names}, which this study has not written; name another folder, or move {them} away"
+        )
 
 
 def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
@@ -158,7 +177,7 @@ def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
 
     problem = found.problem
     headings = ["", *short_names([axis.key for axis in problem.variables])]
-    headings += [f"{one.name} [{one.unit}]" if one.unit else one.name for one in problem.columns]
+    headings += [f"{one.name} [{printed(one.unit)}]" if one.unit else one.name for one in problem.columns]
     rows = []
     if found.baseline is not None:
         own = [axis_value_text(value) for value in own_values(problem)]

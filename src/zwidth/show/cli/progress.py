@@ -75,7 +75,7 @@ class _Bars:
     def _draw(self) -> None:
         stage, done, of = self._stage
         if stage not in self._tasks:
-            self._tasks[stage] = self._bar.add_task(stage, total=of or None)
+            self._tasks[stage] = self._bar.add_task(stage, total=of or None, completed=done)
         self._bar.update(self._tasks[stage], completed=done, total=of or None)
 
 
@@ -86,12 +86,13 @@ class _Lines:
         self._busy = busy or (lambda: False)
         self._pause, self._printed = PATIENCE, monotonic()
         self._stage, self._done, self._of, self._began = "computing", 0, 0, monotonic()
+        self._first = 0  # done when the stage began, which may go on from another
         self._lock = Lock()
 
     def update(self, stage: str, done: int, of: int) -> None:
         """Take what the computation says; print a line if it is time."""
         if stage != self._stage:
-            self._began = monotonic()
+            self._began, self._first = monotonic(), done
         self._stage, self._done, self._of = stage, done, of
         if done < of:
             self.look()
@@ -113,6 +114,7 @@ class _Lines:
         if not self._of:
             return self._stage
         line = f"{self._stage}, {self._done} of {self._of}"
-        if self._done < AN_ESTIMATE * self._of or not self._done:
+        here = self._done - self._first
+        if here <= 0 or here < AN_ESTIMATE * (self._of - self._first):
             return line
-        return f"{line}, about {time_text((now - self._began) * (self._of - self._done) / self._done)} left"
+        return f"{line}, about {time_text((now - self._began) * (self._of - self._done) / here)} left"

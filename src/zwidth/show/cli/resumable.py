@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -51,7 +50,8 @@ def worker_options(command: Callback) -> Callback:
             "--time-limit",
             type=Finite(),
             metavar="SECONDS",
-            help="Give up a design or cell that takes longer: it is 'out of time', the others keep their values.",
+            help="Give up a design or cell that takes longer, to within a second: it is 'out of time', the others "
+            "keep their values.",
         ),
     ]
     for option in reversed(options):
@@ -138,14 +138,11 @@ def series_folder(case: CommandLine) -> Path | None:
 def remove_series(case: CommandLine) -> None:
     """Remove the stores of a series that lie beside the file, now that what they kept is written; what else is in
     the folder stays."""
+    from zwidth.study.jobs.series import remove_stores
+
     folder = series_folder(case)
-    if folder is None or case["resume"] is not None or not folder.is_dir():
-        return
-    for inside in folder.iterdir():
-        if (inside / "zarr.json").exists():
-            shutil.rmtree(inside, ignore_errors=True)
-    with suppress(OSError):  # not empty
-        folder.rmdir()
+    if folder is not None and case["resume"] is None:
+        remove_stores(folder)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from zwidth.show.cli.options import Question, processor_option, refuse_empty
 from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
 from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
-from zwidth.show.units import number, typed
+from zwidth.show.units import number, printed, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +48,11 @@ class StudyQuestion(Question):
         from zwidth.study.designs.study_file import read_study
 
         try:
-            return read_study(self.name, bounds=self.bounds)
+            if self.bounds:
+                from zwidth.study.optimise.problem import read_study_to_optimise
+
+                return read_study_to_optimise(self.name)
+            return read_study(self.name)
         except TooLarge as error:
             raise BadInput(f"{self.name}: {error}") from None
 
@@ -221,7 +225,7 @@ def _lists_all(case: CommandLine) -> bool:
 
 
 def _heading(one: Column) -> str:
-    return f"{one.name} [{one.unit}]" if one.unit else one.name
+    return f"{one.name} [{printed(one.unit)}]" if one.unit else one.name
 
 
 def _design_texts(sweep: Sweep, design: int) -> list[str]:
@@ -246,7 +250,7 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
                 f"{axis.key} = {axis_value_text(v)}"
                 for axis, v in zip(sampling.axes, sampling.values(design), strict=True)
             )
-            yield name, f"{typed(quantity(value, one.unit))} at {where}"
+            yield name, f"{typed(quantity(value, printed(one.unit)))} at {where}"
     yield "designs", ", ".join(f"{n} {STATUS[kind]}" for kind, n in summary.by_status)
 
 

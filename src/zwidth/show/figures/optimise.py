@@ -22,6 +22,7 @@ from zwidth.show.figures.style import (
     label,
     legend_above,
 )
+from zwidth.show.units import printed
 from zwidth.study.designs.column import Column
 from zwidth.study.optimise.front import undominated
 from zwidth.study.optimise.optimisation import Optimisation
@@ -70,10 +71,7 @@ def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -
     inside = ((tried >= low - room) & (tried <= high + room)).all(axis=1)
     shown = tried[inside][:MOST_POINTS]
     ax.plot(*shown.T, ".", color=GREY, markersize=2.0, alpha=0.6, label="tried, keeps the demands", zorder=1)
-    signs = problem.signs[[i, j]]
-    best = undominated(front * signs)
-    line = best[np.argsort(front[best, 0])]
-    ax.plot(*front[line].T, "-", color=BLUE, linewidth=1.2, zorder=2)
+    _draw_reach(ax, tried[inside], problem.signs[[i, j]])
     ax.plot(*front.T, "o", color=BLUE, markersize=4.0, label="front", zorder=3)
     if found.bars is not None:
         _draw_bars(ax, front, found.bars.low[:, columns], found.bars.high[:, columns])
@@ -87,6 +85,17 @@ def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -
         _name(axis, problem.columns[column])
     if legend:
         legend_above(ax, 4)
+
+
+def _draw_reach(ax: Axes, tried: Floats, signs: Floats) -> None:
+    """The edge of what some design reaches or surpasses, in steps: between two of them there is none, and a corner
+    has the worse value of either objective.
+
+    tried  (k, 2)  those that keep the demands;  signs  factor of each objective that makes less better
+    """
+    best = tried[undominated(tried * signs)]
+    line = best[np.argsort(best[:, 0])]
+    ax.step(*line.T, where="post" if signs[0] > 0.0 else "pre", color=BLUE, linewidth=0.9, alpha=0.7, zorder=2)
 
 
 def _draw_bars(ax: Axes, front: Floats, low: Floats, high: Floats) -> None:
@@ -117,6 +126,6 @@ def _draw_approach(ax: Axes, found: Optimisation) -> None:
 def _name(axis: Axis, one: Column) -> None:
     """Name an axis by a column, in its unit if it has one."""
     if one.unit:
-        label(axis, one.title, one.unit)
+        label(axis, one.title, printed(one.unit))
     else:
         axis.set_label_text(one.title)

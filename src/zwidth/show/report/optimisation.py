@@ -19,7 +19,7 @@ from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.report.figures import both_drawings
 from zwidth.show.report.optimisation_text import sentences, short_names
 from zwidth.show.report.report import page_template
-from zwidth.show.units import percent, quantity
+from zwidth.show.units import percent, printed, quantity
 from zwidth.study.designs.sweep_data import axis_value_text
 from zwidth.study.optimise.optimisation import Optimisation
 from zwidth.study.optimise.optimise import own_values
@@ -46,7 +46,7 @@ def optimisation_page(found: Optimisation) -> str:
 
 
 def _value(number: float, unit: str) -> str:
-    return quantity(number, unit) if np.isfinite(number) else NONE
+    return quantity(number, printed(unit)) if np.isfinite(number) else NONE
 
 
 def _before_and_after(found: Optimisation) -> list[tuple[str, str, str, str]]:
@@ -59,7 +59,7 @@ def _before_and_after(found: Optimisation) -> list[tuple[str, str, str, str]]:
         after = design[axis.key]
         number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (own, after))
         texts = [
-            NONE if value is None else quantity(value, axis.unit) if number else axis_value_text(value)
+            NONE if value is None else quantity(value, printed(axis.unit)) if number else axis_value_text(value)
             for value in (own, after)
         ]
         ratio = f"{after / own:.3g}" if number and own else NONE

@@ -9,22 +9,25 @@ from typing import Final
 import numpy as np
 
 from zwidth.device.faults import comma_list, plural
-from zwidth.show.units import percent, quantity
+from zwidth.measures.definition import FAILED, OUT_OF_TIME
+from zwidth.show.units import percent, printed, quantity
 from zwidth.study.optimise.evaluation import margins
 from zwidth.study.optimise.optimisation import Optimisation
 
+WITHOUT: Final = {FAILED: "failed", OUT_OF_TIME: "ran out of time"}
 SMALL: Final = 5e-4  # share of a value that is said to be no change
 
 
 def sentences(found: Optimisation) -> list[str]:
     """Sentences on the front: how it was found, what the chosen design gains, what holds designs back, and what a
-    finer grid and simulation say. One alone where no design keeps the demands."""
+    finer grid and simulation say. Where no design keeps the demands, why not."""
     tried = plural(len(found.shares), "design")
     if not len(found.front):
-        return [f"{tried} tried: {found.reason}"]
+        return [f"{tried} tried: {found.reason}", *_not_judged(found)]
     said = [
         _how_found(found, tried),
         _gain(found),
+        *_not_judged(found),
         *_held_back(found),
         *_finer(found),
         *_produced(found),
@@ -47,11 +50,24 @@ def _gain(found: Optimisation) -> str:
     parts = []
     for objective in problem.objectives:
         one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
-        part = f"{one.name} {quantity(value, one.unit)}"
+        part = f"{one.name} {quantity(value, printed(one.unit))}"
         if found.baseline is not None and np.isfinite(own := float(found.baseline.values[0, objective.column])):
-            part += f" instead of {quantity(own, one.unit)}"
+            part += f" instead of {quantity(own, printed(one.unit))}"
         parts.append(part)
     return f"{chosen} has {comma_list(parts)}"
+
+
+def _not_judged(found: Optimisation) -> list[str]:
+    """How many designs failed or ran out of time, and why, unless that is why there is no front; and whether the
+    device as it is did."""
+    said = [
+        f"{one.designs} of {plural(len(found.shares), 'design')} {WITHOUT[one.status]}"
+        + (f": {one.reason}" if one.reason else "")
+        for one in found.not_judged
+        if not one.reason or one.reason not in (found.reason or "")
+    ]
+    own = [] if found.baseline is None else found.baseline.status[0].tolist()
+    return said + [f"the device as it is {verb}" for status, verb in WITHOUT.items() if status in own]
 
 
 def _held_back(found: Optimisation) -> list[str]:
@@ -105,7 +121,7 @@ def _produced(found: Optimisation) -> list[str]:
         one = problem.columns[objective.column]
         low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
         if np.isfinite(low):
-            span = f"{quantity(low, one.unit)} to {quantity(high, one.unit)}"
+            span = f"{quantity(low, printed(one.unit))} to {quantity(high, printed(one.unit))}"
             said.append(f"90 % of them have {one.name} {span}")
     return said
 

@@ -134,7 +134,7 @@ def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
         )
     elif span is not None and sampling not in ("latin-hypercube", SEARCH) and "count" not in table:
         yield ((), "has a range and no count; add the number of its values, such as count = 11")
-    if table.get("scale") == "log" and isinstance(span, list) and span and is_number(span[0]) and not span[0] > 0:
+    if table.get("scale") == "log" and isinstance(span, list) and span and is_number(span[0]) and span[0] <= 0:
         yield (("range",), f'must begin above 0 where scale = "log", got {quote(span)}')
 
 
@@ -176,6 +176,13 @@ def _values(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
         for key in ("range", "values")
         for n, value in enumerate(table[key] if isinstance(table.get(key), list) else [])
     ]
+
+
+def _well_typed(values: list[tuple[KeyPath, Any]]) -> Iterator[tuple[KeyPath, Any]]:
+    """The entries but for those of a range that are no finite numbers, which `study_schema` reports."""
+    for where, value in values:
+        if where[0] != "range" or (is_number(value) and isfinite(value)):
+            yield where, value
 
 
 def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> Axis | None:
@@ -269,7 +276,9 @@ def key_faults(
     else:
         texts = _texts(steps)
         yield from (
-            ((*where,), message) for where, value in values if (message := _value_fault(value, kinds, key, texts))
+            ((*where,), message)
+            for where, value in _well_typed(values)
+            if (message := _value_fault(value, kinds, key, texts))
         )
 
 
@@ -372,7 +381,7 @@ def _tie_faults(
         if not is_number(base) or base == 0:
             given = f"got {quote(base)}" if base is not None else "and it has none; set it first"
             yield (("power",), f"needs a value of '{key}' other than 0 in the device file, {given}")
-        elif not all(is_number(value) and value / base > 0 for _, value in _values(table)):
+        elif not all(is_number(value) and value / base > 0 for _, value in _well_typed(_values(table))):
             yield (("power",), f"needs values of the sign that '{key}' has in the device file, {quote(base)}")
 
 
@@ -384,7 +393,7 @@ def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None)
     """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
     if key in WANTED:
         number = WANTED_BY_KEY[key]
-        for where, value in _values(table):
+        for where, value in _well_typed(_values(table)):
             if not is_number(value) or not number.allows(value):
                 yield (where, f"must be a finite number, {number.allowed}, got {quote(value)}")
         return

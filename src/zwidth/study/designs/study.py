@@ -133,7 +133,8 @@ def check_study(
     _check_sampling(document, faults)
     _check_circumstances(document, device, faults)
     task = _task(document, device, columns, faults, bounds)
-    plane = None if task else _plane(document, device, columns, plane, faults, spelling)
+    # an optimiser's columns are those of [optimise]
+    plane = None if task or bounds else plane_of_study(document, device, columns, plane, faults, spelling)
     if faults or checked is None or device is None:
         return None
     hypercube = checked.sampling == "latin-hypercube"
@@ -224,7 +225,7 @@ def _check_circumstances(document: dict[str, Any], device: Device | None, faults
                 faults += [fault] if all(path != (key,) for path, _ in faults) else []
 
 
-def _plane(
+def plane_of_study(
     document: dict[str, Any],
     device: Device | None,
     columns: Sequence[Column],

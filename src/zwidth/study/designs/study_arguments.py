@@ -93,12 +93,14 @@ def study_over(
     }
     faults: Faults = []
     operator_faults: list[Fault] = []
-    operators = axis_operators(document, File(), operator_faults)
+    absent: Faults = []
+    operators = axis_operators(document, File(), absent, operator_faults)
     study = check_study(
         document, LABEL, device, operators, measures_by_name, faults, plane=plane, spelling=as_argument
     )
     if isinstance(position, Mapping):
         faults += _angle_faults(device, position, axes)
+    faults += absent
     if faults or operator_faults or study is None:
         raise DeviceError([*(_fault(path, message, list(axes)) for path, message in faults), *operator_faults])
     return replace(study, at=position) if isinstance(position, Mapping) else study

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path as File
 from typing import Any, Final
 
 from zwidth.device import address
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, fail
+from zwidth.device.faults import DeviceError, Fault, KeyPath, fail
 from zwidth.device.format_version import refuse_newer
 from zwidth.device.load import from_document, in_order
 from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
@@ -56,6 +57,7 @@ def study_of(
     bounds: bool = False,
     needs: Sequence[str] | None = None,
     further: Callable[[Device | None, Faults], None] | None = None,
+    further_of_measures: Callable[[Device | None, Mapping[str, Measure], Faults], None] | None = None,
 ) -> Study:
     """The study that a document describes.
 
@@ -63,6 +65,8 @@ def study_of(
     bounds   whether it is read for an optimiser: ranges of axes are bounds, and measures those of [optimise]
     needs    keys that it must have, see `check_study`
     further  adds the faults of tables that a sweep leaves aside, such as [[tolerance]]
+    further_of_measures  the same of tables that name measures, given the user's own; not called where those could
+             not be loaded
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
     """
@@ -70,14 +74,18 @@ def study_of(
     if DEVICE_KEYS & document.keys() and not STUDY_KEYS & document.keys():
         raise _device_instead(label, "a device")
     faults: Faults = []
-    file_faults: list[Fault] = []  # of the files that the study names
+    absent: Faults = []  # files that the study names and that are not there
+    file_faults: list[Fault] = []  # of those that are
     folder = File(label).parent
-    device = _device(document, folder, faults, file_faults)
-    operators = axis_operators(document, folder, file_faults)
+    device = _device(document, folder, faults, absent, file_faults)
+    operators = axis_operators(document, folder, absent, file_faults)
     own_measures = _own_measures(document, folder, faults)
     study = check_study(document, label, device, operators, own_measures, faults, bounds=bounds, needs=needs)
     if further is not None:
         further(device, faults)
+    if further_of_measures is not None and own_measures is not None:
+        further_of_measures(device, own_measures, faults)
+    faults += absent
     if study is None or faults or file_faults:
         raise DeviceError([*in_order(faults, document, label), *file_faults])
     return study
@@ -91,42 +99,64 @@ def _device_instead(label: str, what: str) -> DeviceError:
     )
 
 
-def axis_operators(document: dict[str, Any], folder: File, file_faults: list[Fault]) -> dict[str, Any]:
+def axis_operators(
+    document: dict[str, Any], folder: File, absent: Faults, file_faults: list[Fault]
+) -> dict[str, Any]:
     """The operators that an axis or the task names, by name: their tables, None for nobody.
 
     folder       that files are looked for in
-    file_faults  gets the faults of their files
+    absent       gets the faults of names that are neither bundled nor files
+    file_faults  gets the faults of the files
     """
     operators: dict[str, Any] = {}
-    lists = [axis.get("values") for _, axis in tables(document, "axis") if axis.get("key") == "operator"]
-    for names in (*lists, table(document, "task").get("operators")):
-        for name in names if isinstance(names, list) else []:
+    lists: list[tuple[KeyPath, Any]] = [
+        (("axis", n, "values"), axis.get("values"))
+        for n, axis in tables(document, "axis")
+        if axis.get("key") == "operator"
+    ]
+    for key, names in (*lists, (("task", "operators"), table(document, "task").get("operators"))):
+        for n, name in enumerate(names if isinstance(names, list) else []):
             if isinstance(name, str) and name:
-                try:
+                with _faults_kept((*key, n), name, folder, absent, file_faults):
                     operators[name] = _operator(name, folder)
-                except DeviceError as error:
-                    file_faults += error.faults
     return operators
 
 
-def _device(document: dict[str, Any], folder: File, faults: Faults, file_faults: list[Fault]) -> Device | None:
+@contextmanager
+def _faults_kept(
+    key: KeyPath, name: str, folder: File, absent: Faults, file_faults: list[Fault]
+) -> Iterator[None]:
+    """Keep the faults of a file that is read inside this block: as the study's where it names none that is there,
+    else as the file's own."""
+    try:
+        yield
+    except DeviceError as error:
+        if (folder / name).exists():
+            file_faults += error.faults
+        else:
+            absent += [(key, f"'{name}' {fault.message}") for fault in error.faults]
+
+
+def _device(
+    document: dict[str, Any], folder: File, faults: Faults, absent: Faults, file_faults: list[Fault]
+) -> Device | None:
     """The device with the study's operator and changes; None where it cannot be loaded.
 
-    faults, file_faults  get the faults of the study, and of the files that it names
+    faults                gets the faults of the changes
+    absent, file_faults   as for `axis_operators`
     """
     name, operator, changes = (document.get(key) for key in ("device", "operator", "set"))
     if not isinstance(name, str) or not name:
         return None
-    try:
-        inner, label = read(_resolve_name(name, folder))
-    except DeviceError as error:
-        file_faults += error.faults
+    found: tuple[dict[str, Any], str] | None = None
+    with _faults_kept(("device",), name, folder, absent, file_faults):
+        found = read(_resolve_name(name, folder))
+    if found is None:
         return None
+    inner, label = found
     if isinstance(operator, str) and operator:
-        try:
+        with _faults_kept(("operator",), operator, folder, absent, file_faults):
             inner = with_operator(inner, _operator(operator, folder))
-        except DeviceError as error:
-            file_faults += error.faults
     for n, change in enumerate(changes if isinstance(changes, list) else []):
         if not isinstance(change, str):
             continue

@@ -175,7 +175,7 @@ class TaskSection(Section):
         Annotated[WholeNumber, Field(ge=1, le=MOST)] | Annotated[tuple[Direction, ...], Field(min_length=1)] | None
     ) = documented_key("how many directions, spread evenly, or a list of them", default=None)
     operators: tuple[Text, ...] = documented_key(
-        "who holds the device: bundled names, files beside this one, none", default=()
+        "who holds the device: bundled names, files beside this one, none", min_length=1, default=()
     )
     peak_force_N: Number | None = documented_key("least peak force", "N", gt=0, default=None)
     continuous_force_N: Number | None = documented_key("least continuous force", "N", gt=0, default=None)

@@ -58,6 +58,17 @@ Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cel
 WALL: Final = tuple(WANTED_BY_NAME)  # numbers of the wanted wall, as arguments
 
 
+class MissingMeasures(MeasureError):
+    """Measures that exist for no design of a study.
+
+    refused  column -> why
+    """
+
+    def __init__(self, refused: dict[str, str]) -> None:
+        super().__init__("\n".join(f"{name} {why}" for name, why in refused.items()))
+        self.refused = refused
+
+
 class _NoPoint(Exception):
     """A design without an operating point: its status, and why."""
 
@@ -467,4 +478,4 @@ def _check_measures(job: SweepJob, spelling: Spelling) -> None:
                 refused[one.name] = error.spelled(spelling)
         pending = tuple(one for one in pending if one.name in refused)
     if refused:
-        raise MeasureError("\n".join(f"{name} {why}" for name, why in refused.items()))
+        raise MissingMeasures(refused)

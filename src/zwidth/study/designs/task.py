@@ -83,8 +83,12 @@ def task_of(document: Mapping[str, Any], device: Device, faults: list[Fault], *,
     if found:
         return None
     operators = given.get("operators", ())
-    demands = {key: float(given[key]) for key in DEMANDS if is_number(given.get(key))}
-    return Task(positions, directions, tuple(operators), demands)
+    return Task(positions, directions, tuple(operators), demands_of(given))
+
+
+def demands_of(given: Mapping[str, Any]) -> dict[str, float]:
+    """Key -> bound of each demand in a [task]."""
+    return {key: float(given[key]) for key in DEMANDS if is_number(given.get(key))}
 
 
 def _shape_faults(given: Mapping[str, Any], device: Device) -> Iterator[Fault]:

@@ -56,6 +56,7 @@ def run(
     time_limit: float | None = None,
     cluster: str | None = None,
     executor: Executor | None = None,
+    again: bool = True,
 ) -> Cells:
     """Compute all cells of a job.
 
@@ -73,6 +74,7 @@ def run(
     time_limit  s that a cell may take; one that takes longer is OUT_OF_TIME. All cells are computed in processes
     cluster     address of a dask scheduler, or "local"; see `open_executor`
     executor    what computes all cells, opened before; in place of workers, time_limit and cluster
+    again       whether stored cells that were out of time under a shorter limit are computed again
     Raises    TooLarge      where the cells would not fit into memory
               StoreError    where they would not fit on the disk, or another run computes into the store
               CannotStart   where no process can be started;  WorkerLost  where every cell ends its process
@@ -99,7 +101,7 @@ def run(
         slots = (workers or cores()) if executor is None else executor.slots
         size = _size(job, store, batch, slots, processor, executor, packed)
         stack.enter_context(computing_on(processor))
-        plan = _Plan(job, store, size, time_limit)
+        plan = _Plan(job, store, size, executor.time_limit if executor is not None else None, again)
         if executor is not None and packed is not None:
             batches = executor.compute(packed, plan.ranges())
         else:
@@ -131,8 +133,9 @@ def _executor_for(
     if processor == "cuda":
         raise ValueError(f"{by} is for processes, and the GPU is used by this one alone; leave one of the two out")
     if (packed := pack_job(job)) is None:
-        if executor is not None:
+        if executor is not None and executor.time_limit is None:
             return None, None
+        by = by if executor is None else "time_limit"
         raise ValueError(
             f"{by} needs other processes, and a measure of this study exists in this process only; put it in a "
             "file (measures_file)"
@@ -183,11 +186,13 @@ class _Plan:
     done   (batches,)  whether each is there
     """
 
-    def __init__(self, job: Job, store: Store | None, size: int, time_limit: float | None) -> None:
+    def __init__(
+        self, job: Job, store: Store | None, size: int, time_limit: float | None, again: bool = True
+    ) -> None:
         self.count, self.size = job.count, size
         self.done: NDArray[np.bool_] = np.zeros(-(-job.count // size), dtype=bool)
         if store is not None:
-            self.done = store.done(time_limit)
+            self.done = store.done(time_limit if again else 0.0)
             store.limit_time(time_limit)
         self.left = sum(last - first for first, last in self.ranges())
 

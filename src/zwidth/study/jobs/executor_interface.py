@@ -23,6 +23,11 @@ class Executor(Protocol):
         """How many ranges it computes at once."""
         ...
 
+    @property
+    def time_limit(self) -> float | None:
+        """s that a cell may take; None: no limit."""
+        ...
+
     def compute(
         self, job: PackedJob, ranges: Iterable[CellRange]
     ) -> Generator[tuple[CellRange, Batch], None, None]:

@@ -56,7 +56,11 @@ class CellValues:
 
 
 class Job(Protocol):
-    """Many cells to compute. A job is sent to other processes, so that it must be possible to pickle it."""
+    """Many cells to compute. A job is sent to other processes, so that it must be possible to pickle it.
+
+    Jobs that follow one another and run the same code may say so by a text `code` that is the same in all of them:
+    under a time limit only the first is given time to load it.
+    """
 
     @property
     def count(self) -> int:

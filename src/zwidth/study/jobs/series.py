@@ -2,26 +2,41 @@
 
 Stores lie side by side in one folder, by the names of the jobs: a run that was stopped asks the same questions
 again, and finds those answered that were.
+
+    series.json   fingerprint of the whole question, with the release of zwidth and the version of the format
+    NAME          the store of the job of this name
+    lock          held by the run that writes here
+
+A job may follow from the answers of those before it, so that its store alone would tell another question late: the
+fingerprint of the whole is compared before anything is computed.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
+from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from time import perf_counter
 from types import TracebackType
 from typing import Final
 
+from zwidth._version import __version__
+from zwidth.device.format_version import STORE_VERSION, newer_version_message
 from zwidth.progress import Progress
 from zwidth.study.jobs.executor import SMALL, run
 from zwidth.study.jobs.executor_interface import Executor, open_executor
 from zwidth.study.jobs.job import CellValues, Job
-from zwidth.study.jobs.store import Store, StoreError
+from zwidth.study.jobs.journal import fingerprint
+from zwidth.study.jobs.store import KeptForAnother, Store, StoreError, whose_work
 from zwidth.study.jobs.store_lock import FILE as LOCK
 from zwidth.study.jobs.store_lock import FolderLock, owner_of
 from zwidth.study.jobs.workers import cores
 
+HEADER: Final = "series.json"
+KIND: Final = "series"
 PATIENCE: Final = 5.0  # s of computation after which processes are started, which takes some seconds
 BATCHES: Final = 2  # of a job for each process, where its cells are few
 
@@ -48,11 +63,70 @@ class JobSeries:
     ) -> None:
         self.folder = None if folder is None else Path(folder)
         if self.folder is not None and (self.folder / "zarr.json").exists():
-            raise StoreError(f"{self.folder.name}: holds the store of another study; name another folder")
+            raise StoreError(f"{self.folder}: holds the store of another study; name another folder")
         self.progress, self.workers, self.cluster, self.time_limit = progress, workers, cluster, time_limit
         self._stack, self._lock = ExitStack(), FolderLock()
         self._executor: Executor | None = None
         self._spent = 0.0  # s of computation
+        self._following = False  # whether jobs follow from the answers of those before, see `begin`
+
+    def begin(self, question: str) -> None:
+        """Take the folder for one question whose jobs follow from the answers of those before them; to be called
+        before the first. Cells that are out of time there stay so under any limit, or other jobs would follow than
+        those that are there.
+
+        question  fingerprint of all that the jobs follow from
+        Raises    StoreError  where the folder keeps finished work of another question or release, or another run
+                              computes into it
+                  OSError     where it cannot be written
+        """
+        self._following = True
+        if self.folder is None:
+            return
+        own = {"question": fingerprint(question, __version__), "study": question, "release": __version__}
+        if self._is_kept_for(own):
+            return
+        self._take_folder()
+        if not self._is_kept_for(own) and not any(self._stores()):  # another run may have been here meanwhile
+            draft = self.folder / f".{HEADER}"
+            draft.write_text(
+                json.dumps({"zwidth": KIND, "version": STORE_VERSION, **own}) + "\n", encoding="utf-8"
+            )
+            draft.replace(self.folder / HEADER)
+
+    def _is_kept_for(self, own: dict[str, str]) -> bool:
+        """Whether the folder says that it keeps this question's work. Raises StoreError where it keeps another's.
+
+        Without a store no work is lost, whatever it says. A folder with stores and without a fingerprint is of an
+        older layout: it is recognised by its stores, one after another.
+        """
+        assert self.folder is not None
+        if not any(self._stores()):
+            return False
+        try:
+            header = json.loads((self.folder / HEADER).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return False
+        except ValueError:
+            header = None
+        if not isinstance(header, dict) or header.get("zwidth") != KIND:
+            raise StoreError(f"{self.folder}: its {HEADER} is damaged; remove the folder, or name another")
+        if message := newer_version_message(header.get("version"), STORE_VERSION):
+            raise StoreError(f"{self.folder}: its version {message}, or name another folder")
+        if header.get("question") != own["question"]:
+            raise KeptForAnother(str(self.folder), whose_work(header, own["study"]))
+        return True
+
+    def _stores(self) -> Iterator[Path]:
+        return stores_in(self.folder) if self.folder is not None else iter(())
+
+    def _take_folder(self) -> None:
+        """Make the folder, and keep other runs from writing there. Raises StoreError where another run does."""
+        assert self.folder is not None
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if not self._lock.acquire(self.folder):
+            owner = owner_of(self.folder)
+            raise StoreError(f"{self.folder}: {owner} is computing into it; wait, or name another folder")
 
     def compute(self, name: str, job: Job, stage: str, done: int = 0, of: int | None = None) -> CellValues:
         """Compute a job, and keep it under a name.
@@ -69,11 +143,11 @@ class JobSeries:
 
         store = None
         if self.folder is not None:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            if not self._lock.acquire(self.folder):
-                owner = owner_of(self.folder)
-                raise StoreError(f"{self.folder}: {owner} is computing into it; wait, or name another folder")
-            store = Store(self.folder / name, job)
+            self._take_folder()
+            try:
+                store = Store(self.folder / name, job)
+            except KeptForAnother as error:
+                raise KeptForAnother(str(self.folder), error.whose) from None
         began = perf_counter()
         executor = self._executor_in_time()
         slots = 1 if executor is None else executor.slots
@@ -86,6 +160,7 @@ class JobSeries:
             batch=batch if batch < SMALL else None,
             stage=stage,
             executor=executor,
+            again=not self._following,
         )
         self._spent += perf_counter() - began
         return cells.in_memory()
@@ -105,7 +180,23 @@ class JobSeries:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stack.close()
-        self._lock.release()
-        if self.folder is not None:
+        if self.folder is not None and self._lock.held:
+            self._lock.release()
             with suppress(OSError):
                 (self.folder / LOCK).unlink()
+
+
+def stores_in(folder: Path) -> Iterator[Path]:
+    """The stores of the jobs in a folder; none where there is no folder."""
+    if folder.is_dir():
+        yield from (inside for inside in sorted(folder.iterdir()) if (inside / "zarr.json").exists())
+
+
+def remove_stores(folder: Path) -> None:
+    """Remove what a series keeps in a folder; what else is there stays, and so does the folder then."""
+    for store in stores_in(folder):
+        shutil.rmtree(store, ignore_errors=True)
+    with suppress(OSError):
+        (folder / HEADER).unlink()
+    with suppress(OSError):  # not empty
+        folder.rmdir()

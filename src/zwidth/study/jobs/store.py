@@ -16,7 +16,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -44,6 +44,14 @@ UNLIMITED: Final = float("inf")
 
 class StoreError(ValueError):
     """A store that cannot be used; the text says why, and what to do."""
+
+
+class KeptForAnother(StoreError):
+    """A folder with the finished work of another question or release, which is left as it is."""
+
+    def __init__(self, folder: str, whose: str) -> None:
+        super().__init__(f"{folder}: {whose}; name another folder, or remove it")
+        self.whose = whose
 
 
 class Store:
@@ -121,7 +129,7 @@ class Store:
         """Which batches are done, (batches,).
 
         time_limit  of this run [s]; None: none. Batches of which cells were given up after a shorter time are not
-                    done
+                    done; 0: all are done that are there
         """
         assert self.batch is not None
         found = np.zeros(-(-self.count // self.batch), dtype=bool)
@@ -230,7 +238,7 @@ class Store:
         if kind != KIND or not isinstance(batch, int):
             raise other
         if attributes.get("question") != self.question:
-            raise StoreError(f"{self.path.name}: {self._whose(attributes)}; name another folder, or remove it")
+            raise KeptForAnother(self.path.name, whose_work(attributes, self._study))
         try:
             self._arrays = group["values"], group["status"]
             header = json.dumps({"version": STORE_VERSION, "question": self.question})
@@ -238,15 +246,6 @@ class Store:
         except (KeyError, ValueError):
             raise StoreError(f"{self.path.name}: is damaged; remove it, or name another folder") from None
         self.batch = batch
-
-    def _whose(self, attributes: dict[str, Any]) -> str:
-        """Whose cells a store holds that is not of this question and release."""
-        release = str(attributes.get("release", "another release"))
-        if release != __version__:
-            same = attributes.get("study") == self._study
-            what = "this study" if same else "a study"
-            return f"keeps {what} as computed by zwidth {release}, and this is {__version__}"
-        return "keeps the finished work of another study"
 
     def _check_disk(self) -> None:
         folder = next((p for p in (self.path, *self.path.absolute().parents) if p.exists()), Path())
@@ -257,6 +256,19 @@ class Store:
                 f"{wanted / 1e9:.3g} GB of disk, of {free / 1e9:.3g} GB that are free; ask for fewer, or name a "
                 "folder on another disk"
             )
+
+
+def whose_work(attributes: Mapping[str, Any], study: str) -> str:
+    """Whose finished work a folder keeps that is not of this question and release.
+
+    attributes  that it is recognised by: "study" and "release"
+    study       fingerprint of this question, the same in every release
+    """
+    release = str(attributes.get("release", "another release"))
+    if release != __version__:
+        what = "this study" if attributes.get("study") == study else "a study"
+        return f"keeps {what} as computed by zwidth {release}, and this is {__version__}"
+    return "keeps the finished work of another study"
 
 
 @dataclass(frozen=True)

@@ -56,11 +56,13 @@ class PackedJob:
 
     key       differs for different jobs
     measures  number of columns
+    code      the same for jobs of which the first that is computed loads the code that all others run
     """
 
     key: str
     data: bytes
     measures: int
+    code: str
 
 
 def pack_job(job: Job) -> PackedJob | None:
@@ -76,21 +78,24 @@ def pack_job(job: Job) -> PackedJob | None:
         return None
     if b"__main__" in data:
         return None
-    return PackedJob(hashlib.sha256(data).hexdigest(), data, len(job.measures))
+    key = hashlib.sha256(data).hexdigest()
+    return PackedJob(key, data, len(job.measures), getattr(job, "code", key))
 
 
 class WorkerProcess:
     """One process, started when it is needed, and a new one after it was lost.
 
-    time_limit  s that a cell may take before its process is ended; None: no limit. Compiling is not counted. Cells
-                together may take a second more: they are computed apart if they take longer
+    time_limit  s that a cell may take before its process is ended; None: no limit. Compiling is not counted, and
+                loading code neither. Cells together may take a second more: they are computed apart if they take
+                longer
     """
 
     def __init__(self, time_limit: float | None = None) -> None:
         self.time_limit = time_limit
         self.process: subprocess.Popen[bytes] | None = None
         self._jobs: list[str] = []  # keys of those that the process holds
-        self._computed: dict[str, int] = {}  # a cell of each job whose computation has ended before
+        self._loaded: set[str] = set()  # code that the process has run
+        self._computed: dict[str, tuple[PackedJob, int]] = {}  # code -> a cell that was computed in time
         self._ended = False
 
     def compute(self, job: PackedJob, first: int, last: int) -> CellValues:
@@ -101,17 +106,26 @@ class WorkerProcess:
                 CannotStart  where no process can be started
                 whatever the job raises
         """
-        fresh = self._prepare(job)
-        limit = self.time_limit
-        if limit is not None and last - first > 1:
-            limit += TOGETHER
-        if limit is not None and fresh and job.key in self._computed:
-            known = self._computed[job.key]
-            self._ask(("compute", job.key, known, known + 1), limit + LOADING)  # loads what all cells need
-        elif limit is not None and fresh:
-            limit += LOADING
-        cells: CellValues = self._ask(("compute", job.key, first, last), limit)
-        self._computed[job.key] = first
+        self._prepare(job)
+        if self.time_limit is None:
+            cells: CellValues = self._ask(("compute", job.key, first, last), None)
+            return cells
+        limit = self.time_limit + (TOGETHER if last - first > 1 else 0.0)
+        message = "compute", job.key, first, last
+        if job.code in self._loaded:
+            cells = self._ask(message, limit)
+        elif known := self._computed.get(job.code):
+            self._prepare(known[0])
+            self._ask(("compute", known[0].key, known[1], known[1] + 1), limit + LOADING)
+            self._prepare(job)
+            cells = self._ask(message, limit)
+        else:
+            began = monotonic()
+            cells = self._ask(message, limit + LOADING)
+            if monotonic() - began > limit:  # whether by loading shows now that it is done
+                cells = self._ask(message, limit)
+        self._loaded.add(job.code)
+        self._computed = dict([*self._computed.items(), (job.code, (job, first))][-MOST_JOBS:])
         return cells
 
     def end(self) -> None:
@@ -119,12 +133,12 @@ class WorkerProcess:
         self._ended = True
         self._stop(wait=GRACE)
 
-    def _prepare(self, job: PackedJob) -> bool:
-        """Start the process if there is none, and send it the job. Returns whether it has computed none of it."""
+    def _prepare(self, job: PackedJob) -> None:
+        """Start the process if there is none, and send it the job, unless it holds it."""
         if self.process is None:
             self._start()
         if job.key in self._jobs:
-            return False
+            return
         try:
             self._ask(("job", job.key, job.data), None)
         except WorkerLost:
@@ -132,13 +146,12 @@ class WorkerProcess:
         except Exception as error:
             raise CannotStart(f"a process cannot read the job: {type(error).__name__}: {error}") from error
         self._jobs = [*self._jobs, job.key][-MOST_JOBS:]
-        return True
 
     def _start(self) -> None:
         environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
         command = [sys.executable, "-c", START, json.dumps(sys.path)]
         for left in reversed(range(STARTS)):
-            self._jobs = []
+            self._jobs, self._loaded = [], set()
             try:
                 if self._ended:
                     raise WorkerLost("the run was ended")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device.address import UNSET
 from zwidth.device.edit_file import edited_text
+from zwidth.device.read import LARGEST_FILE
+from zwidth.device.text_file import UnreadableFileError, read_text
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
+from zwidth.study.designs.study import Study
 from zwidth.study.optimise.optimisation import Optimisation
 
 # Circumstance -> where a device file has it.
@@ -28,12 +32,12 @@ def device_files(found: Optimisation) -> Iterator[tuple[str, str]]:
     place there, such as a model, is said in a comment at its beginning.
     """
     study = found.problem.study
-    stem = Path(study.device.label).name.removesuffix(".toml")
+    stem = _stem(study)
     width = len(str(len(found.front)))
     for place in range(len(found.front)):
         settings = found.settings(place)
         numbers = {key: value for key, value in settings.items() if key not in CIRCUMSTANCES}
-        source = f"optimised, study {Path(study.label).name}, seed {found.problem.seed}, design {place + 1}"
+        source = f"{_origin(study)}, seed {found.problem.seed}, design {place + 1}"
         given = {key: study.document[key] for key in CIRCUMSTANCES if key in study.document} | settings
         changes: list[str | tuple[str, Any]] = [*study.document.get("set", ())]
         changes += [(path, _plain(given[key])) for key, path in PLACES.items() if key in given]
@@ -43,7 +47,38 @@ def device_files(found: Optimisation) -> Iterator[tuple[str, str]]:
         head = (
             f"# The design was judged with {', '.join(missing)}, which no device file holds.\n" if missing else ""
         )
+        head += "" if numbers else f"# {source}\n"
         yield f"{stem}-{place + 1:0{width}d}.toml", head + text
+
+
+def files_there(folder: Path, study: Study) -> tuple[list[Path], list[Path]]:
+    """Files in a folder that are called as the designs of a study are: those that it has written earlier, whose
+    place its next designs take, and others. None where there is no folder.
+
+    Raises  OSError  where it cannot be read
+    """
+    if not folder.is_dir():
+        return [], []
+    name = re.compile(rf"{re.escape(_stem(study))}-\d+\.toml")
+    named = [path for path in sorted(folder.iterdir()) if name.fullmatch(path.name)]
+    own = [path for path in named if _is_of(path, study)]
+    return own, [path for path in named if path not in own]
+
+
+def _is_of(path: Path, study: Study) -> bool:
+    try:
+        return f"{_origin(study)}, seed " in read_text(path, LARGEST_FILE)
+    except UnreadableFileError:
+        return False
+
+
+def _stem(study: Study) -> str:
+    """What the names of the files begin with: the name of the device's."""
+    return Path(study.device.label).name.removesuffix(".toml")
+
+
+def _origin(study: Study) -> str:
+    return f"optimised, study {Path(study.label).name}"
 
 
 def _operator(found: Optimisation, settings: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

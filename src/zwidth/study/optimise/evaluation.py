@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device import address
+from zwidth.device.faults import DeviceError
+from zwidth.device.load import in_order
 from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, Note
 from zwidth.measures.overall import global_conditioning_index, overall
 from zwidth.study.designs.column import Column
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
-from zwidth.study.designs.sweep_job import SweepJob, sweep_job
+from zwidth.study.designs.sweep_job import MissingMeasures, SweepJob, sweep_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.optimise.problem import Problem
@@ -54,6 +56,11 @@ class EvaluationJob:
     def question(self) -> str:
         """Fingerprint that stored results are recognised by."""
         return fingerprint("evaluation", self.sweep.question, self.members)
+
+    @property
+    def code(self) -> str:
+        """The same for all designs of a study; see `Job`."""
+        return f"evaluation of {self.sweep.label}: {', '.join(one.name for one in self.sweep.columns)}"
 
     def compute(self, first: int, last: int) -> CellValues:
         """Designs first to last - 1."""
@@ -130,6 +137,7 @@ class Judge:
 
     problem  what is optimised
     drawn    produced devices by which each design is judged besides as it is; left out: the problem's own
+    Raises   DeviceError  for measures that do not exist for this device, by the keys that ask for them
     """
 
     def __init__(self, problem: Problem, drawn: int | None = None) -> None:
@@ -138,8 +146,12 @@ class Judge:
         self._changes = member_changes(problem.tolerances, drawn, problem.seed) if drawn else None
         self._devices = 1 + drawn
         study = replace(problem.study, columns=problem.columns)
-        # checks on the way that the measures exist for this device
-        self._sweep = replace(sweep_job(_small(study)), cells=True)
+        try:
+            self._sweep = replace(sweep_job(_small(study)), cells=True)
+        except MissingMeasures as error:
+            names = [column.name for column in problem.columns]
+            faults = [(problem.paths[names.index(name)], f"{name} {why}") for name, why in error.refused.items()]
+            raise DeviceError(in_order(faults, study.document, study.label)) from None
 
     def job(self, designs: Sequence[tuple[Any, ...]]) -> EvaluationJob:
         """The job that computes designs, each by the values of its variables: held by each operator in turn, as it

@@ -11,19 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.faults import plural
-from zwidth.measures.definition import OK, STATUS, Note
+from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note
+from zwidth.measures.unit_text import unit_text
 from zwidth.result import Result
+from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.study import Study
 from zwidth.study.optimise.evaluation import Judgement, margins
 from zwidth.study.optimise.front import hypervolume, knee
 from zwidth.study.optimise.problem import Demand, Problem
 from zwidth.study.optimise.recheck import Bars, Contact
-from zwidth.study.optimise.variables import pieces, values_at
+from zwidth.study.optimise.variables import pieces, value_at, values_at
 
 Floats = NDArray[np.float64]
 
 AT_BOUND: Final = 1e-6  # share of a range, or of a bound's size, within which a design lies at it
 SHOWN: Final = 3  # designs of a repr
+GIVEN_UP: Final = (FAILED, OUT_OF_TIME)
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,20 @@ class DemandRecord:
     demand: Demand
     kept: float
     best: float
+
+
+@dataclass(frozen=True)
+class NotJudged:
+    """Designs tried that have no values for a reason that is none of their merits.
+
+    status   FAILED or OUT_OF_TIME
+    designs  their number
+    reason   the commonest
+    """
+
+    status: int
+    designs: int
+    reason: str
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,11 +136,11 @@ class Optimisation(Result):
         first = records[0]
         column = self.problem.columns[first.demand.column]
         if np.isnan(first.best):
-            return self._nowhere(first.demand.column, f"no design keeps {first.demand.text}: it has no value")
+            return self._nowhere(first.demand.column, f"no design keeps {first.demand.full_text}: it has no value")
         if not first.kept:
-            best = f"{first.best:.6g} {column.unit}".rstrip()
-            return f"no design keeps {first.demand.text}, the best of {len(self.shares)} has {best}"
-        each = "; ".join(f"{one.demand.text} is kept by {one.kept:.1%}" for one in records)
+            best = f"{first.best:.6g} {unit_text(column.unit)}".rstrip()
+            return f"no design keeps {first.demand.full_text}, the best of {len(self.shares)} has {best}"
+        each = "; ".join(f"{one.demand.full_text} is kept by {one.kept:.1%}" for one in records)
         return f"no design keeps all demands together: {each}"
 
     def _nowhere(self, column: int, sentence: str) -> str:
@@ -147,6 +164,19 @@ class Optimisation(Result):
             records.append(DemandRecord(demand, kept, float(extreme(known)) if len(known) else float("nan")))
         return tuple(records)
 
+    @cached_property
+    def not_judged(self) -> tuple[NotJudged, ...]:
+        """Designs that failed or ran out of time, by which; they keep no demand."""
+        lost = []
+        for status in GIVEN_UP:
+            count = int((self.judgement.status == status).any(axis=1).sum())
+            notes = [
+                note for each in self.notes.values() for note in each if note.status == status and note.reason
+            ]
+            reason = max(notes, key=lambda note: note.count).reason if notes else ""
+            lost += [NotJudged(status, count, reason)] if count else []
+        return tuple(lost)
+
     def settings(self, place: int) -> dict[str, Any]:
         """Path -> value of each number and circumstance that a design of the front sets."""
         (values,) = values_at(self.problem.variables, self.shares[self.front[place], None])
@@ -160,13 +190,11 @@ class Optimisation(Result):
         return {axis.key: value for axis, value in pairs if axis.parts} | self.settings(place)
 
     def active(self, place: int) -> list[str]:
-        """What holds a design of the front back: variables at a bound, and demands kept exactly."""
+        """What holds a design of the front back: variables at a bound, or at an end of their list of numbers, and
+        demands kept exactly."""
         held = []
         for axis, share in zip(self.problem.variables, self.shares[self.front[place]].tolist(), strict=True):
-            many = pieces(axis)
-            ordered = many == 0 or axis.whole
-            if ordered and min(share, 1.0 - share) <= (0.5 / many if many else 0.0) + AT_BOUND:
-                held.append(f"{axis.key} at its {'upper' if share > 0.5 else 'lower'} bound")
+            held += _end_of(axis, share)
         for demand in self.problem.demands:
             if margins(self.values[place, demand.column], demand.bound, demand.at_least) <= AT_BOUND:
                 held.append(demand.text)
@@ -209,6 +237,10 @@ class Optimisation(Result):
                     "best": one.best,
                 }
                 for one in self.demands
+            ],
+            "not_judged": [
+                {"status": STATUS[one.status], "designs": one.designs, "reason": one.reason or None}
+                for one in self.not_judged
             ],
             "finer": None
             if self.finer is None
@@ -258,3 +290,21 @@ class Optimisation(Result):
         held = ["; ".join(self.active(place)) for place in places]
         knee = [place == self.knee for place in places]
         return settings | columns | {"knee": knee, "active": held}
+
+
+def _end_of(axis: Axis, share: float) -> list[str]:
+    """Which end of its range, or of its listed numbers, a variable has; [] between them, or for what has no order.
+
+    >>> _end_of(Axis("a", (3.0, 1.0, 2.0)), 0.1), _end_of(Axis("a", (), (0.0, 1.0)), 0.5)
+    (['a at the largest of its values'], [])
+    """
+    many = pieces(axis)
+    if axis.span is not None:
+        if min(share, 1.0 - share) > (0.5 / many if many else 0.0) + AT_BOUND:
+            return []
+        return [f"{axis.key} at its {'upper' if share > 0.5 else 'lower'} bound"]
+    if not axis.numeric or many < 2:
+        return []
+    value = value_at(axis, share)
+    ends = {max(axis.values): "largest", min(axis.values): "smallest"}
+    return [f"{axis.key} at the {ends[value]} of its values"] if value in ends else []

@@ -18,15 +18,15 @@ from zwidth.device.faults import DeviceError
 from zwidth.measures.definition import Note
 from zwidth.progress import Progress
 from zwidth.study.designs.study import Study
-from zwidth.study.designs.study_file import read_study
 from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.notes import merge_notes
 from zwidth.study.jobs.series import JobSeries
 from zwidth.study.optimise.evaluation import LARGEST, EvaluationJob, Judge, Judgement
 from zwidth.study.optimise.front import ranges, spread_out, undominated
 from zwidth.study.optimise.optimisation import Optimisation
 from zwidth.study.optimise.polish import polish
-from zwidth.study.optimise.problem import Problem, problem_of
+from zwidth.study.optimise.problem import Problem, problem_of, read_study_to_optimise
 from zwidth.study.optimise.recheck import (
     PRODUCED,
     Bars,
@@ -64,11 +64,10 @@ def optimise(
     cluster   address of a dask scheduler, or "local"
     time_limit  s that a design may take; one that takes longer has no values
     Returns   the front, the baseline and how they were found; equal for equal studies, however it was divided
-    Raises    DeviceError   with all faults of the study
-              MeasureError  for measures that do not exist for this device
+    Raises    DeviceError  with all faults of the study, measures that do not exist for this device among them
               what `executor.run` and `Store` raise
     """
-    read = study if isinstance(study, Study) else read_study(study, bounds=True)
+    read = study if isinstance(study, Study) else read_study_to_optimise(study)
     with JobSeries(store, progress, workers, cluster, time_limit) as series:
         return optimise_by(read, series)
 
@@ -77,6 +76,8 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
     """The same, computed by a series of jobs."""
     problem = problem_of(study)
     archive = _Archive(problem, series)
+    if series.folder is not None:
+        series.begin(archive.question)
     baseline = archive.baseline()
     start = _start(problem)
     alone = len(problem.objectives) == 1
@@ -126,6 +127,25 @@ class _Archive:
         self._places: dict[bytes, int] = {}  # of a design's shares
         self._jobs = 0
         self.notes: dict[str, list[Note]] = {column.name: [] for column in problem.columns}
+
+    @property
+    def question(self) -> str:
+        """Fingerprint of all that the jobs follow from: the variables with their bounds, what the designs are
+        judged by, and how they are searched."""
+        problem = self.problem
+        (middle,) = values_at(problem.variables, np.full((1, len(problem.variables)), 0.5))
+        return fingerprint(
+            "optimisation",
+            self.judging.job([middle]).question,
+            problem.variables,
+            problem.objectives,
+            problem.demands,
+            problem.members,
+            problem.tolerances,
+            problem.budget,
+            problem.seed,
+            problem.front,
+        )
 
     @property
     def hopeless(self) -> bool:
@@ -214,13 +234,17 @@ class _Archive:
 
     def _contacts(self, found: Optimisation) -> tuple[Contact, ...]:
         """A wall of each design of the front, simulated."""
-        contacts = []
-        for place in range(len(found.front)):
-            if self.progress is not None:
-                self.progress("simulating walls of the front", place, len(found.front))
+        contacts, count = list[Contact](), len(found.front)
+        for place in range(count):
+            self._tell("simulating walls of the front", place, count)
             cells = found.judgement.cells[found.front[place]]
             contacts.append(simulate_contact(self.problem, found.settings(place), cells))
+        self._tell("simulating walls of the front", count, count)
         return tuple(contacts)
+
+    def _tell(self, stage: str, done: int, of: int) -> None:
+        if self.progress is not None:
+            self.progress(stage, done, of)
 
 
 def own_values(problem: Problem) -> list[Any]:
