@@ -282,7 +282,7 @@ def test_finished_work_of_another_study_is_refused_at_the_start(folder):
     document_of("optimise", "plant.toml", "--resume", "kept")
     (folder / "plant.toml").write_text(WALL + changed(PLANT, "budget = 60", "budget = 61"))
     (line,) = refusal_lines("optimise", "plant.toml", "--resume", "kept")
-    assert line == "kept: keeps the finished work of another study; name another folder, or remove it"
+    assert line == "kept: keeps finished work of another study or other options; name another folder, or remove it"
     assert run_command("optimise", "plant.toml", "--output", "front.csv").code == 0
     assert not Path("front.csv.progress").exists()
 

@@ -233,7 +233,7 @@ def test_a_folder_of_the_user_s_is_kept_and_not_given_to_another_study(folder):
     written = values.stat().st_mtime_ns
     assert document_of("sweep", "study.toml", "--resume", "cells") == first
     assert values.stat().st_mtime_ns == written, "nothing is computed again"
-    refused = "cells: keeps the finished work of another study; name another folder, or remove it"
+    refused = "cells: keeps finished work of another study or other options; name another folder, or remove it"
     (folder / "study.toml").write_text(MANY.format(count=5))
     assert refusal_lines("sweep", "study.toml", "--resume", "cells") == [refused]
     (folder / "study.toml").write_text(MANY.format(count=4))

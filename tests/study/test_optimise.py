@@ -200,7 +200,10 @@ def test_another_study_is_refused_before_anything_is_computed(tmp_path, change):
     wider = axis(RATIO["key"], range=[8.0, 31.0], tie=RATIO["tie"])
     told = []
     for other in (problem_study(RATIO, **(given | change)), problem_study(wider, **given)):
-        with pytest.raises(StoreError, match=rf"^{tmp_path}/kept: keeps the finished work of another study; name"):
+        with pytest.raises(
+            StoreError,
+            match=rf"^{tmp_path}/kept: keeps finished work of another study or other options",
+        ):
             optimise(other, tmp_path / "kept", lambda *now: told.append(now), workers=1)
     assert told == []
     assert optimise(problem_study(RATIO, **given), tmp_path / "kept").values.tobytes() == first.values.tobytes()

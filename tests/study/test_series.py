@@ -24,7 +24,7 @@ def test_a_folder_is_kept_for_one_question(tmp_path):
     assert computed(folder) == []
     before = sorted(path.name for path in folder.iterdir())
     # the job is the same: only the question tells that others follow from it
-    with pytest.raises(StoreError, match=rf"^{folder}: keeps the finished work of another study; name another"):
+    with pytest.raises(StoreError, match=rf"^{folder}: keeps finished work of another study or other options"):
         computed(folder, "second")
     assert sorted(path.name for path in folder.iterdir()) == before
     assert computed(folder) == []
@@ -60,7 +60,7 @@ def test_a_folder_of_an_older_layout_is_told_by_its_stores(tmp_path):
     (folder / "series.json").unlink()
     assert computed(folder) == []
     assert not (folder / "series.json").exists()
-    with pytest.raises(StoreError, match=rf"^{folder}: keeps the finished work of another study; name another"):
+    with pytest.raises(StoreError, match=rf"^{folder}: keeps finished work of another study or other options"):
         computed(folder, cells=34)
 
 

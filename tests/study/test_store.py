@@ -42,7 +42,9 @@ def test_another_question_is_refused_and_nothing_is_lost(tmp_path):
     path = tmp_path / "cells"
     partial_store(path, RootsJob(33), [0])
     for other in (RootsJob(34), RootsJob(33, question="else"), RootsJob(33, measures=("root", "other"))):
-        with pytest.raises(StoreError, match=r"^cells: keeps the finished work of another study; name"):
+        with pytest.raises(
+            StoreError, match=r"^cells: keeps finished work of another study or other options; name"
+        ):
             Store(path, other)
         assert [first for first, _ in Store(path, RootsJob(33)).stored_batches()] == [0]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["cells"]

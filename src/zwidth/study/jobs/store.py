@@ -268,7 +268,7 @@ def whose_work(attributes: Mapping[str, Any], study: str) -> str:
     if release != __version__:
         what = "this study" if attributes.get("study") == study else "a study"
         return f"keeps {what} as computed by zwidth {release}, and this is {__version__}"
-    return "keeps the finished work of another study"
+    return "keeps finished work of another study or other options"
 
 
 @dataclass(frozen=True)
