@@ -115,6 +115,6 @@ class _Lines:
             return self._stage
         line = f"{self._stage}, {self._done} of {self._of}"
         here = self._done - self._first
-        if here <= 0 or here < AN_ESTIMATE * (self._of - self._first):
+        if self._done == self._of or here <= 0 or here < AN_ESTIMATE * (self._of - self._first):
             return line
         return f"{line}, about {time_text((now - self._began) * (self._of - self._done) / here)} left"
