@@ -215,8 +215,10 @@ def test_the_times_are_those_of_kernels_that_exist():
 def test_compile_finds_nothing_to_do_after_the_set_up():
     """The set-up has compiled all kernels: what `zwidth compile` wants is there."""
     command = [str(Path(sys.executable).with_name("zwidth")), "compile", "--json"]
-    first = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-    again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert json.loads(again.stdout)["kernels"] == 0
-    assert again.stderr == ""
-    assert Path(first["folder"]).is_dir()
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    if json.loads(ran.stdout)["kernels"]:  # tests that were set up in another way
+        ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    said = json.loads(ran.stdout)
+    assert said["kernels"] == 0
+    assert ran.stderr == ""
+    assert Path(said["folder"]).is_dir()

@@ -123,12 +123,12 @@ def test_what_is_wrong_is_said_in_a_line(here, words, message):
 
 def test_ctrl_c_keeps_the_cells_that_are_done(here):
     """The same command goes on from them, and ends with the same bytes as one that was never stopped."""
-    words = ["export", MECHANISM, "--cells", "7,4", "--levels", "3", "--workers", "1", "--output", "walls.h"]
+    words = ["export", MECHANISM, "--cells", "5,3", "--levels", "2", "--workers", "1", "--output", "walls.h"]
     code, _, error = stopped_by_ctrl_c(words, "zwidth.study.jobs.store:Store.write_batch", 2, here)
     assert code == 130
     assert "walls.h.progress keeps the finished work; the same command continues from it" in error
     assert not (here / "walls.h").exists()
     assert run_command(*words).code == 0
     assert [path.name for path in here.iterdir()] == ["walls.h"]
-    table = safe_walls(load(MECHANISM), cells=(7, 4), levels=3, workers=1)
+    table = safe_walls(load(MECHANISM), cells=(5, 3), levels=2, workers=1)
     assert (here / "walls.h").read_text() == header_text(table)

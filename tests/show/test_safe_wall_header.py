@@ -80,8 +80,8 @@ def cpp_compiler():
 @pytest.fixture(scope="module", params=CASES)
 def table(request):
     name, directions = CASES[request.param]
-    cells = {"cells": (6, 4)} if name == "five-bar" else {}
-    return safe_walls(load(name), levels=5, directions=directions, workers=1, **cells)
+    cells = {"cells": (5, 3)} if name == "five-bar" else {}
+    return safe_walls(load(name), levels=3, directions=directions, workers=1, **cells)
 
 
 def compiled(folder, program, compiler, *options, name="program.c"):

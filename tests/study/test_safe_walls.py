@@ -28,7 +28,7 @@ MIDDLE = {"x": (-0.1, 0.1), "y": (0.12, 0.28)}
 @pytest.fixture(scope="module")
 def table():
     """A table with two hands over the whole workspace."""
-    return safe_walls(load(MECHANISM), ["none", MEASURED_HAND], cells=(8, 4), levels=6, margin=0.05, workers=1)
+    return safe_walls(load(MECHANISM), ["none", MEASURED_HAND], cells=(6, 3), levels=4, margin=0.05, workers=1)
 
 
 def job_of(device, *, narrowing=True, **arguments):
@@ -198,18 +198,18 @@ def test_a_device_without_a_workspace_has_one_cell_that_is_everywhere():
 def test_the_document_and_the_columns_hold_the_table(table):
     document, columns, data = table.document(), table.table(), table.dataset()
     K = np.array(document["stiffness_max_N_per_m"], dtype=float)
-    assert K.shape == (4, 8)
-    assert {axis["name"]: axis["cells"] for axis in document["axes"]} == {"x": 8, "y": 4}
+    assert K.shape == (3, 6)
+    assert {axis["name"]: axis["cells"] for axis in document["axes"]} == {"x": 6, "y": 3}
     code, box = table.at((0.01, 0.2))
-    row, column = int((0.2 - 0.05) / 0.075), int((0.01 + 0.3) / 0.075)
+    row, column = int((0.2 - 0.05) / 0.1), int((0.01 + 0.3) / 0.1)
     assert (code, box.stiffness) == (0, K[row, column])
     assert document["status"][row][column] == "ok"
     assert set(table.status) == {OK, OUT_OF_REACH}
     assert len({len(values) for values in columns.values()}) == 1
-    assert len(columns["x_m"]) == (table.level > 0).sum() * 6 + (table.level == 0).sum()
+    assert len(columns["x_m"]) == (table.level > 0).sum() * 4 + (table.level == 0).sum()
     assert data["band_damping_min"].dims == ("y_m", "x_m", "sector", "band")
-    assert data["stiffness_max"].sel(x_m=0.0375, y_m=0.2375, method="nearest") == K[2, 4]
-    assert "16 of 32 cells" in repr(table)
+    assert data["stiffness_max"].sel(x_m=0.0375, y_m=0.2375, method="nearest") == K[1, 3]
+    assert "8 of 18 cells" in repr(table)
 
 
 # --- how it is computed -------------------------------------------------------------------------------

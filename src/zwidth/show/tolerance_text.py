@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 from zwidth.show.output import printable
 from zwidth.show.units import amount, number, percent, typed
-from zwidth.study.tolerances.outcomes import STABLE
 
 if TYPE_CHECKING:
     from zwidth.study.tolerances.band import BandWall
@@ -84,6 +83,8 @@ def wall_sentence(result: ToleranceStudy) -> str:
 
 def _undecided_sentence(result: ToleranceStudy, shown: str, share: Interval) -> str:
     """The sentence of a wall that lies on the stability limit of some devices, as far as rounding tells."""
+    from zwidth.study.tolerances.outcomes import STABLE
+
     count, many = result.question.samples, result.undecided
     within = "within rounding of the stability limit"
     if many == count:

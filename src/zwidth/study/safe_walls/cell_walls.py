@@ -29,6 +29,7 @@ from zwidth.chart.point_radii import radii_at_points
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import NO_VALUE, OK, UNDECIDED
+from zwidth.model.posture import Posture
 from zwidth.study.safe_walls.edge_chords import EdgeChords, edges_of_points
 from zwidth.study.safe_walls.grid import CellGrid, Sectors
 from zwidth.study.safe_walls.limits import NONE, Limits, Tightest
@@ -192,11 +193,12 @@ class _Slot:
     def _points(self, samples: Samples) -> list[OperatingPoint]:
         """The loops at n samples, with each hand. Raises _Failed where a posture cannot be had."""
         question, grid = self.question, self.question.grid
-        positions = grid.positions(self.cell, samples.posture)
         directions = self.sampler.along(samples) @ grid.axes
-        points = []
+        where: Floats | Posture | None = grid.positions(self.cell, samples.posture)
+        assembly, points = question.assembly, []
         for device in question.devices:
-            point = device.at(positions, directions, assembly=question.assembly, model=question.model)
+            point = device.at(where, directions, assembly=assembly, model=question.model)
+            where, assembly = point.posture, None  # which is the same in all hands
             if (point.status != OK).any():
                 raise _Failed(int(point.status[np.argmax(point.status != OK)]))
             points.append(point)
