@@ -19,6 +19,7 @@ from docs import _rows_chapters_1_2 as chapters_1_2
 from docs import _rows_device as device
 from docs import _rows_simulations as contact
 from docs._comparison_row import MEANING, OURS_ONLY, Row, count_verdicts
+from docs._markdown import table
 from docs._thesis_items import ITEMS, KINDS, NOT_COVERED, NOT_COVERED_ELSEWHERE, items_covered
 
 Sections = list[tuple[str, list[Row]]]
@@ -83,13 +84,6 @@ their common area](images/fig-5-4-common-area.svg)
 def sections() -> Sections:
     """Headings and their rows."""
     return [(title, rows()) for title, rows in SECTIONS]
-
-
-def table(header: tuple[str, ...], cells: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells]
-    return "\n".join(lines) + "\n"
 
 
 def verdicts(rows: list[Row]) -> str:

@@ -15,8 +15,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import zwidth
+from docs._markdown import table
 from docs.make_examples import run
-from docs.make_reproduction import table
 from zwidth.device.read import bundled_names
 from zwidth.measures.bindings.dexterity import isotropy
 

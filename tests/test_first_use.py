@@ -213,7 +213,8 @@ def test_the_times_are_those_of_kernels_that_exist():
 
 
 def test_compile_finds_nothing_to_do_after_the_set_up():
-    """The set-up has compiled all kernels: what `zwidth compile` wants is there."""
+    """The set-up has compiled all kernels: what `zwidth compile` wants is there. As the README and the page on
+    commands have it."""
     command = [str(Path(sys.executable).with_name("zwidth")), "compile", "--json"]
     ran = subprocess.run(command, capture_output=True, text=True, check=True)
     if json.loads(ran.stdout)["kernels"]:  # tests that were set up in another way

@@ -155,7 +155,7 @@ def assert_right(seen, loops):
 
 @pytest.mark.parametrize("kind", ["force-sensor", "feedforward", "local"])
 def test_charts_agree_with_eigenvalues(kind):
-    assert_right(look_at(kind, range(500)), 500)
+    assert_right(look_at(kind, range(250)), 250)
 
 
 def test_charts_of_all_three_together_agree_with_eigenvalues():

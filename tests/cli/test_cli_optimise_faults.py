@@ -29,8 +29,8 @@ front = 4
 @pytest.mark.parametrize(
     ("place", "calls"),
     [
-        ("zwidth.study.jobs.store:Store.begin", 2),  # a store without a batch
-        ("zwidth.study.jobs.store:Store.write_batch", 3),
+        pytest.param("zwidth.study.jobs.store:Store.begin", 2, marks=pytest.mark.slow),  # a store without a batch
+        pytest.param("zwidth.study.jobs.store:Store.write_batch", 3, marks=pytest.mark.slow),
         ("zwidth.study.optimise.polish:gradients", 1),
         ("zwidth.study.optimise.recheck:simulate_contact", 1),  # after all that is kept
     ],

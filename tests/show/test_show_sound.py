@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import wave
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ sampling_period_s = 0.001
 """
 
 
+@cache
 def mass_on_spring_response(frequency, duration, *, period=1e-4, delay=0.0, substeps=20, amplitude=1e-4):
     """A mass of 1 kg on a spring of this frequency, with very little damping, and next to no wall."""
     one = np.ones(1)
