@@ -9,6 +9,7 @@ import tarfile
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 WORKING_TREE = "."
@@ -35,6 +36,10 @@ def tree_of(label: str) -> str:
         return git("write-tree", **own_index)
 
 
+# What `git archive` wrote is safe; without a filter newer Pythons warn, and those before 3.11.4 know none.
+SAFELY: dict[str, Any] = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
+
+
 def export(trees: Mapping[str, str], folder: Path) -> None:
     """Write files into a folder, once: a folder that is complete stays as it is.
 
@@ -46,7 +51,7 @@ def export(trees: Mapping[str, str], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for path, tree in trees.items():
         with tarfile.open(fileobj=io.BytesIO(_archive(tree, path))) as archive:
-            archive.extractall(folder, filter="data")
+            archive.extractall(folder, **SAFELY)
     complete.touch()
 
 

@@ -16,6 +16,7 @@ from tests.device.device_cases import faults
 from zwidth.device.load import from_document
 from zwidth.device.new_device import new_device
 from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH
+from zwidth.model import handle_position
 from zwidth.model.posture import BeyondLimit, OutOfReach, solve_posture
 from zwidth.study.workspace.plane_grid import plane_of
 
@@ -261,6 +262,22 @@ def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straigh
         if missing > (1.0 - share) * np.linalg.norm(along) + 1e-5:
             with pytest.raises(OutOfReach):
                 device.at(orientation=Rotation.from_rotvec(share * along).as_matrix())
+
+
+def test_rounding_does_not_decide_which_pose_is_the_nearest(monkeypatch):
+    """A descent that passed a singularity ended half a metre away once in some runs, as rounding would have it."""
+    plain, rng = handle_position._descend, np.random.default_rng(2)
+    told = set()
+    for size in (0.0, *6 * [1e-15], *6 * [1e-13]):
+
+        def disturbed(mech, design, start, goal, size=size):
+            return plain(mech, design, start * (1.0 + size * rng.standard_normal(len(start))), goal)
+
+        monkeypatch.setattr(handle_position, "_descend", disturbed)
+        with pytest.raises(OutOfReach) as caught:
+            _stage(limited=False).at(orientation=[3.0, 0.0, 0.0])
+        told.add(str(caught.value))
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize("limited", [True, False])

@@ -27,7 +27,7 @@ from zwidth.model.forward_kinematics import (
     place_links,
     working_memory,
 )
-from zwidth.model.mechanism import ORIENTATION, POSITION, REVOLUTE, Floats
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, REVOLUTE, Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.mobility import constraints
 from zwidth.model.posture_batch import solve_batch
@@ -38,6 +38,7 @@ STARTS: Final = 4  # nodes of the roadmap nearest to the goal, from which it is 
 COARSE: Final = 2  # drives up to which a roadmap is quickly made; with more the reference is the only start
 DESCENTS: Final = 100
 LARGEST_TURN: Final = 0.2  # of a drive in one step [rad]
+ASTRAY: Final = 0.1  # share of a step by which it may miss where it should lead, of a handle that is posed
 SETTLED: Final = 1e-13  # turn of all drives, below which they have arrived [rad]
 # Shares of the way back from the nearest position to where the descent began: at the edge the drives lose control.
 RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.03, *np.linspace(0.1, 1.0, 19)])
@@ -140,7 +141,11 @@ def _descend(mech: MechanismArrays, design: int, start: Floats, goal: Floats) ->
         step[:moved] = motions @ turn
         move_joints(mech, trial, step)
         new = _close_loops(mech, design, trial, goal)
-        if np.linalg.norm(new[1][loops:]) < np.linalg.norm(missing):
+        nearer = np.linalg.norm(new[1][loops:]) < np.linalg.norm(missing)
+        # A pose led elsewhere than it should go has passed a singularity, beyond which rounding decides the way
+        led = J @ turn
+        astray = float(np.linalg.norm(missing - led - new[1][loops:]))
+        if nearer and (mech.controls != POSE or astray <= ASTRAY * float(np.linalg.norm(led))):
             angles, (rows, gaps), damping = trial, new, max(0.1 * damping, 1e-15)
         else:
             damping *= 10.0
