@@ -136,17 +136,19 @@ def may_be_zero(path: tuple[str | int, ...]) -> bool:
     return any(one.get("ge", one.get("minimum")) == 0 for one in numbers)
 
 
-def in_symmetric_matrix(path: tuple[str | int, ...]) -> bool:
-    """Whether a path leads to an element of a symmetric matrix: of a list of lists for which one number may stand.
+def mirror_image(path: tuple[str | int, ...]) -> tuple[str | int, ...] | None:
+    """The path of an element's mirror image in a symmetric matrix: a list of lists for which one number may stand.
+    None for the diagonal, and for what stands in none.
 
-    >>> in_symmetric_matrix(("plant", "mass_kg", 0, 1))
+    >>> mirror_image(("plant", "mass_kg", 0, 1))
+    ('plant', 'mass_kg', 1, 0)
+    >>> mirror_image(("mechanism", "loops", 0, "points_m", 0, 1)) is None
     True
-    >>> in_symmetric_matrix(("mechanism", "loops", 0, "points_m", 0, 1))
-    False
     """
-    if len(path) < 3 or not isinstance(path[-1], int) or not isinstance(path[-2], int):
-        return False
-    return any(kind.get("type") == "number" for kind in subschemas(path[:-2]))
+    if len(path) < 3 or not isinstance(path[-1], int) or not isinstance(path[-2], int) or path[-1] == path[-2]:
+        return None
+    symmetric = any(kind.get("type") == "number" for kind in subschemas(path[:-2]))
+    return (*path[:-2], path[-1], path[-2]) if symmetric else None
 
 
 def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:

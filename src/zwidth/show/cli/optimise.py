@@ -165,7 +165,8 @@ def _check_designs(folder: Path, study: Study) -> None:
         names = comma_list([path.name for path in others], 3)
         them = "it" if len(others) == 1 else "them"
         raise BadInput(
-            f"{folder}: holds {names}, which this study has not written; name another folder, or move {them} away"
+            f"{printable(str(folder))}: holds {names}, which this study has not written; name another folder, or "
+            f"move {them} away"
         )
 
 

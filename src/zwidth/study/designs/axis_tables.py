@@ -347,10 +347,8 @@ def mirrored(document: dict[str, Any], key: str) -> str | None:
     >>> mirrored({"plant": {"mass_kg": [[1.0, 0.0], [0.0, 1.0]]}}, "plant.mass_kg.0.1")
     'plant.mass_kg.1.0'
     """
-    steps = address.resolve(document, key)
-    if not schema.in_symmetric_matrix(steps) or steps[-1] == steps[-2]:
-        return None
-    return dotted((*steps[:-2], steps[-1], steps[-2]), document)
+    image = schema.mirror_image(address.resolve(document, key))
+    return None if image is None else dotted(image, document)
 
 
 def _tie_faults(

@@ -87,7 +87,9 @@ class JobSeries:
         if self._is_kept_for(own):
             return
         self._take_folder()
-        if not self._is_kept_for(own) and not any(self._stores()):  # another run may have been here meanwhile
+        if not self._is_kept_for(own) and not any(
+            stores_in(self.folder)
+        ):  # another run may have been here meanwhile
             draft = self.folder / f".{HEADER}"
             draft.write_text(
                 json.dumps({"zwidth": KIND, "version": STORE_VERSION, **own}) + "\n", encoding="utf-8"
@@ -101,7 +103,7 @@ class JobSeries:
         older layout: it is recognised by its stores, one after another.
         """
         assert self.folder is not None
-        if not any(self._stores()):
+        if not any(stores_in(self.folder)):
             return False
         try:
             header = json.loads((self.folder / HEADER).read_text(encoding="utf-8"))
@@ -116,9 +118,6 @@ class JobSeries:
         if header.get("question") != own["question"]:
             raise KeptForAnother(str(self.folder), whose_work(header, own["study"]))
         return True
-
-    def _stores(self) -> Iterator[Path]:
-        return stores_in(self.folder) if self.folder is not None else iter(())
 
     def _take_folder(self) -> None:
         """Make the folder, and keep other runs from writing there. Raises StoreError where another run does."""

@@ -76,8 +76,7 @@ def optimise_by(study: Study, series: JobSeries) -> Optimisation:
     """The same, computed by a series of jobs."""
     problem = problem_of(study)
     archive = _Archive(problem, series)
-    if series.folder is not None:
-        series.begin(archive.question)
+    series.begin(archive.question)
     baseline = archive.baseline()
     start = _start(problem)
     alone = len(problem.objectives) == 1

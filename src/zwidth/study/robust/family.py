@@ -185,8 +185,8 @@ class Family:
         for k, one in enumerate(self.ranges):
             steps = address.resolve(document, one.path)
             yield steps, k
-            if schema.in_symmetric_matrix(steps):
-                yield (*steps[:-2], steps[-1], steps[-2]), k
+            if (image := schema.mirror_image(steps)) is not None:
+                yield image, k
 
     def _columns(self, members: Sequence[FamilyMember], document: dict[str, Any]) -> list[DesignColumn]:
         """The numbers that differ in the document of several members."""

@@ -22,7 +22,7 @@ from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import device_of_point
-from zwidth.device.schema.device_file import in_symmetric_matrix
+from zwidth.device.schema.device_file import mirror_image
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
@@ -197,8 +197,8 @@ def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]])
 def _places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
     """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
     yield steps, multiple
-    if in_symmetric_matrix(steps) and steps[-1] != steps[-2]:
-        yield (*steps[:-2], steps[-1], steps[-2]), multiple
+    if (image := mirror_image(steps)) is not None:
+        yield image, multiple
 
 
 def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
@@ -227,7 +227,7 @@ def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _mirrored(steps: KeyPath) -> bool:
     """Whether the path is an element below the diagonal of a symmetric matrix."""
-    return in_symmetric_matrix(steps) and int(steps[-2]) > int(steps[-1])
+    return mirror_image(steps) is not None and int(steps[-2]) > int(steps[-1])
 
 
 def _scale(document: dict[str, Any], steps: KeyPath) -> float:

@@ -129,11 +129,14 @@ class Coverage:
 
     def lowest(self, members: int) -> int:
         """The first of the dampings at which so many devices have a wall in common; -1 for none."""
-        return min((d for d in range(len(self.dampings)) if (self._depths[d] >= members).any()), default=-1)
+        return min(self._reached(members), default=-1)
 
     def topmost(self, members: int) -> int:
         """The last of the dampings at which so many devices have a wall in common; -1 for none."""
-        return max((d for d in range(len(self.dampings)) if (self._depths[d] >= members).any()), default=-1)
+        return max(self._reached(members), default=-1)
+
+    def _reached(self, members: int) -> list[int]:
+        return [d for d in range(len(self.dampings)) if (self._depths[d] >= members).any()]
 
 
 def refined_dampings(coverage: Coverage, counts: Sequence[int], pieces: int) -> Floats:
