@@ -144,6 +144,8 @@ def test_other_files(folder, kind):
         assert 'id="charts"' in text
         assert 'id="front"' in text
         assert "as it is" in text
+        assert "plant.mass_kg at its" in text
+        assert "Plant.mass_kg" not in text
 
 
 def changed(text: str, old: str, new: str) -> str:
