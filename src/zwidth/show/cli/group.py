@@ -39,6 +39,7 @@ COMMANDS: Final = {
     "experiment": ("experiment", "ExperimentCommand"),
     "limit-cycles": ("limit_cycles", "LimitCyclesCommand"),
     "move": ("move", "MoveCommand"),
+    "app": ("app", "app"),
 }
 EPILOG = """\b
 Example:

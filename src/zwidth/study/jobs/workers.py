@@ -294,7 +294,7 @@ def work() -> None:
             while True:
                 kind, key, *content = pickle.load(received)
                 try:
-                    with _ended_with_its_starter():
+                    with ended_with_its_starter():
                         if kind == "job":
                             jobs[key] = pickle.loads(content[0])
                             for old in list(jobs)[:-MOST_JOBS]:
@@ -311,7 +311,7 @@ def work() -> None:
         os._exit(0)  # the process that started this one has ended, or needs no more; nothing to clean up
 
 
-class _ended_with_its_starter:
+class ended_with_its_starter:
     """Inside this block the system ends this process when the one that started it is killed.
 
     It sends SIGIO, which ends a process that has not asked for anything else, when the input's other end closes;

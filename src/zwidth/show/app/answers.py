@@ -1,0 +1,106 @@
+"""From a request of the page to a frame: what the computing process does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from zwidth.show.app.frames import pack_frame
+from zwidth.show.app.opened import OpenedDevices
+from zwidth.show.app.request import (
+    Computed,
+    ContactRequest,
+    ExportRequest,
+    FileRequest,
+    MapRequest,
+    MoreRequest,
+    OpenRequest,
+    PointsRequest,
+    SensitivityRequest,
+    State,
+    ViewRequest,
+)
+from zwidth.show.cli.errors import BadInput, NoAnswer, explain, translate_errors
+from zwidth.show.cli.options import Question
+from zwidth.show.cli.process import BAD_INPUT, NO_ANSWER
+
+Contents = tuple[dict[str, Any], Mapping[str, Any]]  # a head, and its arrays
+STATUS: Final = {NO_ANSWER: "no answer", BAD_INPUT: "bad input"}
+
+
+class Answers:
+    """Answers of one process. Each request is answered by one frame, a failure by its sentences.
+
+    folder   where files that the page sends are kept
+    report   takes frames that tell how far a long computation is
+    """
+
+    def __init__(self, folder: Path, report: Callable[[bytes], None]) -> None:
+        self.opened = OpenedDevices(folder)
+        self.report = report
+        self._asked: Any = None
+
+    def warm_up(self) -> None:
+        """Load what every answer needs, by answering a question about a small plant."""
+        from zwidth.loop.loop import Loop
+        from zwidth.model.plant import Plant
+
+        Loop(Plant.one_mass(mass=0.03, damping=1.0), sampling_period=0.001).chart()
+        import zwidth.show.app.layers  # noqa: F401
+
+    def answer(self, request: Computed | FileRequest) -> bytes:
+        """The frame that answers a request; never raises for what a page can ask."""
+        self._asked = request
+        head: dict[str, Any] = {"id": request.id, "kind": request.kind, "ok": True}
+        arrays: Mapping[str, Any] = {}
+        try:
+            with self._translated(request):
+                contents, arrays = self._contents(request)
+            head |= contents
+        except NoAnswer as error:
+            head |= {"ok": False, "status": STATUS[NO_ANSWER], "sentences": [str(error)]}
+        except (Exception, RecursionError) as error:
+            sentences, code = explain(error)
+            head |= {"ok": False, "status": STATUS.get(code, "error in zwidth"), "sentences": sentences}
+        return pack_frame(head, arrays)
+
+    def progress(self, stage: str, done: int, of: int) -> None:
+        """Tell the page how far the computation is."""
+        asked = self._asked
+        self.report(pack_frame({"id": asked.id, "kind": "progress", "stage": stage, "done": done, "of": of}, {}))
+
+    def _translated(self, request: Computed | FileRequest) -> Any:
+        state: State | None = getattr(request, "state", None)
+        name, model = (state.device, state.model) if state else ("", None)
+        return translate_errors(Question(name, model=model))
+
+    def _contents(self, request: Computed | FileRequest) -> Contents:
+        from zwidth.show.app import layers, studies
+
+        opened = self.opened
+        match request:
+            case FileRequest():
+                opened.add(request.name, request.text)
+                return {"name": request.name}, {}
+            case OpenRequest():
+                return layers.opened_device(opened, request.state)
+            case ViewRequest() | MoreRequest():
+                return layers.view(opened, request.state, request.layers)
+            case MapRequest():
+                return studies.workspace(opened, request, self.progress)
+            case SensitivityRequest():
+                return studies.what_to_change(opened, request, self.progress)
+            case ContactRequest():
+                return studies.contact(opened, request, self.progress)
+            case PointsRequest():
+                return studies.measured_points(opened, request)
+            case ExportRequest():
+                return studies.export(opened, request)
+        raise BadInput(f"there is no answer to {request.kind}")
+
+
+def finite(value: float) -> float | None:
+    """The number, or None where it is not finite."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,250 @@
+"""What is drawn while a number is dragged: the chart and all that can be switched on beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from zwidth.chart.chart_base import BoundaryArc, Chart
+from zwidth.device.device import Device
+from zwidth.device.read import DEVICES, OPERATORS, bundled, bundled_names
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.catalogue import MEASURES
+from zwidth.model.reduction import MODELS
+from zwidth.show.app.opened import OpenedDevices
+from zwidth.show.app.request import State
+
+if TYPE_CHECKING:
+    pass
+
+Floats = NDArray[np.float64]
+Contents = tuple[dict[str, Any], dict[str, Any]]
+
+DECAY_LEVELS: Final = (0.25, 0.5, 0.75)  # of the way from radius 1 to the fastest decay
+DAMPINGS: Final = 161  # at which the line of a published condition is computed
+
+
+def opened_device(opened: OpenedDevices, state: State) -> Contents:
+    """What the page needs to know of a device before it asks for views: words, choices and numbers."""
+    from zwidth.device.numbers import device_numbers
+
+    device = opened.device(state)
+    mechanism = device.mechanism
+    reference = None
+    if mechanism is not None:
+        rendered = np.asarray(device.reference_direction, dtype=float)
+        reference = {
+            "position": device.reference_position,
+            "direction": rendered[:3] if rendered[:3].any() else None,
+            "axis": rendered[3:] if rendered.size == 6 else None,
+            "assembly": device.reference_assembly,
+        }
+    return {
+        "name": device.name,
+        "label": device.label,
+        "description": device.description,
+        "source": device.source,
+        "given_by": "mechanism" if mechanism else "response" if device.response else "plant",
+        "reference": reference,
+        "assemblies": list(device.document.get("mechanism", {}).get("assemblies", {})),
+        "models": list(MODELS) if device.response is None else [],
+        "operator": device.operator_name,
+        "operators": bundled_names(OPERATORS),
+        "devices": [{"name": name, "description": about} for name, about, _ in bundled(DEVICES)],
+        "measures": [{"name": name, "unit": one.unit} for name, one in MEASURES.items()] if mechanism else [],
+        "numbers": [one.document() for one in device_numbers(device)],
+    }, {}
+
+
+def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents:
+    """The layers that the page shows of one state. A layer that has no answer says why; the others stand."""
+    device = opened.device(state)
+    point = opened.point(state, device)
+    head: dict[str, Any] = {"moments": point.turns}
+    arrays: dict[str, Any] = {}
+    chart: Chart | None = None
+    for name in sorted(set(layers), key=ORDER.index):
+        try:
+            if chart is None and name in OF_CHART:
+                chart = point.chart(decay="decay" in layers)
+            found, more = LAYERS[name](point, chart, state, device)
+        except (ArithmeticError, ValueError, NotImplementedError) as error:
+            if name == "chart":
+                raise
+            head[name] = {"reason": str(error)}
+            continue
+        head[name] = found
+        arrays |= {f"{name}.{key}": value for key, value in more.items()}
+    return head, arrays
+
+
+def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    numbers = {
+        "stiffness_max": chart.stiffness_max,
+        "damping_at_stiffness_max": chart.damping_at_stiffness_max,
+        "frequencies": list(chart.frequencies_at_stiffness_max),
+        "damping_max": chart.damping_max,
+        "stable_area": chart.stable_area,
+        "unobserved_modes": list(chart.unobserved_modes),
+        "left_out": list(point.linear_omissions),
+        "box": list(chart.box),
+    }
+    if state.wall is not None:
+        verdict = chart.check(state.wall.stiffness, state.wall.damping)
+        radius = getattr(verdict, "spectral_radius", None)
+        numbers["wall"] = {
+            "verdict": verdict.names[0],
+            "frequency": float(verdict.frequency),
+            "spectral_radius": None if radius is None else float(radius),
+        }
+    period = point.controller.sampling_period
+    numbers["sampling_period"] = float(period)
+    return numbers, rings(chart.regions) | edge(chart.boundary)
+
+
+def rings(outlines: Iterable[Floats]) -> dict[str, Any]:
+    """Closed rings one after another, and where each ends."""
+    return _joined("rings", list(outlines), 2)
+
+
+def edge(arcs: Iterable[BoundaryArc]) -> dict[str, Any]:
+    """The arcs of an edge one after another, rows (K, B, f), and where each ends."""
+    return _joined("arcs", [np.column_stack([a.stiffness, a.damping, a.frequency]) for a in arcs], 3)
+
+
+def _joined(name: str, parts: Sequence[Floats], width: int) -> dict[str, Any]:
+    ends = np.cumsum([len(part) for part in parts], dtype=np.int64)
+    whole = np.concatenate(parts) if parts else np.zeros((0, width))
+    return {name: whole, f"{name}_ends": ends}
+
+
+def _decay(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """Contours of equal spectral radius, and the fastest-decaying wall."""
+    from zwidth.chart.chart import StabilityChart, stability_chart
+
+    best = chart.fastest_decay
+    if not isinstance(chart, StabilityChart) or best is None:
+        raise ValueError("there are no contours of decay for this kind of device")
+    radii = [1.0 - share * (1.0 - best.spectral_radius) for share in DECAY_LEVELS]
+    levels = [stability_chart(chart.loop, radius, decay=False) for radius in radii]
+    arrays: dict[str, Any] = {}
+    for n, level in enumerate(levels):
+        arrays |= {f"{n}.{key}": value for key, value in rings(level.regions).items()}
+    buildable = chart.fastest_decay_in_first_quadrant
+    fastest = None if buildable is None else buildable.document()
+    return {"radii": radii, "fastest": fastest}, arrays
+
+
+def _models(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """The charts of the simpler models."""
+    others = [name for name in MODELS if name != (point.model or "full")]
+    return _several({name: _with_model(device, state, name) for name in others})
+
+
+def _with_model(device: Device, state: State, model: str) -> Callable[[], Chart]:
+    def chart() -> Chart:
+        if device.mechanism is None:
+            return device.at(model=model).chart(decay=False)
+        return device.at(
+            state.position, state.direction, axis=state.axis, assembly=state.assembly, model=model
+        ).chart(decay=False)
+
+    return chart
+
+
+def _hands(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """The charts in the bundled hands, and in nobody's."""
+    now = device.operator_name
+
+    def held(name: str) -> Callable[[], Chart]:
+        other = state.model_copy(update={"operator": name, "hand": None})
+
+        def chart() -> Chart:
+            return _with_model(device.held_by(name), other, point.model or "full" if device.mechanism else "")()
+
+        return chart
+
+    def ungripped() -> Chart:
+        return point.without_operator.chart(decay=False)
+
+    wanted: dict[str, Callable[[], Chart]] = {} if now is None else {"no hand": ungripped}
+    for name in bundled_names(OPERATORS):
+        if name != now:
+            wanted[name] = held(name)
+    return _several(wanted)
+
+
+def _several(wanted: Mapping[str, Callable[[], Chart]]) -> Contents:
+    head: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
+    for name, compute in wanted.items():
+        try:
+            chart = compute()
+        except (ArithmeticError, ValueError) as error:
+            head[name] = {"reason": str(error)}
+            continue
+        head[name] = {"stiffness_max": chart.stiffness_max}
+        arrays |= {f"{name}.{key}": value for key, value in rings(chart.regions).items()}
+    return {"charts": head}, arrays
+
+
+def _guarantees(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """The walls with each guarantee."""
+    head: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
+    for one in point.guarantees().guarantees:
+        head[one.name] = {"stiffness_max": one.region.stiffness_max}
+        arrays |= {f"{one.name}.{key}": value for key, value in rings(one.region.rings).items()}
+    return {"regions": head}, arrays
+
+
+def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """The published conditions, each as its largest stiffness over damping."""
+    compared = point.bounds()
+    top = 1.2 * max(chart.damping_max, chart.box[3], 1e-12)
+    dampings = np.linspace(0.0, top, DAMPINGS)
+    head, arrays = [], {"damping": dampings}
+    for n, one in enumerate(compared.bounds):
+        if one.lacking:
+            continue
+        head.append(
+            {
+                "name": one.name,
+                "source": one.source,
+                "claim": one.claim,
+                "kind": one.kind,
+                "violated": list(one.violated),
+                "stiffness_max": one.stiffness_max,
+                "array": f"bounds.{n}",
+            }
+        )
+        arrays[f"{n}"] = one.stiffness_max_at(dampings)
+    return {"conditions": head}, arrays
+
+
+def _eigenvalues(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """The eigenvalues of the loop with the state's wall."""
+    from zwidth.chart.verdict import eigenvalues
+
+    if state.wall is None:
+        raise ValueError("choose a wall on the chart first")
+    z = np.sort_complex(eigenvalues(point.loop, state.wall.stiffness, state.wall.damping).ravel())
+    return {}, {"z": np.column_stack([z.real, z.imag])}
+
+
+Layer = Callable[[OperatingPoint, Any, State, Device], Contents]
+LAYERS: dict[str, Layer] = {
+    "chart": _chart,
+    "decay": _decay,
+    "models": _models,
+    "hands": _hands,
+    "guarantees": _guarantees,
+    "bounds": _bounds,
+    "eigenvalues": _eigenvalues,
+}
+# In this order they are computed; these need the chart.
+ORDER: Final = ("chart", *(name for name in LAYERS if name != "chart"))
+OF_CHART: Final = frozenset({"chart", "decay", "models", "hands", "guarantees", "bounds"})

@@ -1,0 +1,88 @@
+"""Run the server: find a port, say where the page is, open it, and end with ctrl-C."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import webbrowser
+from collections.abc import Callable
+from typing import Any
+
+import uvicorn
+
+from zwidth.show.app.connection import LARGEST_FILE
+from zwidth.show.app.server import LARGEST_MESSAGE, LOOPBACK, Settings, make_app
+from zwidth.show.cli.errors import BadInput
+
+TRIED: int = 20  # ports, from the wanted one on
+
+
+def serve(
+    start: dict[str, Any], host: str, port: int, token: str, browser: bool, say: Callable[..., None]
+) -> None:
+    """Serve the page until ctrl-C. Raises BadInput where no port can be had."""
+    listening = listen(host, port)
+    settings = Settings(host, listening.getsockname()[1], token, start)
+    say(*announcement(settings))
+    server = make_server(settings)
+    if browser:
+        webbrowser.open(address_of(settings))
+    asyncio.run(server.serve(sockets=[listening]))
+    say("zwidth: the workbench has ended")
+
+
+def make_server(settings: Settings) -> uvicorn.Server:
+    """The server, quiet, with limits on what it reads."""
+    assert LARGEST_MESSAGE > LARGEST_FILE
+    return uvicorn.Server(
+        uvicorn.Config(
+            make_app(settings),
+            log_level="error",
+            access_log=False,
+            ws="websockets-sansio",
+            ws_max_size=LARGEST_MESSAGE,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=2,
+            server_header=False,
+        )
+    )
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket on the port, or on one of those after it that is free. Raises BadInput."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    wrong = ""
+    for candidate in range(port, port + (TRIED if port else 1)):
+        made = socket.socket(family, socket.SOCK_STREAM)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            made.bind((host, candidate))
+            made.listen(64)
+        except (OSError, OverflowError) as error:
+            made.close()
+            wrong = getattr(error, "strerror", "") or str(error)
+            continue
+        return made
+    raise BadInput(
+        f"--port {port}: the workbench cannot listen on {host}: {wrong}; choose another --port or --host"
+    )
+
+
+def address_of(settings: Settings) -> str:
+    """The page's address for this computer's browser."""
+    host = "127.0.0.1" if settings.host in ("0.0.0.0", "::") else settings.host
+    host = f"[{host}]" if ":" in host else host
+    query = f"?token={settings.token}" if settings.token else ""
+    return f"http://{host}:{settings.port}/{query}"
+
+
+def announcement(settings: Settings) -> list[str]:
+    """What the terminal says when the server has started."""
+    lines = [f"zwidth: the workbench is at {address_of(settings)} (ctrl-C ends it)"]
+    if settings.host not in LOOPBACK:
+        lines += [
+            "zwidth: other computers can connect with this token; what is sent is not encrypted",
+            "zwidth: on other computers browsers allow sound and boards only at a secure address: forward the port "
+            f"with ssh -L {settings.port}:127.0.0.1:{settings.port}, or put a server with https before it",
+        ]
+    return lines

@@ -1,0 +1,110 @@
+"""What is computed beside the view: maps, what to change, contacts, measured points, and files to be kept."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from zwidth.progress import Progress
+from zwidth.show.app.opened import OpenedDevices
+from zwidth.show.app.request import (
+    ContactRequest,
+    ExportRequest,
+    MapRequest,
+    PointsRequest,
+    SensitivityRequest,
+)
+from zwidth.show.cli.errors import BadInput
+
+# Series of a simulation that are sent as arrays.
+SERIES: Final = ("time_s", "position_m", "force_N", "energy_J", "velocity_m_per_s", "handle_m")
+WORDS: Final = {"figure": "chart", "data": "chart", "report": "report", "python": "lines"}
+Contents = tuple[dict[str, Any], dict[str, Any]]
+
+
+def workspace(opened: OpenedDevices, request: MapRequest, progress: Progress) -> Contents:
+    """A measure over the plane of the device's workspace, in this process."""
+    from zwidth.study.workspace.map import workspace_map
+    from zwidth.study.workspace.plane_grid import plane_of
+
+    state, device = request.state, opened.device(request.state)
+    plane = plane_of(device, cells=(request.count, request.count))
+    data = workspace_map(
+        device,
+        request.measure,
+        plane,
+        direction=state.direction,
+        assembly=state.assembly,
+        model=state.model,
+        progress=progress,
+        workers=1,
+    )
+    values = data[request.measure]
+    axes = [str(name) for name in values.dims]
+    arrays = {
+        "y": np.asarray(data[axes[0]]),
+        "x": np.asarray(data[axes[1]]),
+        "values": np.asarray(values, dtype=float),
+        "status": np.asarray(data[f"{request.measure}_status"]).astype(np.uint8),
+    }
+    return {"measure": request.measure, "unit": str(values.attrs.get("units", "")), "axes": axes}, arrays
+
+
+def what_to_change(opened: OpenedDevices, request: SensitivityRequest, progress: Progress) -> Contents:
+    """Sensitivity of the largest stiffness to each number; with a goal, what each would have to be."""
+    from zwidth.study.sensitivity.sensitivities import sensitivities
+
+    device = opened.device(request.state)
+    point = opened.point(request.state, device)
+    head: dict[str, Any] = dict(sensitivities(device, point, progress).document())
+    if request.goal is not None:
+        from zwidth.study.sensitivity.goal import numbers_for_goal
+
+        head["goal"] = numbers_for_goal(device, point, request.goal, progress).document()
+    return head, {}
+
+
+def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) -> Contents:
+    """One contact with the state's wall, as `zwidth simulate` has it."""
+    state = request.state
+    point = opened.point(state)
+    if state.wall is None:
+        raise BadInput("choose a wall on the chart first")
+    made = point.simulate(
+        stiffness=state.wall.stiffness,
+        damping=state.wall.damping,
+        wall="one-sided" if request.one_sided else "two-sided",
+        start_position=request.depth,
+        start_velocity=request.velocity,
+        push=request.push,
+        duration=request.duration,
+        progress=progress,
+    )
+    document = made.document()
+    arrays = {name: document.pop(name) for name in list(document) if name in SERIES}
+    return {**document, "series": list(arrays)}, arrays
+
+
+def measured_points(opened: OpenedDevices, request: PointsRequest) -> Contents:
+    """The measured points of a file, and the device's verdict on each."""
+    from zwidth.study.boundary.points_file import read_points
+
+    if request.file not in opened.texts:
+        raise BadInput(f"{request.file} has not been sent by the page; open it once more")
+    points = read_points(request.file)
+    walls = np.array([(one.stiffness, one.damping) for one in points])
+    checked = opened.point(request.state).check(walls[:, 0], walls[:, 1])
+    spread = [(one.damping_low, one.damping_high, one.stiffness_low, one.stiffness_high) for one in points]
+    words = [{"edge": one.edge, "verdict": one.verdict} for one in points]
+    return {"file": request.file, "points": words, "verdicts": checked.names}, {"walls": walls, "spread": spread}
+
+
+def export(opened: OpenedDevices, request: ExportRequest) -> Contents:
+    """A file to be kept, as bytes, and the name that it is offered under."""
+    from zwidth.show.app.kept_files import kept_file
+
+    content = kept_file(opened, request)
+    stem = request.state.device.removesuffix(".toml")
+    ending = "" if request.what == "device" else f"-{WORDS[request.what]}"
+    return {"name": f"{stem}{ending}.{request.format}"}, {"content": np.frombuffer(content, dtype=np.uint8)}
