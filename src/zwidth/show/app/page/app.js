@@ -1,0 +1,479 @@
+/**
+ * The page: one state, three views of it, and the numbers beside them.
+ *
+ *     a change of the state ──▶ request ──▶ frame ──▶ drawn on the next animation frame ──▶ confirmed
+ *
+ * Whatever is asked for is asked for in `ask`; whatever is drawn is drawn in `draw`.
+ */
+
+import { number, palette, quantity } from "./canvas.js";
+import { ChartView } from "./chart_view.js";
+import { Connection, Dropped, Refusal } from "./connection.js";
+import { linkOf, readLink, Store } from "./state.js";
+import { NumbersPanel } from "./numbers_panel.js";
+import { saveBytes } from "./files.js";
+
+/** @typedef {import("./connection.js").Frame} Frame */
+/** @typedef {import("./state.js").State} State */
+
+const FAST = ["frequency", "decay", "models", "hands"]; // layers that come with every view
+const SLOW = ["guarantees", "bounds"]; // and those that follow when the hand rests
+const RESTS = 250; // ms without a change after which they are asked for
+
+/** @param {string} id @returns {any} */
+const byId = (id) => document.getElementById(id);
+
+export class App {
+  /**
+   * @param {string} token
+   * @param {State} state
+   * @param {{[name: string]: string}} files
+   * @param {boolean} local  whether the server is on this computer
+   */
+  constructor(token, state, files, local) {
+    this.local = local;
+    this.store = new Store({ ...state, settings: state.settings ?? {} }, (next) => this.changed(next));
+    /** @type {any} */
+    this.device = null;
+    /** @type {Frame | null} */
+    this.view = null;
+    this.opened = "";
+    this.keys = "";
+    this.waits = false; // a view has come that is not drawn yet
+    this.rests = 0;
+    this.face = "chart";
+    this.chart = new ChartView(byId("chart"), {
+      onWall: (wall, drag) => this.store.set({ wall }, drag),
+      onRelease: () => this.store.release(),
+    });
+    this.numbers = new NumbersPanel(byId("number-list"), {
+      onNumber: (settings, drag) => this.store.setNumbers(settings, drag),
+      onRelease: () => this.store.release(),
+    });
+    this.connection = new Connection(token, {
+      onOpen: () => this.refresh(),
+      onLost: () => this.say("The connection to zwidth is lost; the page keeps its numbers and tries again.", true),
+    });
+    for (const [name, text] of Object.entries(files)) this.connection.files.set(name, text);
+    this.listen();
+  }
+
+  get state() {
+    return this.store.state;
+  }
+
+  // --- asking -----------------------------------------------------------------------------------------
+
+  /** Ask anew for everything that is shown. */
+  refresh() {
+    this.opened = "";
+    this.changed(this.state);
+  }
+
+  /** @param {State} state */
+  changed(state) {
+    const opened = `${state.from_file ? "file" : "bundled"} ${state.device}`;
+    const keys = `${opened} ${JSON.stringify(Object.entries(state.settings).filter(([, value]) => typeof value !== "number"))} ${Object.keys(state.settings).sort()} ${state.operator} ${state.assembly}`;
+    if (keys !== this.keys || !this.opened) {
+      this.keys = keys;
+      void this.openDevice(opened);
+    }
+    this.numbers.update(state.settings);
+    this.chart.wall = state.wall ?? null;
+    byId("undo").disabled = !this.store.past.length;
+    byId("redo").disabled = !this.store.future.length;
+    this.writeWall();
+    void this.ask();
+  }
+
+  /** @param {string} opened */
+  async openDevice(opened) {
+    const another = opened !== this.opened;
+    this.opened = opened;
+    try {
+      const { head } = await this.connection.ask("open", { state: sent(this.state) });
+      this.device = head;
+      this.writeDevice(head, another);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** Ask for the view of the present state, and later for what takes longer. */
+  async ask() {
+    clearTimeout(this.rests);
+    this.rests = setTimeout(() => void this.askMore(), RESTS);
+    const layers = ["chart", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers()];
+    try {
+      const frame = await this.connection.ask("view", { state: sent(this.state), layers });
+      this.view = frame;
+      this.chart.setFrame(frame);
+      this.say("");
+      this.drawSoon();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  async askMore() {
+    const layers = SLOW.filter((name) => this.chart.layers.has(name));
+    if (!layers.length) {
+      this.chart.more = null;
+      return;
+    }
+    this.say(`computing ${layers.join(" and ")}…`);
+    try {
+      this.chart.more = await this.connection.ask("more", { state: sent(this.state), layers }, this.progress);
+      this.say("");
+      this.drawSoon();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  faceLayers() {
+    return ["impedance", "nyquist", "eigenvalues"].includes(this.face) ? [this.face] : [];
+  }
+
+  progress = (/** @type {string} */ stage, /** @type {number} */ done, /** @type {number} */ of) => {
+    this.say(of ? `${stage}: ${done} of ${of}` : `${stage}…`);
+  };
+
+  /** @param {unknown} error */
+  fail(error) {
+    if (error instanceof Dropped) return;
+    if (error instanceof Refusal) {
+      if (error.status !== "stopped") this.say(error.message, true);
+      return;
+    }
+    throw error;
+  }
+
+  // --- drawing ----------------------------------------------------------------------------------------
+
+  drawSoon() {
+    if (this.waits) return;
+    this.waits = true;
+    requestAnimationFrame(() => {
+      this.waits = false;
+      this.draw();
+      this.connection.confirm();
+    });
+  }
+
+  draw() {
+    this.chart.draw();
+    this.writeHeadline();
+    this.writeLegend();
+    this.writeWall();
+  }
+
+  writeHeadline() {
+    const chart = this.view?.head.chart;
+    const line = byId("headline");
+    if (!chart) return;
+    const { K, B } = this.chart.units;
+    if (!(chart.stiffness_max > 0)) {
+      line.textContent = "No stable wall has K > 0 and B ≥ 0.";
+      return;
+    }
+    const strong = document.createElement("strong");
+    strong.textContent = quantity(chart.stiffness_max, K);
+    const hertz = chart.frequencies.map((/** @type {number} */ f) => quantity(f, "Hz")).join(" and ");
+    line.replaceChildren("up to ", strong, ` at ${quantity(chart.damping_at_stiffness_max, B)} of damping; there it oscillates at ${hertz}`);
+  }
+
+  writeLegend() {
+    const colours = palette(byId("chart"));
+    const items = [
+      ...this.chart.outlines(/** @type {any} */ (colours)).map((one, n) => ({ ...one, pinned: n < this.chart.pinned.length ? n : -1, title: "" })),
+      ...this.chart.bounds(/** @type {any} */ (colours)).map((one) => ({ ...one, pinned: -1, title: `${one.source}${one.holds ? "" : "; its assumptions are not met"}` })),
+    ];
+    const list = byId("legend");
+    list.replaceChildren(...items.map((one) => this.legendItem(one)));
+  }
+
+  /** @param {{name: string, colour: string, dash: number[], pinned: number, title: string}} one */
+  legendItem(one) {
+    const item = document.createElement("li");
+    const picture = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    for (const [key, value] of Object.entries({ x1: 0, y1: 4, x2: 26, y2: 4, stroke: one.colour, "stroke-width": 2, "stroke-dasharray": one.dash.join(" ") })) line.setAttribute(key, String(value));
+    picture.append(line);
+    item.append(picture, one.name);
+    item.title = one.title;
+    if (one.pinned >= 0) {
+      const remove = document.createElement("button");
+      remove.type = "button";
+      remove.textContent = "×";
+      remove.setAttribute("aria-label", `Remove ${one.name}`);
+      remove.addEventListener("click", () => {
+        this.chart.pinned.splice(one.pinned, 1);
+        this.chart.follow();
+        this.drawSoon();
+      });
+      item.append(remove);
+    }
+    return item;
+  }
+
+  writeWall() {
+    const wall = this.state.wall;
+    const { K, B } = this.chart.units;
+    for (const [id, value, unit] of /** @type {[string, number | undefined, string][]} */ ([["wall-stiffness", wall?.stiffness, K], ["wall-damping", wall?.damping, B]])) {
+      const field = byId(id);
+      if (document.activeElement !== field) field.value = value === undefined ? "" : String(Number(value.toPrecision(4)));
+      byId(`${id}-unit`).textContent = unit;
+    }
+    const found = this.view?.head.chart.wall;
+    const output = byId("verdict");
+    output.className = found?.verdict ?? "";
+    output.textContent = !wall ? "choose a wall on the chart" : !found ? "" : `${found.verdict}, ${found.verdict === "stable" ? "slowest motion" : "oscillates"} at ${quantity(found.frequency, "Hz")}${found.spectral_radius === null ? "" : `, |z| ${number(found.spectral_radius, 5)}`}`;
+  }
+
+  /** @param {any} head @param {boolean} another */
+  writeDevice(head, another) {
+    const choice = byId("device-choice");
+    const names = head.devices.map((/** @type {any} */ each) => each.name);
+    const own = this.state.from_file ? [this.state.device] : [];
+    choice.replaceChildren(...[...own, ...names].map((name) => new Option(name, name)));
+    choice.value = this.state.device;
+    choice.title = head.description;
+    document.title = `${head.name} – zwidth`;
+    this.numbers.setNumbers(head.numbers, this.state.settings);
+    options(byId("model"), [["", head.given_by === "mechanism" ? "full" : "as given"], ...head.models.map((/** @type {string} */ name) => [name, name])], this.state.model ?? "");
+    options(byId("operator"), [["", head.operator ? `${head.operator} (file)` : "nobody"], ["none", "nobody"], ...head.operators.map((/** @type {string} */ name) => [name, name])], this.state.operator ?? "");
+    options(byId("assembly"), [["", head.reference?.assembly ?? "–"], ...head.assemblies.map((/** @type {string} */ name) => [name, name])], this.state.assembly ?? "");
+    options(byId("measure"), [["", "none"], ...head.measures.map((/** @type {any} */ each) => [each.name, `${each.name.replaceAll("_", " ")}`])], "");
+    for (const id of ["model", "assembly", "measure"]) byId(id).disabled = byId(id).options.length < 2;
+    if (another) {
+      this.chart.box = null;
+      this.chart.more = null;
+      this.numbers.sortBy(null);
+      byId("sort").setAttribute("aria-pressed", "false");
+    }
+  }
+
+  /** @param {string} sentence @param {boolean} [wrong] */
+  say(sentence, wrong = false) {
+    const status = byId("status");
+    status.textContent = sentence;
+    status.classList.toggle("wrong", wrong);
+  }
+
+  // --- what the user does -----------------------------------------------------------------------------
+
+  listen() {
+    byId("undo").addEventListener("click", () => this.store.undo());
+    byId("redo").addEventListener("click", () => this.store.redo());
+    byId("share").addEventListener("click", () => void this.share());
+    byId("pin").addEventListener("click", () => this.pin());
+    byId("theme").addEventListener("click", () => this.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+    byId("sort").addEventListener("click", () => void this.sort());
+    byId("seek").addEventListener("click", () => void this.seek());
+    byId("filter").addEventListener("input", () => this.numbers.show(byId("filter").value));
+    byId("whole").addEventListener("change", () => this.chart.showWhole(byId("whole").checked));
+    byId("device-choice").addEventListener("change", () => this.choose(byId("device-choice").value));
+    byId("export").addEventListener("change", () => void this.export(byId("export").value));
+    byId("open-file").addEventListener("click", () => byId("file").click());
+    byId("file").addEventListener("change", () => void this.openFiles(byId("file").files));
+    for (const box of document.querySelectorAll("[data-layer]")) {
+      box.addEventListener("change", () => {
+        const input = /** @type {HTMLInputElement} */ (box);
+        if (input.checked) this.chart.layers.add(String(input.dataset.layer));
+        else this.chart.layers.delete(String(input.dataset.layer));
+        void this.ask();
+        this.drawSoon();
+      });
+    }
+    for (const [id, key] of [["model", "model"], ["operator", "operator"], ["assembly", "assembly"]]) {
+      byId(id).addEventListener("change", () => this.store.set({ [key]: byId(id).value || null }));
+    }
+    for (const id of ["wall-stiffness", "wall-damping"]) {
+      byId(id).addEventListener("change", () => this.typeWall());
+    }
+    addEventListener("keydown", (event) => this.shortcut(event));
+    addEventListener("hashchange", () => void this.followLink());
+    new ResizeObserver(() => this.drawSoon()).observe(byId("chart"));
+    this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    this.listenToDrops();
+  }
+
+  listenToDrops() {
+    addEventListener("dragover", (event) => {
+      event.preventDefault();
+      byId("drop").hidden = false;
+    });
+    addEventListener("dragleave", (event) => {
+      if (!event.relatedTarget) byId("drop").hidden = true;
+    });
+    addEventListener("drop", (event) => {
+      event.preventDefault();
+      byId("drop").hidden = true;
+      void this.openFiles(event.dataTransfer?.files ?? null);
+    });
+  }
+
+  /** @param {KeyboardEvent} event */
+  shortcut(event) {
+    if (!(event.ctrlKey || event.metaKey)) return;
+    const typing = event.target instanceof HTMLInputElement && event.target.type !== "range" && event.target.type !== "checkbox";
+    if (typing) return;
+    const key = event.key.toLowerCase();
+    if (key === "z" && !event.shiftKey) this.store.undo();
+    else if (key === "y" || (key === "z" && event.shiftKey)) this.store.redo();
+    else return;
+    event.preventDefault();
+  }
+
+  typeWall() {
+    const numbers = ["wall-stiffness", "wall-damping"].map((id) => Number(byId(id).value.replace(",", ".")));
+    const wrong = numbers.findIndex((value) => !Number.isFinite(value));
+    if (wrong >= 0) {
+      this.say(`${wrong ? "B" : "K"} of the wall is a number, such as ${wrong ? "10" : "4000"}`, true);
+      return;
+    }
+    this.store.set({ wall: { stiffness: numbers[0], damping: numbers[1] } });
+  }
+
+  /** @param {string} device */
+  choose(device) {
+    const from_file = this.connection.files.has(device);
+    this.store.set({ device, from_file, settings: {}, position: null, direction: null, axis: null, assembly: null, model: null, operator: null, hand: null });
+  }
+
+  /** @param {string} theme */
+  setTheme(theme) {
+    document.documentElement.dataset.theme = theme;
+    this.drawSoon();
+  }
+
+  pin() {
+    if (!this.view) return;
+    const names = this.chart.pinned.map((each) => each.name);
+    let n = 1;
+    while (names.includes(`pinned ${n}`)) n++;
+    this.chart.pinned.push({ name: `pinned ${n}`, frame: this.view });
+    this.drawSoon();
+  }
+
+  async share() {
+    const files = this.state.from_file ? Object.fromEntries(this.connection.files) : {};
+    const address = `${location.origin}${location.pathname}${location.search}#${await linkOf(this.state, files)}`;
+    history.replaceState(null, "", address);
+    try {
+      await navigator.clipboard.writeText(address);
+      this.say("the link is copied; the numbers are in it");
+    } catch {
+      this.say("the link is in the address bar; the numbers are in it");
+    }
+  }
+
+  async followLink() {
+    try {
+      const { state, files } = await readLink(location.hash.slice(1));
+      for (const [name, text] of Object.entries(files)) await this.connection.sendFile(name, text);
+      this.store.set(state);
+    } catch (error) {
+      this.say(/** @type {Error} */ (error).message, true);
+    }
+  }
+
+  async sort() {
+    const button = byId("sort");
+    if (button.getAttribute("aria-pressed") === "true") {
+      button.setAttribute("aria-pressed", "false");
+      this.numbers.sortBy(null);
+      return;
+    }
+    this.say("computing what to change first…");
+    try {
+      const { head } = await this.connection.ask("sensitivity", { state: sent(this.state) }, this.progress);
+      button.setAttribute("aria-pressed", "true");
+      this.numbers.sortBy(head.sensitivities);
+      this.say("");
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  async seek() {
+    const field = byId("goal");
+    const goal = 1000 * Number(field.value.replace(",", "."));
+    if (!(goal > 0)) {
+      this.say("a goal is a stiffness above 0, such as 8 kN/m", true);
+      return;
+    }
+    this.say(`looking for what reaches ${quantity(goal, "N/m")}…`);
+    try {
+      const { head } = await this.connection.ask("sensitivity", { state: sent(this.state), goal }, this.progress);
+      byId("sort").setAttribute("aria-pressed", "true");
+      this.numbers.sortBy(head.sensitivities);
+      this.numbers.setGoal(head.goal.goal ?? head.goal.numbers ?? []);
+      this.say("");
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** @param {string} choice  what.format */
+  async export(choice) {
+    byId("export").value = "";
+    if (!choice) return;
+    const [what, format] = choice.split(".");
+    this.say(`writing the ${what}…`);
+    try {
+      const { head, arrays } = await this.connection.ask("export", { state: sent(this.state), what, format }, this.progress);
+      saveBytes(head.name, /** @type {Uint8Array<ArrayBuffer>} */ (arrays.content.values));
+      this.say(`${head.name} is written`);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** @param {FileList | null} files */
+  async openFiles(files) {
+    if (!files?.length) return;
+    try {
+      const texts = await Promise.all([...files].map(async (file) => ({ name: file.name, text: await file.text() })));
+      for (const { name, text } of texts) await this.connection.sendFile(name, text);
+      const device = texts.find(({ name }) => name.toLowerCase().endsWith(".toml"));
+      if (device) this.choose(device.name);
+      else await this.showPoints(texts[0].name);
+    } catch (error) {
+      this.fail(error);
+    }
+    byId("file").value = "";
+  }
+
+  /** @param {string} file */
+  async showPoints(file) {
+    const { head, arrays } = await this.connection.ask("points", { state: sent(this.state), file });
+    const walls = arrays.walls.values;
+    this.chart.points = head.points.map((/** @type {any} */ each, /** @type {number} */ n) => ({
+      stiffness: walls[2 * n],
+      damping: walls[2 * n + 1],
+      spread: [...arrays.spread.values.slice(4 * n, 4 * n + 4)],
+      measured: each.verdict,
+      verdict: head.verdicts[n],
+    }));
+    this.chart.follow();
+    this.say(`${head.points.length} measured points of ${file}`);
+    this.drawSoon();
+  }
+}
+
+/**
+ * The state as the server takes it: without what is not set.
+ *
+ * @param {State} state
+ */
+export function sent(state) {
+  return Object.fromEntries(Object.entries(state).filter(([, value]) => value !== null && value !== undefined));
+}
+
+/** @param {HTMLSelectElement} select @param {string[][]} pairs @param {string} value */
+function options(select, pairs, value) {
+  select.replaceChildren(...pairs.map(([key, text]) => new Option(text, key)));
+  select.value = value;
+}

@@ -1,0 +1,255 @@
+/**
+ * The numbers of the device as sliders and fields, grouped as in its file, or the most influential first.
+ *
+ * Rows are made once for a device and then only changed, so that a drag never loses its slider.
+ */
+
+import { number, quantity } from "./canvas.js";
+
+/**
+ * @typedef {object} DeviceNumber
+ * @property {string} path
+ * @property {string[]} group
+ * @property {string} name
+ * @property {any} value
+ * @property {string} unit
+ * @property {string} description
+ * @property {string} source
+ * @property {number | null} low       of the slider
+ * @property {number | null} high
+ * @property {"linear" | "logarithmic"} scale
+ * @property {boolean} whole
+ * @property {number | null} lowest    that is allowed
+ * @property {number | null} highest
+ * @property {string[] | null} choices
+ * @property {string[]} also           paths that change with it
+ * @property {boolean} given           whether the file gives it
+ */
+/** @typedef {{path: string, d_ln_stiffness_max_d_ln_value: number | null, unit: string | null}} Sensitivity */
+/** @typedef {{path: string, value: number | null, status: string, reason?: string | null}} GoalNumber */
+
+const STEPS = 1000; // of a slider
+
+export class NumbersPanel {
+  /**
+   * @param {HTMLElement} element
+   * @param {{onNumber: (settings: {[path: string]: any}, drag?: string) => void, onRelease: () => void}} listeners
+   */
+  constructor(element, listeners) {
+    this.element = element;
+    this.listeners = listeners;
+    /** @type {DeviceNumber[]} */
+    this.numbers = [];
+    /** @type {Map<string, {row: HTMLElement, slider: HTMLInputElement | null, field: HTMLInputElement | HTMLSelectElement,
+     *   note: HTMLElement, number: DeviceNumber}>} */
+    this.rows = new Map();
+    /** @type {{[path: string]: any}} */
+    this.settings = {};
+    /** @type {Sensitivity[] | null} */
+    this.order = null;
+    /** @type {Map<string, GoalNumber>} */
+    this.goal = new Map();
+    this.filter = "";
+  }
+
+  /** @param {DeviceNumber[]} numbers @param {{[path: string]: any}} settings */
+  setNumbers(numbers, settings) {
+    this.numbers = numbers;
+    this.settings = settings;
+    this.build();
+  }
+
+  /** @param {Sensitivity[] | null} order  null: as in the file */
+  sortBy(order) {
+    this.order = order;
+    this.build();
+  }
+
+  /** @param {GoalNumber[]} goal */
+  setGoal(goal) {
+    this.goal = new Map(goal.map((each) => [each.path, each]));
+    for (const [path, { note, number: of }] of this.rows) this.writeNote(note, path, of);
+  }
+
+  /** @param {string} text */
+  show(text) {
+    this.filter = text.toLowerCase();
+    this.build();
+  }
+
+  /** Take over changed values; a field that is typed into is left alone. @param {{[path: string]: any}} settings */
+  update(settings) {
+    this.settings = settings;
+    for (const { number: of, slider, field, row } of this.rows.values()) {
+      const value = this.valueOf(of);
+      if (slider && document.activeElement !== field) slider.value = String(toSlider(of, value));
+      if (document.activeElement !== field) field.value = of.choices ? value : plain(value);
+      if (slider) slider.setAttribute("aria-valuetext", quantity(value, of.unit));
+      row.classList.toggle("changed", of.path in settings);
+    }
+  }
+
+  /** @param {DeviceNumber} of */
+  valueOf(of) {
+    const value = this.settings[of.path];
+    return value === undefined || value === null ? of.value : value;
+  }
+
+  build() {
+    this.rows.clear();
+    const shown = this.numbers.filter((of) => `${of.path} ${of.name} ${of.group.join(" ")}`.toLowerCase().includes(this.filter));
+    const parts = [];
+    if (this.order) {
+      const rank = new Map(this.order.map((each, n) => [each.path, { n, each }]));
+      const sorted = shown.filter((of) => rank.has(of.path)).sort((a, b) => (rank.get(a.path)?.n ?? 0) - (rank.get(b.path)?.n ?? 0));
+      parts.push(this.groupOf("What to change first", sorted, true));
+    } else {
+      /** @type {Map<string, DeviceNumber[]>} */
+      const groups = new Map();
+      for (const of of shown) {
+        const title = of.group.join(" › ");
+        groups.set(title, [...(groups.get(title) ?? []), of]);
+      }
+      for (const [title, members] of groups) parts.push(this.groupOf(title, members, this.filter !== "" || members[0].group[0] === "loop"));
+    }
+    const open = new Set([...this.element.querySelectorAll("details[open]")].map((each) => each.getAttribute("data-title")));
+    this.element.replaceChildren(...parts);
+    for (const each of this.element.querySelectorAll("details")) if (open.has(each.getAttribute("data-title"))) each.open = true;
+    this.update(this.settings);
+  }
+
+  /** @param {string} title @param {DeviceNumber[]} members @param {boolean} open */
+  groupOf(title, members, open) {
+    const group = document.createElement("details");
+    group.open = open;
+    group.dataset.title = title;
+    const head = document.createElement("summary");
+    head.textContent = title || "device";
+    group.append(head, ...members.map((of) => this.rowOf(of)));
+    return group;
+  }
+
+  /** @param {DeviceNumber} of */
+  rowOf(of) {
+    const row = document.createElement("div");
+    row.className = "number";
+    const name = document.createElement("label");
+    name.textContent = this.order ? `${of.group.slice(1).join(" ")} ${of.name}`.trim() : of.name;
+    name.title = [of.path, of.description, of.source && `source: ${of.source}`].filter(Boolean).join("\n");
+    const id = `n-${of.path}`;
+    name.htmlFor = id;
+    const unit = document.createElement("span");
+    unit.className = "unit";
+    unit.textContent = of.unit === "1" ? "" : of.unit;
+    const note = document.createElement("div");
+    note.className = "note";
+    const field = of.choices ? this.choiceOf(of) : this.fieldOf(of);
+    field.id = id;
+    const slider = of.choices || of.low === null || of.high === null ? null : this.sliderOf(of, name.textContent ?? "");
+    row.append(name, field, unit);
+    if (slider) row.append(slider);
+    row.append(note);
+    this.rows.set(of.path, { row, slider, field, note, number: of });
+    this.writeNote(note, of.path, of);
+    return row;
+  }
+
+  /** @param {HTMLElement} note @param {string} path @param {DeviceNumber} of */
+  writeNote(note, path, of) {
+    note.replaceChildren();
+    const sensitive = this.order?.find((each) => each.path === path)?.d_ln_stiffness_max_d_ln_value;
+    if (typeof sensitive === "number") {
+      const bar = document.createElement("span");
+      bar.className = sensitive < 0 ? "bar negative" : "bar";
+      bar.style.setProperty("--share", `${Math.min(100, 30 * Math.abs(sensitive))}%`);
+      note.append(bar, `+1 % gives ${sensitive < 0 ? "−" : "+"}${number(Math.abs(sensitive), 3)} %`);
+    }
+    const goal = this.goal.get(path);
+    if (goal) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "reach";
+      if (typeof goal.value === "number" && goal.status === "reached") {
+        button.textContent = `goal at ${quantity(goal.value, of.unit)}`;
+        const value = goal.value;
+        button.addEventListener("click", () => this.listeners.onNumber(this.changeOf(of, value)));
+        note.append(button);
+      } else note.append(` ${goal.reason ?? "cannot reach the goal"}`);
+    }
+  }
+
+  /** @param {DeviceNumber} of @param {any} value */
+  changeOf(of, value) {
+    return Object.fromEntries([of.path, ...of.also].map((path) => [path, value]));
+  }
+
+  /** @param {DeviceNumber} of */
+  fieldOf(of) {
+    const field = document.createElement("input");
+    field.type = "text";
+    field.inputMode = "decimal";
+    field.autocomplete = "off";
+    field.addEventListener("change", () => {
+      const text = field.value.trim().replace(",", ".");
+      const value = text === "" ? NaN : Number(text);
+      const wrong = this.fault(of, value, field.value);
+      field.setCustomValidity(wrong);
+      field.reportValidity();
+      if (!wrong) this.listeners.onNumber(this.changeOf(of, value));
+    });
+    return field;
+  }
+
+  /**
+   * What is wrong with a number that was typed; the server has the last word.
+   *
+   * @param {DeviceNumber} of @param {number} value @param {string} text
+   */
+  fault(of, value, text) {
+    if (!Number.isFinite(value)) return `${of.name} is a number${of.unit ? ` in ${of.unit}` : ""}, got "${text}"`;
+    if (of.whole && !Number.isInteger(value)) return `${of.name} is a whole number, got ${text}`;
+    if (of.lowest !== null && value < of.lowest) return `${of.name} is at least ${of.lowest} ${of.unit}, got ${text}`;
+    if (of.highest !== null && value > of.highest) return `${of.name} is at most ${of.highest} ${of.unit}, got ${text}`;
+    return "";
+  }
+
+  /** @param {DeviceNumber} of */
+  choiceOf(of) {
+    const choice = document.createElement("select");
+    for (const each of of.choices ?? []) choice.append(new Option(each, each));
+    choice.addEventListener("change", () => this.listeners.onNumber(this.changeOf(of, choice.value)));
+    return choice;
+  }
+
+  /** @param {DeviceNumber} of @param {string} label */
+  sliderOf(of, label) {
+    const slider = document.createElement("input");
+    slider.type = "range";
+    slider.min = "0";
+    slider.max = String(STEPS);
+    slider.setAttribute("aria-label", label);
+    slider.addEventListener("input", () => this.listeners.onNumber(this.changeOf(of, fromSlider(of, Number(slider.value))), of.path));
+    slider.addEventListener("change", () => this.listeners.onRelease());
+    return slider;
+  }
+}
+
+/** @param {DeviceNumber} of @param {number} value */
+function toSlider(of, value) {
+  const [low, high] = [Number(of.low), Number(of.high)];
+  const share = of.scale === "logarithmic" ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  return Math.round(STEPS * Math.min(Math.max(share, 0), 1));
+}
+
+/** @param {DeviceNumber} of @param {number} at */
+function fromSlider(of, at) {
+  const [low, high] = [Number(of.low), Number(of.high)];
+  const share = at / STEPS;
+  const value = of.scale === "logarithmic" ? low * (high / low) ** share : low + share * (high - low);
+  return of.whole ? Math.round(value) : Number(value.toPrecision(5));
+}
+
+/** @param {any} value */
+function plain(value) {
+  return typeof value === "number" ? String(Number(value.toPrecision(7))) : String(value);
+}
