@@ -18,7 +18,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import llvmlite.binding as llvm
+import numba
 from numba import types
 
 from zwidth.compiled import linked_module
@@ -94,14 +96,17 @@ def optimised() -> str:
     whole.verify()
     machine = target_machine(WIDE[0])
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
-    tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
+    tuning.loop_vectorization = tuning.slp_vectorization = False
+    tuning.loop_interleaving = tuning.loop_unrolling = False
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(whole, builder)
     text = str(whole)
     kept = re.findall(r"(?m)^define [^\n]*@([\w.]+|\"[^\"]+\")\(", text)
     if set(kept) != set(EXPORTS):
         raise SystemExit(f"left over after inlining: {sorted(set(kept) - set(EXPORTS))}")
-    addresses = [line for line in text.splitlines() if re.search(r"alloca|store ptr|load ptr|store \{|load \{", line)]
+    addresses = [
+        line for line in text.splitlines() if re.search(r"alloca|store ptr|load ptr|store \{|load \{", line)
+    ]
     if addresses:
         raise SystemExit("addresses are kept in memory, whose layout differs:\n" + "\n".join(addresses))
     return text
@@ -135,7 +140,16 @@ def link(code: bytes) -> bytes:
         options += [f"--initial-memory={PAGES * 65536}", "--export=__heap_base"]
         options += [f"--export={name}" for name in EXPORTS]
         subprocess.run([*command, *options, str(source), "-o", str(result)], check=True)
-        return result.read_bytes()
+        return result.read_bytes() + note()
+
+
+def note() -> bytes:
+    """A custom section that says by which releases the module was built: others may give other bytes."""
+    python = ".".join(map(str, sys.version_info[:2]))
+    text = f"zwidth: numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {python} ".encode()
+    content = b"\x04note" + text
+    assert len(content) < 128, "its length is written in one byte"
+    return bytes([0, len(content)]) + content
 
 
 if __name__ == "__main__":

@@ -32,9 +32,9 @@ class TouchNumbers:
     period       T [s]
     noise        (C,)  standard deviation of each encoder's noise, of which the caller draws
     states_at    where in the memory the states begin: n amplitudes of modes, then their velocities
-    coordinates  (n, n)  the plant's coordinates per amplitude;   names (n,)  of the coordinates, the arm's the last
-    arm          stiffness [N/m] and damping [N s/m] that tie the arm, or the handle in a rigid grasp, to the ground:
-                 moved by x_m, the ground pushes with  stiffness x_m + damping x_m'
+    coordinates  (n, n)  the plant's coordinates per amplitude;   names (n,)  of them, the arm's last
+    arm          stiffness [N/m] and damping [N s/m] that tie the arm (in a rigid grasp the handle) to the
+                 ground, which moved by x_m pushes with  stiffness x_m + damping x_m'
     """
 
     counts: Ints
@@ -137,9 +137,7 @@ def arm_spring(operator: Operator | None) -> tuple[float, float]:
 def touch_obstacle(loop: object) -> str | None:
     """What of a loop the kernel does not cover, in one sentence; None: nothing, and `touch_numbers` takes it."""
     if not isinstance(loop, Loop):
-        return _sentence(
-            "the device is no plant and computer of one direction, but a measured response or the like"
-        )
+        return _sentence("the device is measured, or has no plant and computer of one direction")
     controller, nonlinear = loop.controller, loop.plant.nonlinear
     parts = {
         "velocity estimates that are not linear": isinstance(controller.velocity, Foaw | Levant),

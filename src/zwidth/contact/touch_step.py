@@ -14,7 +14,7 @@ parts one after the other, matrices in the order of rows:
     numbers  period, limit; transition (P, R, N), inputs (P, F, R), length (P), element numbers (E, 6), sensor (n),
              handle (n), channel (C, n), step (C), weight (C), noise (C), energy (N, N), window (w), estimator
              (k, 2, 3), filter (f, 2, 3), with R = N + 2 E and F = 2 + E
-    memory   periods gone through, first reading; states (R), the states before them (R), increment (R), forces (E),
+    memory   periods gone through, first reading; states (R), those before them (R), increment (R), forces (E),
              past readings (w), estimator's states (k, 2), filter's states (f, 2), queue (delay + 2)
     ports    LAW .. LAST_PUSH, OUTPUTS numbers that come out, then the noise of each encoder (C)
 """
@@ -31,12 +31,12 @@ from zwidth.contact.engine_arrays import FORCE, HANDLE, READING, TRACES, TRUTH, 
 from zwidth.contact.plant_step import PlantState, dot, read_sensor, step_with_frictions
 from zwidth.model.mechanism import Floats, Ints
 
-# Sizes at the beginning of `counts`: coordinates n, states N, elements E, parts P, encoders C, whole samples of delay,
-# weights w, factors of the estimate k and of the force filter f.
+# Sizes at the beginning of `counts`: coordinates n, states N, elements E, parts P, encoders C, whole samples of
+# delay, weights w, factors of the estimate k and of the force filter f.
 SIZE, STATES, ELEMENTS, PARTS, ENCODERS, DELAY, WEIGHTS, FACTORS, FILTERS = range(9)
 SIZES: Final = 9
-# Ports, what goes in: the wall law's number, stiffness [N/m], damping [N s/m], the wall's position [m], and the push
-# towards it [N], in the first period of a call and in the first of the next.
+# Ports, what goes in: the wall law's number, stiffness [N/m], damping [N s/m], the wall's position [m], and the
+# push towards it [N], in the first period of a call and in the first of the next.
 LAW, STIFFNESS, DAMPING, WALL, PUSH, LAST_PUSH = range(6)
 # What comes out of a period, at its sample: columns READING .. HANDLE of a trace, then these two.
 HANDLE_VELOCITY, ENERGY = TRACES, TRACES + 1
@@ -188,8 +188,8 @@ def touch_periods(
 ) -> None:
     """Several sampling periods in one call; the push goes in a straight line from PUSH to LAST_PUSH.
 
-    Period j of S has PUSH + (LAST_PUSH - PUSH) j/S: a call that begins with the last push of the one before goes on
-    where that would have.
+    Period j of S has PUSH + (LAST_PUSH - PUSH) j/S: a call that begins with the last push of the one before goes
+    on where that would have.
 
     noise    (S C,)        of each period and encoder, in place of the ports'
     outputs  (S OUTPUTS,)  a row for each period
