@@ -1,4 +1,4 @@
-"""The contact kernel against `simulate`, which has a ledger and a trail in between: the same numbers to the bit."""
+"""The contact kernel against `simulate`, which has a ledger and a trail in between: equal to the bit."""
 
 from dataclasses import replace
 
