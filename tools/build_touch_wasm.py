@@ -5,7 +5,7 @@
 Numba translates the kernels with pointers as arguments. Everything is inlined and optimised as wasm64, for numba
 lays out memory for 64-bit addresses; what is left keeps no address in memory, so that it can be emitted as wasm32.
 No fused multiplications and no vectors: products and sums are rounded one by one, as on the processor. `wasm-ld`
-links; the module imports nothing. The same sources and the same releases of numba and llvmlite give the same bytes.
+links; the module imports nothing. The same sources and releases of numba and llvmlite give the same bytes.
 """
 
 from __future__ import annotations
@@ -104,9 +104,8 @@ def optimised() -> str:
     kept = re.findall(r"(?m)^define [^\n]*@([\w.]+|\"[^\"]+\")\(", text)
     if set(kept) != set(EXPORTS):
         raise SystemExit(f"left over after inlining: {sorted(set(kept) - set(EXPORTS))}")
-    addresses = [
-        line for line in text.splitlines() if re.search(r"alloca|store ptr|load ptr|store \{|load \{", line)
-    ]
+    kept_address = re.compile(r"alloca|(store|load) (ptr|\{)")
+    addresses = [line for line in text.splitlines() if kept_address.search(line)]
     if addresses:
         raise SystemExit("addresses are kept in memory, whose layout differs:\n" + "\n".join(addresses))
     return text

@@ -50,15 +50,10 @@ def simulated(loop, operator, start, ports, **recorded):
 @pytest.mark.parametrize("seed", range(12))
 def test_kernel_is_simulation_to_the_bit(seed, frictions):
     loop, operator, start, device, ports, _ = random_touch(np.random.default_rng([seed, frictions]), frictions)
-    C, numbers = len(device.noise), loop.plant.nonlinear.counters
-    channels = [c if each.channel is None else each.channel for c, each in enumerate(numbers)]
-    drawn = np.array(
-        [
-            [sd * normal(np.uint64(SEED), j, c) for sd, c in zip(device.noise, channels, strict=True)]
-            for j in range(S)
-        ]
-    )
-    assert drawn.shape == (S, C)
+    counters = loop.plant.nonlinear.counters
+    channels = [c if each.channel is None else each.channel for c, each in enumerate(counters)]
+    normals = np.array([[normal(np.uint64(SEED), j, c) for c in channels] for j in range(S)])
+    drawn = device.noise * normals
     mine, _ = in_python(device, ports, drawn.ravel(), S)
     kinds = [{}, {"trail": False, "ledger": False}] if frictions else [{}]
     for recorded in kinds:

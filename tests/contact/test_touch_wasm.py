@@ -16,7 +16,8 @@ from benchmarks._touch_node import WASM, run_in_node
 
 ROOT = Path(__file__).parents[2]
 BUILT_WITH = re.compile(rb"zwidth: (numba \S+, llvmlite \S+, Python \S+)")
-HERE = f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {sys.version_info[0]}.{sys.version_info[1]}"
+PYTHON = ".".join(map(str, sys.version_info[:2]))
+HERE = f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, Python {PYTHON}"
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 needs_linker = pytest.mark.skipif(shutil.which("wasm-ld") is None, reason="wasm-ld is not installed")
 

@@ -14,7 +14,7 @@ from zwidth.model.plant import Plant
 
 
 def random_loop(rng, frictions):
-    """One to four modes from 1 Hz to three times Nyquist, damping to 150 %, 0.2 to 20 kHz; a number of frictions."""
+    """One to four modes from 1 Hz to three times Nyquist, damping to 150 %, 0.2 to 20 kHz."""
     n, T = int(rng.integers(1, 5)), 1.0 / np.exp(rng.uniform(np.log(200.0), np.log(20000.0)))
     L = np.diag(np.exp(rng.uniform(-3.0, 0.0, n))) + 0.1 * np.tril(rng.normal(size=(n, n)), -1)
     V = np.linalg.qr(rng.normal(size=(n, n)))[0]
