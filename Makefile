@@ -29,7 +29,7 @@ export PIP_CONSTRAINT := $(CONSTRAINTS)
 export PIP_BUILD_CONSTRAINT := $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help report test older-processor record structure slow lint compile-check bench bench-pairs wheel docs clean
+.PHONY: help report test older-processor record structure slow lint compile-check bench bench-pairs wasm wheel docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
@@ -42,6 +42,7 @@ help:
 	@echo 'make compile-check  how many kernels are compiled at first use, against what is allowed'
 	@echo 'make bench    how fast, beside what a competent user would write otherwise'
 	@echo 'make bench-pairs  our own part of it at two commits in turn: BASE, and NEW or what is here'
+	@echo 'make wasm     the contact kernel of the page as WebAssembly, from its Python source; wants wasm-ld'
 	@echo 'make wheel    a wheel in dist/ that carries compiled kernels, for this Python and platform'
 	@echo 'make docs     write the generated pages and pictures of docs/ again'
 	@echo 'make clean    remove what was made, all but $(VENV)'
@@ -83,6 +84,10 @@ bench: $(VENV)/.installed-test $(VENV)/.kernels
 bench-pairs: $(VENV)/.installed-test
 	$(BIN)/python -m benchmarks._pairs $(if $(filter file,$(origin BASE)),,--base $(BASE)) \
 	  $(if $(NEW),--new $(NEW)) $(PAIRS)
+
+# The result is committed; the same sources and releases of numba and llvmlite give the same bytes.
+wasm: $(VENV)/.installed
+	$(BIN)/python tools/build_touch_wasm.py
 
 # For this Python and this platform, with the machine code of all kernels: nothing is compiled at first use.
 wheel: $(VENV)/.installed

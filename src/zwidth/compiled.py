@@ -89,6 +89,20 @@ def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
     return entry
 
 
+def linked_module(kernel: Any, signature: Any) -> tuple[str, str]:
+    """A kernel with all that it calls in LLVM's language, not optimised yet, for compiling it to another target.
+
+    kernel     as the decorators here return it;   signature  a numba signature, or a tuple of types
+    Returns    text of the module, and the name of the kernel's function in it
+    Raises     RuntimeError  with a release of numba whose internal classes are not known
+    """
+    if not can_be_taken_apart():
+        raise RuntimeError(f"modules are taken out of numba {TAKEN_APART[0]} to {TAKEN_APART[1]} only")
+    kernel.compile(signature)
+    (result,) = kernel.overloads.values()
+    return str(result.library._final_module), str(result.fndesc.llvm_func_name)
+
+
 def can_be_taken_apart() -> bool:
     """Whether the installed numba is a release whose internal classes are known (`TAKEN_APART`)."""
     oldest, newest = TAKEN_APART

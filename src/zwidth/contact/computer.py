@@ -183,6 +183,12 @@ def read_encoder(place: float, step: float, noise: float, seed: np.uint64, sampl
     """
     if noise > 0.0:
         place += noise * normal(seed, sample, channel)
+    return round_to_step(place, step)
+
+
+@compiled_inline
+def round_to_step(place: float, step: float) -> float:
+    """The nearest multiple of an encoder's step, half a step upwards; the position itself for a step of 0."""
     if step > 0.0:
         return float(step * np.floor(place / step + 0.5))
     return place
@@ -253,6 +259,14 @@ def send(signals: Signals, c: int, command: float) -> None:
     for k in range(queue.shape[1] - 1, 0, -1):
         queue[c, k] = queue[c, k - 1]
     queue[c, 0] = command
+
+
+@compiled_inline
+def send_force(computer: Computer, signals: Signals, c: int, force: float) -> float:
+    """Filter a force, cut it off at the limit and put it at the head of queue c. Returns the command [N]."""
+    command = clip(filter_force(computer, signals, c, force), computer.limit)
+    send(signals, c, command)
+    return command
 
 
 @compiled_inline

@@ -21,11 +21,11 @@ from zwidth.contact.computer import (
     computer_at,
     estimate_velocity,
     filter_force,
-    read_encoder,
     send,
+    send_force,
     signals_of,
 )
-from zwidth.contact.elements import COULOMB, SAMPLED, VARYING
+from zwidth.contact.elements import SAMPLED, VARYING
 from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_substep, new_ledger
 from zwidth.contact.engine_arrays import (
     FORCE,
@@ -49,16 +49,22 @@ from zwidth.contact.fixed_feedback import (
     with_feedback,
 )
 from zwidth.contact.hand import hand_force, sample_brakes_and_reflexes, step_brakes_and_reflexes
+from zwidth.contact.noise import normal
 from zwidth.contact.passivity_controller import PASSIVITY_MEMORY as PASSIVITY
 from zwidth.contact.passivity_controller import passivity_force
 from zwidth.contact.plant_step import (
     PlantState,
+    dot,
+    keep_swapped,
     motion_from,
+    only_coulomb,
     predict_motions,
+    read_sensor,
     set_held_increment,
     solve_forces,
     step,
-    step_with_friction,
+    step_with_frictions,
+    swapped,
 )
 from zwidth.model.mechanism import Floats, Ints
 
@@ -66,32 +72,14 @@ ENCODERS = 64  # numbers of encoders by which two samples of a local loop draw n
 
 
 @compiled_inline
-def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
-    """a[row, :count] . b[start:start + count]"""
-    total = 0.0
-    for k in range(count):
-        total += a[row, k] * b[start + k]
-    return total
-
-
-@compiled_inline
-def read_sensor(
-    devices: PlantArrays, d: int, states: Floats, truth: float, seed: np.uint64, sample: int, fast: int
-) -> float:
-    """The reading as the encoders count it; the true one where they have neither steps nor noise.
+def draw_noise(devices: PlantArrays, d: int, seed: np.uint64, sample: int, fast: int, drawn: Floats) -> None:
+    """Noise of each encoder at a sample, into drawn (C,).
 
     fast  number of the local loop's sample within the period: each has noise of its own
     """
-    reading, exact = 0.0, True
-    for c in range(devices.weight.shape[1]):
-        place, step, noise = 0.0, devices.step[d, c], devices.noise[d, c]
-        for k in range(devices.size[d]):
-            place += devices.channel[d, c, k] * states[k]
-        exact = exact and step == 0.0 and noise == 0.0
-        reading += devices.weight[d, c] * read_encoder(
-            place, step, noise, seed, sample, devices.encoder[d, c] + ENCODERS * fast
-        )
-    return truth if exact else reading
+    for c in range(drawn.size):
+        noise = devices.noise[d, c]
+        drawn[c] = noise * normal(seed, sample, devices.encoder[d, c] + ENCODERS * fast) if noise > 0.0 else 0.0
 
 
 @compiled_inline
@@ -115,10 +103,9 @@ def advance_substeps(
     hand, E, kept, booked = members.push, devices.kind.shape[1], trail.shape[1] > 0, book.entries.size > 0
     steady = hand[m, 1] == 0.0 and hand[m, 5] == 0.0 and hand[m, 6] == 0.0
     push, here = hand[m, 0], state
-    # one dry friction under a constant push, nothing recorded: the commonest case, in a loop of its own
-    if E == 1 and devices.kind[d, 0] == COULOMB and steady and not (kept or booked) and end > begin:
-        set_held_increment(inputs, d, part, command, push, state.held_increment)
-        step_with_friction(A, inputs, d, part, devices.numbers[d, 0, 0], end - begin, state)
+    # dry friction or none under a constant push, nothing recorded: the commonest case, in a loop of its own
+    if steady and not (kept or booked) and only_coulomb(devices, d):
+        step_with_frictions(devices, d, part, end - begin, command, push, state)
         return
     for j in range(begin, end):
         # a push that changes is held at its value in the middle, an error of second order in the substep
@@ -128,18 +115,15 @@ def advance_substeps(
             set_held_increment(inputs, d, part, command, push, here.held_increment)
         if E:
             predict_motions(A, d, part, here)
-            solve_forces(devices, d, part, here)
+            solve_forces(devices, d, part, False, here)
         step(A, inputs, d, part, here)
         if booked:
             enter_substep(devices, d, part, here.states, here.next_states, command, push, here.forces, book)
-        # the two arrays of states change places, instead of a copy for each substep
-        here = PlantState(here.next_states, here.states, here.forces, here.memory, here.held_increment)
+        here = swapped(here)
         if kept:
             trail[m, first + j] = dot(devices.handle, d, here.states, 0, n)
-    # after an odd number of exchanges the result is in the other array
     if (end - begin) % 2:
-        for i in range(state.states.size):
-            state.states[i] = state.next_states[i]
+        keep_swapped(state)
 
 
 @compiled_inline
@@ -183,6 +167,7 @@ def advance_interval(
     feedback: FeedbackArrays,
     memory: FeedbackMemory,
     added: Signals,
+    drawn: Floats,
     book: Ledger,
     varies: bool,
 ) -> None:
@@ -202,7 +187,8 @@ def advance_interval(
         if has_local:
             if devices.local[d, part] == SAMPLE:
                 truth = dot(devices.sensor, d, state.states, 0, devices.size[d])
-                counted = read_sensor(devices, d, state.states, truth, members.seed[m], j, fast)
+                draw_noise(devices, d, members.seed[m], j, fast, drawn)
+                counted = read_sensor(devices, d, state.states, truth, drawn)
                 sample_local_loop(feedback, d, memory, counted)
                 fast, fast_part = fast + 1, 1
             elif devices.local[d, part] == LATER:
@@ -243,7 +229,7 @@ def run_member(
     signals, exact = signals_of(computer, 1, 1), signals_of(computer, 1, 1)
     memory, sampled_memory, law_memory = np.zeros(MEMORY), np.zeros(MEMORY), np.zeros(MEMORY)
     states, watch, observer = own.states, members.observer[m], np.zeros(PASSIVITY)
-    reflex, traces = members.reflex[m], records.traces
+    reflex, traces, drawn = members.reflex[m], records.traces, np.zeros(devices.step.shape[1])
     watched, booked = not np.isnan(watch[0]), records.ledger.shape[1] > 0
     kept, controls, varies = feedback_memory(feedback, d), False, False
     for part in range(3):
@@ -255,7 +241,8 @@ def run_member(
     for j in range(samples):
         time, truth = j * T, dot(devices.sensor, d, states, 0, n)
         # the order of one period: read, estimate, render, filter, limit, send
-        counted = read_sensor(devices, d, states, truth, members.seed[m], j, 0)
+        draw_noise(devices, d, members.seed[m], j, 0, drawn)
+        counted = read_sensor(devices, d, states, truth, drawn)
         speed = estimate_velocity(computer, signals, 0, counted, j)
         environment_force = force(counted - wall, speed, time, T, values, memory)
         controlled_force = (
@@ -284,8 +271,7 @@ def run_member(
             push = hand_force(members.push, m, time)
             measured = measured_force(feedback, d, states, kept.first[2], push, own.forces)
             total_force = with_feedback(feedback, d, kept, controlled_force, counted, measured, j, T)
-        command = clip(filter_force(computer, signals, 0, total_force), computer.limit)
-        send(signals, 0, command)
+        command = send_force(computer, signals, 0, total_force)
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed
         traces[m, j, FORCE], traces[m, j, HANDLE] = command, dot(devices.handle, d, states, 0, n)
         records.samples[m] = j + 1
@@ -296,7 +282,21 @@ def run_member(
             sample_forces(devices, d, computer, added, states)
             sample_brakes_and_reflexes(devices, d, reflex, time, T, controlled_force, states, own.memory)
         advance_interval(
-            devices, members, m, time, j, records, own, computer, signals, feedback, kept, added, book, varies
+            devices,
+            members,
+            m,
+            time,
+            j,
+            records,
+            own,
+            computer,
+            signals,
+            feedback,
+            kept,
+            added,
+            drawn,
+            book,
+            varies,
         )
 
 

@@ -260,6 +260,15 @@ def _fill_part(arrays: PlantArrays, d: int, part: int, step: Substep) -> None:
     arrays.inputs[d, part, :F, N:last] = (motions @ step.inputs).T
 
 
+def start_states(held_device: HeldDevice, arrays: PlantArrays, d: int, x: Floats, v: Floats) -> Floats:
+    """States (R,) at time 0 of device d, from coordinates x and velocities v (n,) of the attached plant."""
+    n, (R, N) = held_device.attached_plant.size, arrays.transition.shape[-2:]
+    start = np.zeros(R)
+    start[:n], start[n : 2 * n] = held_device.modal(x), held_device.modal(v)
+    start[N:] = motions_of(arrays, d, N) @ start[:N]
+    return start
+
+
 def motions_of(arrays: PlantArrays, d: int, m: int) -> Floats:
     """Rows (2 E, m) that read place and speed of each element's motion from m states."""
     E, n = arrays.kind.shape[1], int(arrays.size[d])

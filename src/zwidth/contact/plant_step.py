@@ -1,4 +1,5 @@
-"""The plant between samples: substeps that are exact for what is linear, and elements that answer to them.
+"""The plant at a sample and between samples: what is read of it, substeps that are exact for what is linear, and
+elements that answer to them.
 
 These kernels index element by element and count no references: a substep of a few states costs less than counting
 would.
@@ -11,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from zwidth.compiled import compiled, compiled_inline, compiled_lean
-from zwidth.contact.elements import BRISTLES, bristles_bend, element_force
+from zwidth.contact.computer import round_to_step
+from zwidth.contact.elements import BRISTLES, COULOMB, bristles_bend, element_force
 from zwidth.contact.engine_arrays import PlantArrays
 from zwidth.contact.friction import coulomb_force
 from zwidth.model.mechanism import Floats
@@ -43,6 +45,40 @@ def motion_from(devices: PlantArrays, start: Floats) -> PlantState:
     E = devices.kind.shape[1]
     R = start.size
     return PlantState(start.copy(), np.zeros(R), np.zeros(E), np.zeros((E, 4)), np.zeros(R))
+
+
+@compiled_inline
+def dot(a: Floats, row: int, b: Floats, start: int, count: int) -> float:
+    """a[row, :count] . b[start:start + count]"""
+    total = 0.0
+    for k in range(count):
+        total += a[row, k] * b[start + k]
+    return total
+
+
+@compiled_inline
+def read_sensor(devices: PlantArrays, d: int, states: Floats, truth: float, drawn: Floats) -> float:
+    """The reading as the encoders count it; the true one where they have neither steps nor noise.
+
+    drawn  (C,)  noise of each encoder's position, drawn already, in its own unit
+    """
+    reading, exact = 0.0, True
+    for c in range(devices.weight.shape[1]):
+        place, step = 0.0, devices.step[d, c]
+        for k in range(devices.size[d]):
+            place += devices.channel[d, c, k] * states[k]
+        exact = exact and step == 0.0 and devices.noise[d, c] == 0.0
+        reading += devices.weight[d, c] * round_to_step(place + drawn[c], step)
+    return truth if exact else reading
+
+
+@compiled_inline
+def only_coulomb(devices: PlantArrays, d: int) -> bool:
+    """Whether all elements of a device are Coulomb frictions; true where there are none."""
+    only = True
+    for e in range(devices.kind.shape[1]):
+        only = only and devices.kind[d, e] == COULOMB
+    return only
 
 
 @compiled_inline
@@ -108,29 +144,69 @@ def step_with_friction(
         place += A[d, part, N, k] * there[k]
     here[N] = place + inputs[d, part, 2, N] * force
     if count % 2:
-        for i in range(state.states.size):
-            state.states[i] = state.next_states[i]
+        keep_swapped(state)
 
 
 @compiled_inline
-def solve_forces(devices: PlantArrays, d: int, part: int, state: PlantState) -> None:
-    """The forces of the elements; those that move one another settle by Gauss-Seidel."""
+def step_with_frictions(
+    devices: PlantArrays, d: int, part: int, count: int, command: float, push: float, state: PlantState
+) -> None:
+    """Take several substeps under a constant command and push; whatever elements there are, are Coulomb frictions.
+
+    Plain arithmetic: `touch_step` has no other way, and the engine takes it where nothing is recorded in between.
+    """
+    A, inputs, E = devices.transition, devices.inputs, state.forces.size
+    set_held_increment(inputs, d, part, command, push, state.held_increment)
+    if E == 1:
+        if count > 0:
+            step_with_friction(A, inputs, d, part, devices.numbers[d, 0, 0], count, state)
+        return
+    here = state
+    for _ in range(count):
+        if E:
+            predict_motions(A, d, part, here)
+            solve_forces(devices, d, part, True, here)
+        step(A, inputs, d, part, here)
+        here = swapped(here)
+    if count % 2:
+        keep_swapped(state)
+
+
+@compiled_inline
+def swapped(state: PlantState) -> PlantState:
+    """The state after a substep: the two arrays of states change places, instead of a copy for each substep."""
+    return PlantState(state.next_states, state.states, state.forces, state.memory, state.held_increment)
+
+
+@compiled_inline
+def keep_swapped(state: PlantState) -> None:
+    """After an odd number of exchanges the result is in the other array: copy it back."""
+    for i in range(state.states.size):
+        state.states[i] = state.next_states[i]
+
+
+@compiled_inline
+def solve_forces(devices: PlantArrays, d: int, part: int, coulomb: bool, state: PlantState) -> None:
+    """The forces of the elements; those that move one another settle by Gauss-Seidel.
+
+    coulomb  whether all are Coulomb frictions; written as True in a call, the code of the others is left out
+    """
     forces, E = state.forces, state.forces.size
     if E == 1:
-        forces[0] = _force(devices, d, part, 0, state)
+        forces[0] = _force(devices, d, part, 0, coulomb, state)
     else:
         for e in range(E):
             forces[e] = 0.0
         for _ in range(SWEEPS):
             change, largest = 0.0, 0.0
             for e in range(E):
-                f = _force(devices, d, part, e, state)
+                f = _force(devices, d, part, e, coulomb, state)
                 change, largest = max(change, abs(f - forces[e])), max(largest, abs(f))
                 forces[e] = f
             if change <= SETTLED * largest:
                 break
     for e in range(E):
-        if devices.kind[d, e] == BRISTLES:
+        if not coulomb and devices.kind[d, e] == BRISTLES:
             _bend(devices, d, part, e, state)
 
 
@@ -147,12 +223,12 @@ def _ahead(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -
 
 
 @compiled_inline
-def _force(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) -> float:
+def _force(devices: PlantArrays, d: int, part: int, e: int, coulomb: bool, state: PlantState) -> float:
     """The force of element e under those of all others."""
     at, inputs = devices.energy.shape[1] + 2 * e, devices.inputs
     place, speed = _ahead(devices, d, part, e, state)
     return element_force(
-        devices.kind[d, e],
+        COULOMB if coulomb else devices.kind[d, e],
         devices.numbers,
         state.memory,
         d,

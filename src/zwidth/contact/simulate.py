@@ -14,7 +14,7 @@ from zwidth.conditions.friction_and_resolution import reading_noise, reading_ste
 from zwidth.contact.computer import computers
 from zwidth.contact.engine import run_several
 from zwidth.contact.engine_arrays import ENTRIES, TRACES, PlantArrays, Records, RunArrays
-from zwidth.contact.engine_inputs import HeldDevice, measured_rows, motions_of, pack_plants
+from zwidth.contact.engine_inputs import HeldDevice, measured_rows, pack_plants, start_states
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.fixed_feedback import feedback_arrays
 from zwidth.contact.hand import PUSH_NUMBERS, REFLEX_NUMBERS, Hand
@@ -210,14 +210,11 @@ def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], NDArray[np.int
 def _members(
     runs: Sequence[Run], held_devices: list[HeldDevice], index: NDArray[np.int64], plants: PlantArrays
 ) -> RunArrays:
-    m, (R, N) = len(runs), plants.transition.shape[-2:]
-    start = np.zeros((m, R))
+    m = len(runs)
+    start = np.zeros((m, plants.transition.shape[-2]))
     for i, run in enumerate(runs):
         held_device = held_devices[index[i]]
-        n = held_device.attached_plant.size
-        x, v = _start(held_device, run)
-        start[i, :n], start[i, n : 2 * n] = held_device.modal(x), held_device.modal(v)
-        start[i, N:] = motions_of(plants, int(index[i]), N) @ start[i, :N]
+        start[i] = start_states(held_device, plants, int(index[i]), *_start(held_device, run))
     watched = [np.array([np.nan]) if run.passivity is None else run.passivity.parameters for run in runs]
     width = max(len(numbers) for numbers in watched)
     return RunArrays(
