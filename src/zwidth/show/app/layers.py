@@ -235,6 +235,30 @@ def _eigenvalues(point: OperatingPoint, chart: Chart, state: State, device: Devi
     return {}, {"z": np.column_stack([z.real, z.imag])}
 
 
+def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """The blocks of `touch_step` for the page, held by the state's hand."""
+    from zwidth.contact.touch_numbers import arm_spring, touch_numbers
+
+    made = touch_numbers(point.loop)
+    arm = arm_spring(point.operator) if point.operator is not None else (0.0, 0.0)
+    head = {
+        "ports": made.ports,
+        "port_count": made.port_count,
+        "period": made.period,
+        "states_at": made.states_at,
+        "names": list(made.names),
+        "arm": list(arm),
+    }
+    arrays = {
+        "counts": made.counts,
+        "numbers": made.numbers,
+        "memory": made.memory,
+        "noise": made.noise,
+        "coordinates": made.coordinates,
+    }
+    return head, arrays
+
+
 Layer = Callable[[OperatingPoint, Any, State, Device], Contents]
 LAYERS: dict[str, Layer] = {
     "chart": _chart,
@@ -244,6 +268,7 @@ LAYERS: dict[str, Layer] = {
     "guarantees": _guarantees,
     "bounds": _bounds,
     "eigenvalues": _eigenvalues,
+    "touch": _touch,
 }
 # In this order they are computed; these need the chart.
 ORDER: Final = ("chart", *(name for name in LAYERS if name != "chart"))

@@ -11,6 +11,7 @@ import { ChartView } from "./chart_view.js";
 import { Connection, Dropped, Refusal } from "./connection.js";
 import { linkOf, readLink, Store } from "./state.js";
 import { NumbersPanel } from "./numbers_panel.js";
+import { ContactPanel } from "./contact_panel.js";
 import { saveBytes } from "./files.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
@@ -50,12 +51,39 @@ export class App {
       onNumber: (settings, drag) => this.store.setNumbers(settings, drag),
       onRelease: () => this.store.release(),
     });
+    /** @type {import("./state.js").Hand | null} */
+    this.hand = null; // that touches now; not part of the history
+    this.contact = new ContactPanel(
+      { tools: byId("contact-tools"), canvas: byId("motion"), text: byId("contact-text") },
+      {
+        onHand: (hand) => {
+          this.hand = this.device?.operator ? null : hand;
+          void this.ask();
+        },
+        onSimulate: async (options) => {
+          try {
+            return await this.connection.ask("contact", { state: this.sent(), ...options }, this.progress);
+          } catch (error) {
+            this.fail(error);
+            return null;
+          }
+        },
+        onVibration: () => {},
+        say: (sentence, wrong) => this.say(sentence, wrong),
+      },
+    );
     this.connection = new Connection(token, {
       onOpen: () => this.refresh(),
       onLost: () => this.say("The connection to zwidth is lost; the page keeps its numbers and tries again.", true),
     });
     for (const [name, text] of Object.entries(files)) this.connection.files.set(name, text);
     this.listen();
+  }
+
+  /** The state as the server takes it: without what is not set, held by the hand that touches. */
+  sent() {
+    const state = this.hand ? { ...this.state, operator: null, hand: this.hand } : this.state;
+    return Object.fromEntries(Object.entries(state).filter(([, value]) => value !== null && value !== undefined));
   }
 
   get state() {
@@ -91,7 +119,7 @@ export class App {
     const another = opened !== this.opened;
     this.opened = opened;
     try {
-      const { head } = await this.connection.ask("open", { state: sent(this.state) });
+      const { head } = await this.connection.ask("open", { state: this.sent() });
       this.device = head;
       this.writeDevice(head, another);
     } catch (error) {
@@ -103,11 +131,12 @@ export class App {
   async ask() {
     clearTimeout(this.rests);
     this.rests = setTimeout(() => void this.askMore(), RESTS);
-    const layers = ["chart", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers()];
+    const layers = ["chart", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers(), ...(this.contact.touching ? ["touch"] : [])];
     try {
-      const frame = await this.connection.ask("view", { state: sent(this.state), layers });
+      const frame = await this.connection.ask("view", { state: this.sent(), layers });
       this.view = frame;
       this.chart.setFrame(frame);
+      this.contact.update(frame, this.state.wall ?? null);
       this.say("");
       this.drawSoon();
     } catch (error) {
@@ -123,7 +152,7 @@ export class App {
     }
     this.say(`computing ${layers.join(" and ")}…`);
     try {
-      this.chart.more = await this.connection.ask("more", { state: sent(this.state), layers }, this.progress);
+      this.chart.more = await this.connection.ask("more", { state: this.sent(), layers }, this.progress);
       this.say("");
       this.drawSoon();
     } catch (error) {
@@ -388,7 +417,7 @@ export class App {
     }
     this.say("computing what to change first…");
     try {
-      const { head } = await this.connection.ask("sensitivity", { state: sent(this.state) }, this.progress);
+      const { head } = await this.connection.ask("sensitivity", { state: this.sent() }, this.progress);
       button.setAttribute("aria-pressed", "true");
       this.numbers.sortBy(head.sensitivities);
       this.say("");
@@ -406,7 +435,7 @@ export class App {
     }
     this.say(`looking for what reaches ${quantity(goal, "N/m")}…`);
     try {
-      const { head } = await this.connection.ask("sensitivity", { state: sent(this.state), goal }, this.progress);
+      const { head } = await this.connection.ask("sensitivity", { state: this.sent(), goal }, this.progress);
       byId("sort").setAttribute("aria-pressed", "true");
       this.numbers.sortBy(head.sensitivities);
       this.numbers.setGoal(head.goal.goal ?? head.goal.numbers ?? []);
@@ -423,7 +452,7 @@ export class App {
     const [what, format] = choice.split(".");
     this.say(`writing the ${what}…`);
     try {
-      const { head, arrays } = await this.connection.ask("export", { state: sent(this.state), what, format }, this.progress);
+      const { head, arrays } = await this.connection.ask("export", { state: this.sent(), what, format }, this.progress);
       saveBytes(head.name, /** @type {Uint8Array<ArrayBuffer>} */ (arrays.content.values));
       this.say(`${head.name} is written`);
     } catch (error) {
@@ -448,7 +477,7 @@ export class App {
 
   /** @param {string} file */
   async showPoints(file) {
-    const { head, arrays } = await this.connection.ask("points", { state: sent(this.state), file });
+    const { head, arrays } = await this.connection.ask("points", { state: this.sent(), file });
     const walls = arrays.walls.values;
     this.chart.points = head.points.map((/** @type {any} */ each, /** @type {number} */ n) => ({
       stiffness: walls[2 * n],
@@ -461,15 +490,6 @@ export class App {
     this.say(`${head.points.length} measured points of ${file}`);
     this.drawSoon();
   }
-}
-
-/**
- * The state as the server takes it: without what is not set.
- *
- * @param {State} state
- */
-export function sent(state) {
-  return Object.fromEntries(Object.entries(state).filter(([, value]) => value !== null && value !== undefined));
 }
 
 /** @param {HTMLSelectElement} select @param {string[][]} pairs @param {string} value */
