@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
+Layer = Callable[[OperatingPoint, Any, State, Device], Contents]
+
 DECAY_LEVELS: Final = (0.25, 0.5, 0.75)  # of the way from radius 1 to the fastest decay
 DAMPINGS: Final = 161  # at which the line of a published condition is computed
 
@@ -225,14 +227,20 @@ def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -
     return {"conditions": head}, arrays
 
 
-def _eigenvalues(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-    """The eigenvalues of the loop with the state's wall."""
-    from zwidth.chart.verdict import eigenvalues
+def _face(name: str) -> Layer:
+    """One of the other faces of the state's wall."""
 
-    if state.wall is None:
-        raise ValueError("choose a wall on the chart first")
-    z = np.sort_complex(eigenvalues(point.loop, state.wall.stiffness, state.wall.damping).ravel())
-    return {}, {"z": np.column_stack([z.real, z.imag])}
+    def face(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+        from zwidth.show.app import faces
+
+        if state.wall is None:
+            raise ValueError("choose a wall on the chart first")
+        if point.response is not None:
+            raise ValueError("there is no such picture of a measured response")
+        contents: Contents = getattr(faces, name)(point, state.wall)
+        return contents
+
+    return face
 
 
 def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
@@ -259,7 +267,6 @@ def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
     return head, arrays
 
 
-Layer = Callable[[OperatingPoint, Any, State, Device], Contents]
 LAYERS: dict[str, Layer] = {
     "chart": _chart,
     "decay": _decay,
@@ -267,7 +274,9 @@ LAYERS: dict[str, Layer] = {
     "hands": _hands,
     "guarantees": _guarantees,
     "bounds": _bounds,
-    "eigenvalues": _eigenvalues,
+    "impedance": _face("impedance"),
+    "nyquist": _face("nyquist"),
+    "eigenvalues": _face("eigenvalues_of"),
     "touch": _touch,
 }
 # In this order they are computed; these need the chart.

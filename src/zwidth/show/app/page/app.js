@@ -11,6 +11,7 @@ import { ChartView } from "./chart_view.js";
 import { Connection, Dropped, Refusal } from "./connection.js";
 import { linkOf, readLink, Store } from "./state.js";
 import { NumbersPanel } from "./numbers_panel.js";
+import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
 import { saveBytes } from "./files.js";
 
@@ -47,6 +48,7 @@ export class App {
       onWall: (wall, drag) => this.store.set({ wall }, drag),
       onRelease: () => this.store.release(),
     });
+    this.faceView = new FaceView(byId("face"));
     this.numbers = new NumbersPanel(byId("number-list"), {
       onNumber: (settings, drag) => this.store.setNumbers(settings, drag),
       onRelease: () => this.store.release(),
@@ -191,7 +193,11 @@ export class App {
   }
 
   draw() {
-    this.chart.draw();
+    if (this.face === "chart") this.chart.draw();
+    else {
+      this.faceView.frame = this.view;
+      this.faceView.draw();
+    }
     this.writeHeadline();
     this.writeLegend();
     this.writeWall();
@@ -321,11 +327,42 @@ export class App {
     for (const id of ["wall-stiffness", "wall-damping"]) {
       byId(id).addEventListener("change", () => this.typeWall());
     }
+    for (const tab of document.querySelectorAll("[role=tab]")) {
+      tab.addEventListener("click", () => this.showFace(/** @type {HTMLElement} */ (tab).dataset.face ?? "chart"));
+    }
+    byId("faces").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => this.stepFace(event));
+    new ResizeObserver(() => this.drawSoon()).observe(byId("face"));
     addEventListener("keydown", (event) => this.shortcut(event));
     addEventListener("hashchange", () => void this.followLink());
     new ResizeObserver(() => this.drawSoon()).observe(byId("chart"));
     this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     this.listenToDrops();
+  }
+
+  /** @param {string} face */
+  showFace(face) {
+    this.face = face;
+    this.faceView.face = face;
+    byId("chart").hidden = face !== "chart";
+    byId("face").hidden = face === "chart";
+    for (const tab of document.querySelectorAll("[role=tab]")) {
+      const chosen = /** @type {HTMLElement} */ (tab).dataset.face === face;
+      tab.setAttribute("aria-selected", String(chosen));
+      tab.setAttribute("tabindex", chosen ? "0" : "-1");
+    }
+    void this.ask();
+    this.drawSoon();
+  }
+
+  /** Arrow keys go from one tab to the next. @param {KeyboardEvent} event */
+  stepFace(event) {
+    const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!way) return;
+    const tabs = /** @type {HTMLElement[]} */ ([...document.querySelectorAll("[role=tab]")]);
+    const at = tabs.findIndex((tab) => tab.dataset.face === this.face);
+    const next = tabs[(at + way + tabs.length) % tabs.length];
+    this.showFace(next.dataset.face ?? "chart");
+    next.focus();
   }
 
   listenToDrops() {
