@@ -24,9 +24,10 @@ from zwidth.model.plant import Plant
 from zwidth.show.figures.decay import draw_decay_contours, round_radii, tenfold_time
 from zwidth.show.figures.frequency import corners, draw_frequency
 from zwidth.show.figures.mechanism import draw_mechanism
-from zwidth.show.figures.plant import as_chain, draw_chain
+from zwidth.show.figures.plant import draw_chain
 from zwidth.show.figures.stability import draw_chart, draw_models, edges_of
 from zwidth.show.figures.style import GREY, figure, fitted_columns, inline_svg, label, number_logarithmic, save
+from zwidth.show.mass_chain import as_chain
 from zwidth.show.output import OutputError
 
 

@@ -1,7 +1,7 @@
 """The numbers of a device as a list for people: what each is called, its unit and source, and how far to move it.
 
-Everything comes from the schema and the file: names from keys, units and hard limits from the schema, sources from the
-file's own [sources]. Ranges are for a slider and promise nothing; the file's checks have the last word.
+Everything comes from the schema and the file: names from keys, units and hard limits from the schema, sources from
+the file's own [sources]. Ranges are for a slider and promise nothing; the file's checks have the last word.
 """
 
 from __future__ import annotations
@@ -120,7 +120,9 @@ def _entry(device: Device, steps: KeyPath, value: Any, *, given: bool = True) ->
     unit = schema.key_unit(steps)
     lowest, highest = _limits(kinds)
     *tables, name = path.split(".")
-    while tables and isinstance(steps[len(tables)], int) and not isinstance(_at(document, steps, len(tables)), dict):
+    while (
+        tables and isinstance(steps[len(tables)], int) and not isinstance(_at(document, steps, len(tables)), dict)
+    ):
         name = f"{tables.pop()}.{name}"
     return DeviceNumber(
         path=path,

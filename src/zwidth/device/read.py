@@ -53,6 +53,11 @@ def bundled_names(shelf: BundledFiles = DEVICES) -> list[str]:
     return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
 
 
+def first_bundled() -> str:
+    """The bundled device that is shown where none is named: the file `first` of their folder names it."""
+    return str((_place(DEVICES) / "first").read_text(encoding="utf-8")).strip()
+
+
 def bundled(shelf: BundledFiles = DEVICES) -> list[tuple[str, str, str]]:
     """(name, description, source) of every bundled device; their numbers are not checked here."""
     listing = []

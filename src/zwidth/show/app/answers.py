@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from zwidth.device.read import first_bundled
 from zwidth.show.app.frames import pack_frame
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import (
@@ -21,6 +21,7 @@ from zwidth.show.app.request import (
     SensitivityRequest,
     State,
     ViewRequest,
+    Wall,
 )
 from zwidth.show.cli.errors import BadInput, NoAnswer, explain, translate_errors
 from zwidth.show.cli.options import Question
@@ -43,12 +44,10 @@ class Answers:
         self._asked: Any = None
 
     def warm_up(self) -> None:
-        """Load what every answer needs, by answering a question about a small plant."""
-        from zwidth.loop.loop import Loop
-        from zwidth.model.plant import Plant
-
-        Loop(Plant.one_mass(mass=0.03, damping=1.0), sampling_period=0.001).chart()
-        import zwidth.show.app.layers  # noqa: F401
+        """Load what every answer needs, by answering what a page asks first."""
+        state = State(device=first_bundled(), wall=Wall(stiffness=1000.0, damping=1.0))
+        self._contents(OpenRequest(id=0, kind="open", state=state))
+        self._contents(ViewRequest(id=0, kind="view", state=state, layers=("chart", "scene")))
 
     def answer(self, request: Computed | FileRequest) -> bytes:
         """The frame that answers a request; never raises for what a page can ask."""
@@ -99,8 +98,3 @@ class Answers:
             case ExportRequest():
                 return studies.export(opened, request)
         raise BadInput(f"there is no answer to {request.kind}")
-
-
-def finite(value: float) -> float | None:
-    """The number, or None where it is not finite."""
-    return value if math.isfinite(value) else None

@@ -2,8 +2,8 @@
 
     uint32 length of the head | the head as UTF-8, blanks up to a multiple of 8 | array | array | ...
 
-The head's `arrays` names them: name -> [type, shape, first byte, counted from the end of the head]. A page makes typed
-arrays on the message's own memory, so that nothing is parsed number by number.
+The head's `arrays` names them: name -> [type, shape, first byte, counted from the end of the head]. A page makes
+typed arrays on the message's own memory, so that nothing is parsed number by number.
 """
 
 from __future__ import annotations

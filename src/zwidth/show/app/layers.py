@@ -16,6 +16,8 @@ from zwidth.measures.catalogue import MEASURES
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State
+from zwidth.show.mass_chain import as_chain
+from zwidth.show.mechanism_scene import mechanism_scene
 
 if TYPE_CHECKING:
     pass
@@ -227,6 +229,44 @@ def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -
     return {"conditions": head}, arrays
 
 
+def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """Where the links are, the handle and the rendered direction; the masses of a plant that is a row of them."""
+    if point.mechanism is None:
+        chain = None if point.response is not None else as_chain(point.ungripped_plant)
+        if chain is None:
+            return {"kind": "none"}, {}
+        return {"kind": "chain"}, {
+            "mass": chain.mass,
+            "stiffness": chain.stiffness,
+            "damping": chain.damping,
+        }
+    posture = point.posture
+    assert posture is not None
+    made = mechanism_scene(point.mechanism, posture)
+    rendered = np.asarray(point.direction, dtype=float)
+    head: dict[str, Any] = {
+        "kind": "mechanism",
+        "names": list(made.names),
+        "styles": list(made.styles),
+        "drives": list(made.drives),
+        "flat": list(made.flat),
+        "planar": made.planar,
+        "projected": float(posture.projected),
+        "turns": point.turns,
+    }
+    if point.load is not None:
+        head["load"] = {"force": point.load.force, "gravity": point.load.gravity}
+    joined = _joined("strokes", list(made.strokes), 3)
+    return head, {
+        **joined,
+        "base": made.base,
+        "joints": made.joints,
+        "driven": made.driven,
+        "handle": made.handle,
+        "direction": rendered[3:] if point.turns else rendered[:3],
+    }
+
+
 def _face(name: str) -> Layer:
     """One of the other faces of the state's wall."""
 
@@ -269,6 +309,7 @@ def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 
 LAYERS: dict[str, Layer] = {
     "chart": _chart,
+    "scene": _scene,
     "decay": _decay,
     "models": _models,
     "hands": _hands,

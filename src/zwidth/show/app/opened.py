@@ -1,15 +1,12 @@
-"""The devices that a page has opened: bundled ones, and the files that it has sent, kept in a folder of their own."""
+"""The devices that a page has opened: bundled ones, and files that it has sent, which lie in a folder."""
 
 from __future__ import annotations
 
 import os
 from collections import OrderedDict
-from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import fail
 from zwidth.device.load import from_document
@@ -22,7 +19,6 @@ if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
 
 MOST_KEPT: Final = 8  # devices kept as they were loaded
-OPERATOR_PATH: Final = "operator"
 
 
 class OpenedDevices:
@@ -95,17 +91,3 @@ class OpenedDevices:
 def changes(settings: dict[str, Any]) -> list[str | tuple[str, Any]]:
     """Settings as `address.apply` takes them; None removes a key."""
     return [f"{path}=unset" if value is None else (path, value) for path, value in settings.items()]
-
-
-def changed_document(opened: OpenedDevices, state: State) -> dict[str, Any]:
-    """The device file of a state with its numbers changed."""
-    return address.apply(
-        document_held_by(opened.document(state), opened._operator(state)), changes(state.settings)
-    )
-
-
-def remove(names: Iterable[Path]) -> None:
-    """Remove files, those that are there."""
-    for name in names:
-        with suppress(OSError):
-            name.unlink()

@@ -82,7 +82,7 @@ def announcement(settings: Settings) -> list[str]:
     if settings.host not in LOOPBACK:
         lines += [
             "zwidth: other computers can connect with this token; what is sent is not encrypted",
-            "zwidth: on other computers browsers allow sound and boards only at a secure address: forward the port "
-            f"with ssh -L {settings.port}:127.0.0.1:{settings.port}, or put a server with https before it",
+            "zwidth: on other computers browsers allow sound and boards only at a secure address: forward the "
+            f"port with ssh -L {settings.port}:127.0.0.1:{settings.port}, or put a server with https before it",
         ]
     return lines

@@ -1,7 +1,7 @@
 """The server of the workbench: the page's files, one socket, and who may use them.
 
-It listens on this computer alone unless told otherwise, and then wants a token. Requests that name another host, as
-those of a page that had its own name resolved to this computer, and sockets opened by other pages are refused.
+It listens on this computer alone unless told otherwise, and then wants a token. Requests that name another host,
+as those of a page that had its own name resolved to this computer, and sockets opened by other pages are refused.
 No path of a request ever reaches the file system: what can be fetched is a fixed list.
 """
 

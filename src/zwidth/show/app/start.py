@@ -1,17 +1,15 @@
-"""What a page opens first: the device of the command line, with the text of its file and of those that it names."""
+"""What a page opens first: the device of the command line, with the text of its file and those it names."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from zwidth.device import address
-from zwidth.device.read import bundled_names, device_text, parse_document
+from zwidth.device.read import bundled_names, device_text, first_bundled, parse_document
 from zwidth.device.text_file import read_text
 from zwidth.show.app.connection import LARGEST_FILE
-
-FIRST: Final = "five-bar"  # shown where no device is named
 
 
 def start_of(device: str | None, settings: Sequence[str]) -> dict[str, Any]:
@@ -23,7 +21,7 @@ def start_of(device: str | None, settings: Sequence[str]) -> dict[str, Any]:
     """
     from zwidth.device.load import load
 
-    name = device or FIRST
+    name = device or first_bundled()
     made = load(name, settings)
     changes = dict(address.parse(one) for one in settings)
     if name in bundled_names():

@@ -116,6 +116,7 @@ class SparePool:
     def __init__(self) -> None:
         self._spare: ComputeProcess | None = None
         self._lock = asyncio.Lock()
+        self._next: asyncio.Task[None] | None = None
 
     async def prepare(self) -> None:
         """Start a spare process if there is none."""
@@ -130,10 +131,13 @@ class SparePool:
         await self.prepare()
         taken, self._spare = self._spare, None
         assert taken is not None
+        self._next = asyncio.ensure_future(self.prepare())
         return taken
 
     async def end(self) -> None:
         """End the spare process."""
+        if self._next is not None:
+            await self._next
         if self._spare is not None:
             await self._spare.end()
             self._spare = None

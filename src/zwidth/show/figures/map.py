@@ -24,8 +24,8 @@ from zwidth.measures.definition import (
     UNDECIDED,
 )
 from zwidth.show.figures.colour_bands import LARGEST, bands_of, colour_bar
-from zwidth.show.figures.mechanism import drawn_links, joint_points, link_stroke
 from zwidth.show.figures.style import BLACK, GREY, LINES, VERMILION, figure, label
+from zwidth.show.mechanism_scene import drawn_links, joint_points, link_stroke
 from zwidth.show.units import area_text, as_written, percent, printed
 from zwidth.study.workspace.reach_outline import continued, reach_outline
 

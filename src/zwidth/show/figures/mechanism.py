@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from itertools import pairwise
 from typing import Any
 
@@ -13,16 +12,13 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.device.device import Device
-from zwidth.model.mechanism import FIXED, Mechanism
-from zwidth.model.posture import LinkPoints, Posture, link_points
+from zwidth.model.posture import Posture
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, label, legend_beside
+from zwidth.show.mechanism_scene import SAME_POINT, MechanismScene, mechanism_scene
 from zwidth.show.units import quantity
 
 Floats = NDArray[np.float64]
-# Points closer than this share of the mechanism's size are one.
-SAME_POINT = 1e-6
 AXES = "xyz"
-AXIS_LENGTH = 0.05  # m, to either side, of joint axes that are drawn alone
 # Where x, y and z go in the picture of a spatial mechanism, (2, 3): it is looked at from the right and above.
 TURNED, TILTED = np.radians(35.0), np.radians(22.0)
 OBLIQUE = np.array(
@@ -44,20 +40,14 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     if device.mechanism is None:
         raise ValueError(f"{device.label} is given by its [plant] and has no mechanism to draw")
     mechanism = device.mechanism
-    placed = link_points(mechanism, posture)
-    bodies = drawn_links(mechanism)
-    strokes = [link_stroke(mechanism, placed, i) for i in bodies]
-    if not np.ptp(np.vstack(strokes), axis=0).any():  # a wrist, of which nothing has a length
-        strokes = [_axis_stroke(mechanism, placed, i) for i in bodies]
+    scene = mechanism_scene(mechanism, posture)
+    strokes, flat, planar = scene.strokes, list(scene.flat), scene.planar
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
-    flat = projection_axes(everything)
-    planar = np.ptp(np.delete(everything, flat, axis=1)) <= SAME_POINT * max(float(np.ptp(everything)), 1e-9)
     view = np.eye(3)[flat] if planar else OBLIQUE
     size = max(float(np.max(np.ptp(everything @ view.T, axis=0))), 1e-9)
-    groups = _groups([mechanism.links.names[i] for i in bodies])
-    for stroke, (name, n, first) in zip(strokes, groups, strict=True):
+    for stroke, name, n, first in zip(strokes, scene.names, scene.styles, scene.first, strict=True):
         _link(ax, stroke @ view.T, name if first else "", n)
-    _joints(ax, mechanism, placed, view, size, [stroke @ view.T for stroke in strokes])
+    _joints(ax, scene, view, size, [stroke @ view.T for stroke in strokes])
     _handle(ax, view @ posture.position, np.asarray(direction, dtype=float), view, size)
     ax.set_aspect("equal")
     ax.margins(0.12, 0.06)
@@ -70,28 +60,6 @@ def draw_mechanism(ax: Axes, device: Device, posture: Posture, direction: ArrayL
     else:
         _base_axes(ax, everything @ view.T, size)
     legend_beside(ax)
-
-
-def _axis_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
-    """The joint's axis through its origin, (2, 3), where there is nothing else to draw."""
-    axis = points_of_links.rotation[link] @ mechanism.links.axis[link]
-    return np.asarray(points_of_links.origin[link] + AXIS_LENGTH * np.array([-axis, axis]))
-
-
-def drawn_links(mechanism: Mechanism) -> list[int]:
-    """The entries of the links that are bodies, not the crosses and balls between two joint coordinates."""
-    return [i for i, name in enumerate(mechanism.links.names) if "/" not in name]
-
-
-def _groups(names: list[str]) -> list[tuple[str, int, bool]]:
-    """Of each link its name, or that of all copies of a leg's link; the number of its style; whether it is the
-    first of that name."""
-    kinds = [re.sub(r"-\d+$", "", name) for name in names]
-    shown, known = [], list(dict.fromkeys(kinds))
-    for name, kind in zip(names, kinds, strict=True):
-        copies = kinds.count(kind)
-        shown.append((f"{kind} ({copies})" if copies > 1 else name, known.index(kind)))
-    return [(name, n, shown.index((name, n)) == i) for i, (name, n) in enumerate(shown)]
 
 
 def _base_axes(ax: Axes, points: Floats, size: float) -> None:
@@ -116,29 +84,6 @@ def _base_axes(ax: Axes, points: Floats, size: float) -> None:
     ax.axis("off")
 
 
-def projection_axes(points: Floats) -> list[int]:
-    """The two coordinates in which the points spread most, in the order x, y, z; x and y where it is a tie."""
-    spread = np.ptp(points, axis=0) + np.array([2.0, 2.0, 0.0]) * 1e-12
-    return sorted(np.argsort(-spread, kind="stable")[:2].tolist())
-
-
-def link_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
-    """The points that a link joins, (k, 3), from its joint to the joints and points that it carries."""
-    links, closures = mechanism.links, mechanism.closures
-    start = points_of_links.origin[link]
-    points = [points_of_links.tip[link]]
-    points += [points_of_links.origin[child] for child in np.flatnonzero(links.parent == link)]
-    for owners, at in ((closures.a, closures.point_a), (closures.b, closures.point_b)):
-        points += [points_of_links.of(link, at[k]) for k in np.flatnonzero(owners == link)]
-    if mechanism.handle_link == link:
-        points.append(points_of_links.of(link, mechanism.handle_point))
-    stroke = [start]
-    for point in points:
-        if all(np.linalg.norm(point - other) > SAME_POINT for other in stroke):
-            stroke += [point, start]  # out and back: a link may branch
-    return np.array(stroke)
-
-
 def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
     colour = LINES[n % len(LINES)][0]
     style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 2.0}
@@ -146,35 +91,23 @@ def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
     ax.plot(*stroke.T, color=colour, linestyle=LINES[n % len(LINES)][1], linewidth=1.2, label=name, zorder=2.1)
 
 
-def _joints(
-    ax: Axes,
-    mechanism: Mechanism,
-    points_of_links: LinkPoints,
-    view: Floats,
-    size: float,
-    strokes: list[Floats],
-) -> None:
+def _joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes: list[Floats]) -> None:
     """Base, joints and loop closures; driven joints filled, with the names of their drives."""
-    links, closures, drives = mechanism.links, mechanism.closures, mechanism.drives
-    based = [i for i in np.flatnonzero(links.parent < 0) if not _is_free(mechanism, int(i))]
-    base = points_of_links.origin[based] @ view.T
-    grounded = [p for a, p in zip(closures.a, closures.point_a, strict=True) if a < 0]
-    grounded += [p for b, p in zip(closures.b, closures.point_b, strict=True) if b < 0]
-    base = np.vstack([base, np.array(grounded).reshape(-1, 3) @ view.T])
+    base = scene.base @ view.T
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
     circle: dict[str, Any] = {"marker": "o", "markersize": 7.0, "linestyle": "none", "markeredgecolor": BLACK}
     ax.plot(
-        *(joint_points(mechanism, points_of_links) @ view.T).T,
+        *(scene.joints @ view.T).T,
         markerfacecolor="white",
         zorder=3.0,
         label="joint",
         **circle,
     )
-    driven = points_of_links.origin[drives.joint] @ view.T
+    driven = scene.driven @ view.T
     if len(driven):
         ax.plot(*driven.T, markerfacecolor=BLUE, zorder=3.1, label="driven joint", **circle)
-    for place, names in _labels_by_position(driven, drives.names, SAME_POINT * max(size, 1.0)):
+    for place, names in _labels_by_position(driven, scene.drives, SAME_POINT * max(size, 1.0)):
         aside = _free_side(place, strokes, SAME_POINT * max(size, 1.0))
         room = place + 0.2 * size * aside  # texts do not widen the view
         ax.plot(*room[:, None], linestyle="none", marker=None)
@@ -190,22 +123,6 @@ def _joints(
             path_effects=[withStroke(linewidth=3.0, foreground="white")],
             zorder=5.0,
         )
-
-
-def joint_points(mechanism: Mechanism, points_of_links: LinkPoints) -> Floats:
-    """Where joints move and loops meet, (k, 3); a free link has no such place."""
-    closures, joint = mechanism.closures, mechanism.links.joint
-    moving = [i for i in np.flatnonzero(joint != FIXED) if not _is_free(mechanism, int(i))]
-    meeting = [
-        points_of_links.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)
-    ]
-    return np.array([*points_of_links.origin[moving], *meeting]).reshape(-1, 3)
-
-
-def _is_free(mechanism: Mechanism, entry: int) -> bool:
-    """Whether an entry belongs to a free link, which has six of them and no joint that holds it."""
-    names = [name.partition("/")[0] for name in mechanism.links.names]
-    return names.count(names[entry]) > 3
 
 
 def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:

@@ -17,8 +17,9 @@ from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_no
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import Posture, PostureError, link_points, solve_posture
 from zwidth.show.figures.contact_response import LONGEST_LINE, draw_envelope, draw_line
-from zwidth.show.figures.mechanism import AXES, drawn_links, joint_points, link_stroke, projection_axes
+from zwidth.show.figures.mechanism import AXES
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
+from zwidth.show.mechanism_scene import drawn_links, joint_points, link_stroke, projection_axes
 from zwidth.show.units import quantity
 
 Floats = NDArray[np.float64]

@@ -17,11 +17,12 @@ from zwidth.show.figures.felt import draw_felt_chart
 from zwidth.show.figures.frequency import draw_frequency
 from zwidth.show.figures.load_path import load_path_figure
 from zwidth.show.figures.mechanism import draw_mechanism
-from zwidth.show.figures.plant import as_chain, draw_chain
+from zwidth.show.figures.plant import draw_chain
 from zwidth.show.figures.sensitivity import draw_sensitivities
 from zwidth.show.figures.stability import draw_chart, draw_models
 from zwidth.show.figures.style import context, figure, inline_svg
 from zwidth.show.figures.validity import draw_validity
+from zwidth.show.mass_chain import as_chain
 from zwidth.show.report.facts import Facts
 from zwidth.study.validity import Validity
 
