@@ -40,7 +40,7 @@ def impedance(point: OperatingPoint, wall: Wall) -> Contents:
 def nyquist(point: OperatingPoint, wall: Wall) -> Contents:
     """The open loop L = P (K + B w) over the upper half of the unit circle, (k, 3) with angles; the wall is stable
     where it goes round -1 as often as it must. With every passive operator P fills a disk at each frequency, and
-    so does L: rows (real, imaginary, radius, frequency). The wall is stable in any passive hand if no disk holds -1.
+    so does L: rows (real, imaginary, radius, frequency). In any passive hand it is stable if no disk holds -1.
     """
     loop = point.loop
     angles = np.geomspace(LOWEST, np.pi - LOWEST, ANGLES)

@@ -11,6 +11,7 @@ import { ChartView } from "./chart_view.js";
 import { Connection, Dropped, Refusal } from "./connection.js";
 import { linkOf, readLink, Store } from "./state.js";
 import { NumbersPanel } from "./numbers_panel.js";
+import { DeviceView } from "./device_view.js";
 import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
 import { saveBytes } from "./files.js";
@@ -49,6 +50,14 @@ export class App {
       onRelease: () => this.store.release(),
     });
     this.faceView = new FaceView(byId("face"));
+    this.deviceView = new DeviceView(byId("scene"), {
+      onPosition: (position, drag) => this.store.set({ position }, drag),
+      onDirection: (direction, drag) => this.store.set({ direction, axis: null }, drag),
+      onRelease: () => {
+        this.deviceView.wanted = null;
+        this.store.release();
+      },
+    });
     this.numbers = new NumbersPanel(byId("number-list"), {
       onNumber: (settings, drag) => this.store.setNumbers(settings, drag),
       onRelease: () => this.store.release(),
@@ -133,11 +142,12 @@ export class App {
   async ask() {
     clearTimeout(this.rests);
     this.rests = setTimeout(() => void this.askMore(), RESTS);
-    const layers = ["chart", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers(), ...(this.contact.touching ? ["touch"] : [])];
+    const layers = ["chart", "scene", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers(), ...(this.contact.touching ? ["touch"] : [])];
     try {
       const frame = await this.connection.ask("view", { state: this.sent(), layers });
       this.view = frame;
       this.chart.setFrame(frame);
+      this.deviceView.setFrame(frame, this.opened);
       this.contact.update(frame, this.state.wall ?? null);
       this.say("");
       this.drawSoon();
@@ -155,6 +165,23 @@ export class App {
     this.say(`computing ${layers.join(" and ")}…`);
     try {
       this.chart.more = await this.connection.ask("more", { state: this.sent(), layers }, this.progress);
+      this.say("");
+      this.drawSoon();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** Ask for the map of a measure behind the device; none for "". @param {string} measure */
+  async showMap(measure) {
+    this.deviceView.map = null;
+    this.drawSoon();
+    if (!measure) return;
+    this.say(`mapping ${measure.replaceAll("_", " ")}…`);
+    try {
+      const { head, arrays } = await this.connection.ask("map", { state: this.sent(), measure }, this.progress);
+      const values = (/** @type {string} */ name) => /** @type {Float64Array} */ (arrays[name].values);
+      this.deviceView.map = { x: values("x"), y: values("y"), values: values("values"), unit: head.unit, name: measure.replaceAll("_", " ") };
       this.say("");
       this.drawSoon();
     } catch (error) {
@@ -198,6 +225,7 @@ export class App {
       this.faceView.frame = this.view;
       this.faceView.draw();
     }
+    this.deviceView.draw();
     this.writeHeadline();
     this.writeLegend();
     this.writeWall();
@@ -284,6 +312,7 @@ export class App {
     if (another) {
       this.chart.box = null;
       this.chart.more = null;
+      this.deviceView.map = null;
       this.numbers.sortBy(null);
       byId("sort").setAttribute("aria-pressed", "false");
     }
@@ -324,6 +353,8 @@ export class App {
     for (const [id, key] of [["model", "model"], ["operator", "operator"], ["assembly", "assembly"]]) {
       byId(id).addEventListener("change", () => this.store.set({ [key]: byId(id).value || null }));
     }
+    byId("measure").addEventListener("change", () => void this.showMap(byId("measure").value));
+    new ResizeObserver(() => this.drawSoon()).observe(byId("scene"));
     for (const id of ["wall-stiffness", "wall-damping"]) {
       byId(id).addEventListener("change", () => this.typeWall());
     }
