@@ -78,7 +78,7 @@ def sensitivities(
         stiffest, obstacle = optimum(loop, peak), ""
     except OptimumError as error:
         stiffest, obstacle = None, str(error)
-    numbers, varied = [], list(_numbers(device.document))
+    numbers, varied = [], list(varied_numbers(device.document))
     changed = None
     if stiffest is not None:
         changes = dict(_changes(device.document, varied))
@@ -201,7 +201,7 @@ def _places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
         yield image, multiple
 
 
-def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
+def varied_numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
     """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
     and above the diagonal."""
     for steps, value in address.numbers(document):
@@ -250,7 +250,7 @@ def _key(steps: KeyPath) -> str:
 def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
     """Path -> paths of its members: each list and matrix, and each key over all elements of a list of tables."""
     members: dict[str, list[str]] = {}
-    for path, steps, _ in _numbers(document):
+    for path, steps, _ in varied_numbers(document):
         whole = steps
         while whole and isinstance(whole[-1], int):
             whole = whole[:-1]

@@ -73,7 +73,9 @@ export class App {
         },
         onSimulate: async (options) => {
           try {
-            return await this.connection.ask("contact", { state: this.sent(), ...options }, this.progress);
+            const frame = await this.connection.ask("contact", { state: this.sent(), ...options }, this.progress);
+            this.say("");
+            return frame;
           } catch (error) {
             this.fail(error);
             return null;

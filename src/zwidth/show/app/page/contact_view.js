@@ -119,7 +119,7 @@ export class ContactView {
     if (this.touching) this.drawStrip(context, { x: 0, y: 0, width, height: STRIP }, colours);
     const top = this.touching ? STRIP : 0;
     if (!motion || motion.time.length < 2) {
-      if (!this.touching) drawText(context, "choose a wall on the chart, then let the device go, or touch it", width / 2, height / 2, { align: "center", colour: colours.grey });
+      if (!this.touching) ["choose a wall on the chart,", "then let the device go, or touch it"].forEach((line, n) => drawText(context, line, width / 2, height / 2 + 18 * n, { align: "center", colour: colours.grey }));
       return;
     }
     const wide = width > 420;
@@ -137,20 +137,17 @@ export class ContactView {
     const wall = x(0);
     context.strokeStyle = colours.grey;
     context.lineWidth = 1;
+    context.save();
+    context.beginPath();
+    context.rect(wall, 12, Math.max(area.width - wall, 0), 66);
+    context.clip();
+    context.beginPath();
     for (let at = wall; at < area.width + 60; at += 9) {
-      context.beginPath();
       context.moveTo(at, 12);
       context.lineTo(at - 60, 78);
-      context.save();
-      context.beginPath();
-      context.rect(wall, 12, area.width - wall, 66);
-      context.clip();
-      context.beginPath();
-      context.moveTo(at + 60, 12);
-      context.lineTo(at, 78);
-      context.stroke();
-      context.restore();
     }
+    context.stroke();
+    context.restore();
     context.strokeStyle = colours.ink;
     context.lineWidth = 2;
     context.beginPath();
@@ -166,7 +163,7 @@ export class ContactView {
     context.fill();
     context.fillStyle = colours.purple;
     context.fillRect(hand - 6, middle - 6, 12, 12);
-    drawText(context, "wall", Math.min(wall + 6, area.width - 40), 24, { colour: colours.ink, halo: colours.surface });
+    drawText(context, "wall", area.width - 8, 24, { align: "right", colour: colours.ink, halo: colours.surface });
     drawText(context, "device", device, middle - 17, { align: "center", colour: colours.ink, halo: colours.surface });
     drawText(context, "hand", hand, middle + 24, { align: "center", colour: colours.ink, halo: colours.surface });
     drawText(context, `±${quantity(this.span, this.units.x, 2)}`, 6, 86, { colour: colours.grey });
@@ -199,9 +196,9 @@ export class ContactView {
 
   /** @param {CanvasRenderingContext2D} context @param {Area} area @param {Motion} motion @param {any} colours */
   drawLoop(context, area, motion, colours) {
-    const box = { x: area.x + 52, y: area.y + 30, width: area.width - 64, height: area.height - 64 };
-    plot(context, box, motion.position, motion.force, { along: "Position", unit: this.units.f, name: "Force on the device", colour: colours.vermilion, colours, timeUnit: this.units.x });
-    drawText(context, `energy from the wall ${quantity(workOf(motion), "J", 3)}`, box.x, area.y + 13, { colour: colours.ink });
+    const box = { x: area.x + 52, y: area.y + 32, width: area.width - 64, height: area.height - 66 };
+    plot(context, box, motion.position, motion.force, { along: "Position", unit: this.units.f, name: "Force", colour: colours.vermilion, colours, timeUnit: this.units.x });
+    drawText(context, `wall gave ${quantity(workOf(motion), "J", 3)}`, box.x, area.y + 12, { colour: colours.ink });
   }
 }
 

@@ -16,6 +16,7 @@ const REACH = 22; // css px round the handle, or the arrow's tip, that a pointer
 const ARROW = 74; // css px
 const STEP = 0.001; // m, by which an arrow key moves the handle
 const TURN = Math.PI / 36; // by which [ and ] turn the direction
+const OUTSIDE = 0.05; // share of the cells at each end of a map that have the colour of the end
 const COLOURS = ["ink", "blue", "vermilion", "green", "purple", "orange"];
 // Of a map, dark to light: cividis, told apart with any colour vision.
 const SHADES = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
@@ -100,6 +101,10 @@ export class DeviceView {
   fit(device) {
     const strokes = [...this.points("strokes"), ...this.points("handle"), 0, 0, 0];
     const [right, up] = this.view();
+    const direction = this.points("direction");
+    const size = Math.max(...strokes.map(Math.abs));
+    const handle = this.points("handle");
+    strokes.push(...[0, 1, 2].map((k) => handle[k] + 0.25 * size * direction[k])); // room for the arrow
     const spread = (/** @type {Vector} */ axis) => {
       let [low, high] = [Infinity, -Infinity];
       for (let i = 0; i < strokes.length; i += 3) {
@@ -395,10 +400,11 @@ export class DeviceView {
   drawMap(context, width, height, colours) {
     const map = /** @type {Grid} */ (this.map);
     const { x, y, values } = map;
-    const known = values.filter((value) => Number.isFinite(value));
+    const known = values.filter((value) => Number.isFinite(value)).sort();
     if (!known.length) return;
-    let [low, high] = [Infinity, -Infinity];
-    for (const value of known) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    // colours for nine cells of ten: near a singular posture single cells are thousands of times the others
+    const [low, high] = [known[Math.floor(OUTSIDE * known.length)], known[Math.ceil((1 - OUTSIDE) * known.length) - 1]];
+    context.globalAlpha = 0.75;
     const [i, j] = this.scene.flat;
     const [dx, dy] = [x[1] - x[0], y[1] - y[0]];
     for (let row = 0; row < y.length; row++) {
@@ -413,13 +419,14 @@ export class DeviceView {
         context.fillRect(Math.floor(at.x), Math.floor(at.y), Math.ceil(dx * this.scale) + 1, Math.ceil(dy * this.scale) + 1);
       }
     }
+    context.globalAlpha = 1;
     const length = Math.min(150, width / 3);
     for (let k = 0; k < length; k++) {
       context.fillStyle = shade(k / length);
       context.fillRect(width - length - 12 + k, 8, 1.5, 9);
     }
-    drawText(context, quantity(low, map.unit, 3), width - length - 12, 30, { colour: colours.ink, halo: colours.surface, size: 11 });
-    drawText(context, quantity(high, map.unit, 3), width - 12, 30, { align: "right", colour: colours.ink, halo: colours.surface, size: 11 });
+    drawText(context, `${low > known[0] ? "≤ " : ""}${quantity(low, map.unit, 3)}`, width - length - 12, 30, { colour: colours.ink, halo: colours.surface, size: 11 });
+    drawText(context, `${high < known[known.length - 1] ? "≥ " : ""}${quantity(high, map.unit, 3)}`, width - 12, 30, { align: "right", colour: colours.ink, halo: colours.surface, size: 11 });
     drawText(context, map.name, width - 12, 44, { align: "right", colour: colours.ink, halo: colours.surface, size: 11 });
   }
 
