@@ -167,8 +167,11 @@ class Connection:
         except ValidationError as error:
             await self._refuse(message, [_sentence(one) for one in error.errors()[:5]])
             return
-        except (ValueError, RecursionError) as error:
-            await self._refuse(message, [str(error) or "the message is nested too deeply"])
+        except RecursionError:
+            await self._refuse(message, ["the message is nested too deeply"])
+            return
+        except ValueError as error:
+            await self._refuse(message, [str(error)])
             return
         if isinstance(request, FileRequest):
             await self._take_file(request)
