@@ -161,7 +161,10 @@ def test_a_bad_state_is_answered_in_a_sentence_and_the_next_one_is_answered(clie
         ('{"kind": "no-such", "id": 1}', "kind"),
         ('{"id": 1, "kind": "view", "state": {"device": "../five-bar"}}', "device"),
         ('{"id": 1, "kind": "view", "state": {"device": "five-bar", "settings": {"a": NaN}}}', "finite"),
-        ('{"id": 1, "kind": "view", "state": {"device": "five-bar", "wall": {"stiffness": 1e99, "damping": 0}}}', "wall"),
+        (
+            '{"id": 1, "kind": "view", "state": {"device": "five-bar", "wall": {"stiffness": 1e99, "damping": 0}}}',
+            "wall",
+        ),
         ('{"id": 1, "kind": "view", "state": {"device": "five-bar", "secret": 1}}', "secret"),
         ("[" * 100_000, "nested"),
         ('{"id": 1, "kind": "file", "name": "../../x.toml", "text": ""}', "name"),

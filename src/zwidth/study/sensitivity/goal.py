@@ -92,7 +92,9 @@ class Goal(Result):
     def __repr__(self) -> str:
         reached = [one for one in self.numbers if one.status == "reached"]
         lines = [f"Goal: {self.stiffness:.6g} N/m, from {self.now:.6g} N/m; {len(reached)} numbers reach it alone"]
-        return "\n".join([*lines, *(f"  {one.path} = {one.wanted:.6g} {one.unit}".rstrip() for one in reached[:3])])
+        return "\n".join(
+            [*lines, *(f"  {one.path} = {one.wanted:.6g} {one.unit}".rstrip() for one in reached[:3])]
+        )
 
 
 def numbers_for_goal(
@@ -131,7 +133,9 @@ def numbers_for_goal(
         search.add((steps, free[steps] * np.exp(x)) for steps, xs in inner.items() for x in xs[1:-1])
         for steps, xs in inner.items():
             intervals[steps] = _nearest(search, steps, free[steps], xs, now)
-    found = [_number(search, path, steps, value, intervals.get(steps), now, grid) for path, steps, value in numbers]
+    found = [
+        _number(search, path, steps, value, intervals.get(steps), now, grid) for path, steps, value in numbers
+    ]
     return Goal(goal, now, tuple(sorted(found, key=_rank)))
 
 

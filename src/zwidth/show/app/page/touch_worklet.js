@@ -17,12 +17,12 @@ class TouchProcessor extends AudioWorkletProcessor {
   /** @param {any} options */
   constructor(options) {
     super();
-    const { module, blocks, wall, memory, factor } = options.processorOptions;
+    const { module, blocks, wall, memory, factor, push } = options.processorOptions;
     this.machine = new TouchMachine(module);
     this.machine.load(blocks);
     if (memory) this.machine.floats(this.machine.at.memory, memory.length).set(memory);
     this.wall = wall;
-    this.push = 0;
+    this.push = push ?? 0;
     this.factor = factor ?? 1;
     this.time = 0; // s that have been heard
     this.done = 0; // periods gone through

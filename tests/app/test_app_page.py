@@ -1,0 +1,289 @@
+"""The page in a browser: every view, drag, click, key, drop, link and file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from app.page_driver import Page
+from app.test_app_socket import PLANT
+
+import zwidth
+
+
+@pytest.fixture
+def page(browser, workbench):
+    with Page(browser, workbench) as opened:
+        yield opened
+
+
+def test_the_first_view_is_the_chart_of_python(page) -> None:
+    assert page.stiffness_max == pytest.approx(zwidth.load("five-bar").at().chart().stiffness_max, rel=1e-12)
+    headline = page.page.locator("#headline").text_content().replace("\u00a0", " ")
+    assert headline == "up to 7.849 kN/m at 10.82 Ns/m of damping; there it oscillates at 170.5 Hz"
+    assert page.page.title() == "Five-bar – zwidth"
+
+
+def test_a_slider_is_dragged_and_the_chart_follows(page) -> None:
+    slider = page.page.locator("input[aria-label='sampling period']")
+    box = slider.bounding_box()
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.drag(middle, (box["x"] + 0.3 * box["width"], middle[1]), steps=25)
+    page.settle()
+    period = page.value("zwidth.state.settings['loop.sampling_period_s']")
+    assert period < 0.00125
+    made = zwidth.load("five-bar", {"loop.sampling_period_s": period})
+    assert page.stiffness_max == pytest.approx(made.at().chart().stiffness_max, rel=1e-12)
+    assert page.value("zwidth.store.past.length") == 1, "a drag is one step"
+    page.page.click("#undo")
+    page.settle()
+    assert page.stiffness_max == pytest.approx(7849.4414930, rel=1e-9)
+    page.page.keyboard.press("Control+y")
+    page.settle()
+    assert page.value("zwidth.state.settings['loop.sampling_period_s']") == period
+
+
+def test_a_number_is_typed_and_a_wrong_one_is_refused(page) -> None:
+    field = page.page.locator("[id='n-loop.sampling_period_s']")
+    field.fill("0,001")
+    field.press("Enter")
+    page.settle()
+    assert page.value("zwidth.state.settings['loop.sampling_period_s']") == 0.001
+    for text in ("abc", "-1", "1e99", "NaN"):
+        field.fill(text)
+        field.press("Enter")
+        assert page.value("zwidth.state.settings['loop.sampling_period_s']") == 0.001, text
+        assert not field.evaluate("(field) => field.validity.valid"), text
+
+
+def test_a_wall_is_chosen_by_click_keys_and_fields(page) -> None:
+    page.page.mouse.click(*page.at("chart", 0.5, 0.6))
+    page.settle()
+    clicked = page.value("zwidth.state.wall")
+    assert 3000.0 < clicked["stiffness"] < 5000.0
+    assert "stable" in page.page.locator("#verdict").text_content()
+    page.page.focus("#chart")
+    page.page.keyboard.press("ArrowRight")
+    assert page.value("zwidth.state.wall.stiffness") > clicked["stiffness"]
+    page.page.fill("#wall-stiffness", "8500")
+    page.page.press("#wall-stiffness", "Enter")
+    page.settle()
+    point = zwidth.load("five-bar").at()
+    damping = page.value("zwidth.state.wall.damping")
+    assert point.check(8500.0, damping).names == ["unstable"]
+    assert page.page.locator("#verdict").text_content().startswith("unstable")
+    page.page.fill("#wall-damping", "hard")
+    page.page.press("#wall-damping", "Enter")
+    assert "is a number" in page.status
+
+
+def test_layers_are_switched_on_and_named(page) -> None:
+    for layer in ("decay", "models", "hands", "bounds", "frequency"):
+        page.page.check(f"[data-layer={layer}]")
+    page.wait("zwidth.chart.more?.head.bounds")
+    page.settle()
+    legend = page.page.locator("#legend").text_content()
+    for name in ("rigid model", "thesis-arm", "|z| <", "rigid mass"):
+        assert name in legend, name
+    page.page.uncheck("[data-layer=models]")
+    page.settle()
+    assert "rigid model" not in page.page.locator("#legend").text_content()
+
+
+def test_the_other_faces_of_a_wall_are_shown(page) -> None:
+    page.page.mouse.click(*page.at("chart", 0.5, 0.6))
+    page.settle()
+    for face in ("edge", "impedance", "nyquist", "eigenvalues"):
+        page.page.click(f"[data-face={face}]")
+        page.settle()
+        assert page.page.locator("#face").is_visible()
+        assert inked(page, "face") > 500, face
+    page.page.focus("[data-face=eigenvalues]")
+    page.page.keyboard.press("ArrowRight")
+    assert page.value("zwidth.face") == "chart"
+    assert page.page.locator("#chart").is_visible()
+
+
+def test_the_handle_and_the_direction_are_dragged(page) -> None:
+    handle = page.value(
+        "(() => { const p = zwidth.deviceView.place(zwidth.deviceView.points('handle')); return [p.x, p.y]; })()"
+    )
+    box = page.page.locator("#scene").bounding_box()
+    start = (box["x"] + handle[0], box["y"] + handle[1])
+    page.drag(start, (start[0] + 30.0, start[1] + 20.0), steps=12)
+    page.settle()
+    position = page.value("zwidth.state.position")
+    assert position[0] > 0.01
+    assert position[1] < 0.25
+    made = zwidth.load("five-bar").at(tuple(position)).chart()
+    assert page.stiffness_max == pytest.approx(made.stiffness_max, rel=1e-9)
+    tip = page.value("(() => { const p = zwidth.deviceView.tip(); return [p.x, p.y]; })()")
+    page.drag((box["x"] + tip[0], box["y"] + tip[1]), (start[0] + 110.0, start[1] + 20.0), steps=12)
+    page.settle()
+    assert abs(page.value("zwidth.state.direction")[0]) > 0.9
+    page.page.focus("#scene")
+    page.page.keyboard.press("]")
+    page.page.keyboard.press("ArrowUp")
+    page.settle()
+    assert page.value("zwidth.state.position")[1] > position[1]
+
+
+def test_a_handle_dragged_out_of_reach_says_so_and_comes_back(page) -> None:
+    before = page.stiffness_max
+    page.page.evaluate("() => zwidth.store.set({ position: [2, 2, 0] })")
+    page.wait("document.getElementById('status').classList.contains('wrong')")
+    assert "reach" in page.status
+    page.page.click("#undo")
+    page.settle()
+    assert page.stiffness_max == before
+    assert page.status == ""
+
+
+def test_a_map_lies_behind_the_device(page) -> None:
+    page.page.select_option("#measure", "isotropy")
+    page.wait("zwidth.deviceView.map")
+    values = page.value("[...zwidth.deviceView.map.values].filter(Number.isFinite)")
+    assert len(values) > 100
+    assert page.value("zwidth.deviceView.map.name") == "isotropy"
+
+
+def test_a_spatial_device_is_turned(page) -> None:
+    page.page.select_option("#device-choice", "stamper-delta")
+    page.wait("zwidth.device?.label === 'stamper-delta' && !zwidth.deviceView.scene.planar")
+    page.settle()
+    before = page.value("zwidth.deviceView.turned")
+    page.drag(page.at("scene", 0.1, 0.9), page.at("scene", 0.4, 0.8))
+    assert page.value("zwidth.deviceView.turned") != before
+    assert inked(page, "scene") > 500
+
+
+def test_numbers_are_sorted_and_a_goal_is_reached(page) -> None:
+    page.page.click("#sort")
+    page.wait("zwidth.numbers.order")
+    assert "sampling period" in page.page.locator(".number label").first.text_content()
+    page.page.fill("#goal", "8,5")
+    page.page.click("#seek")
+    page.wait("zwidth.numbers.goal.size > 0")
+    page.page.locator(".reach", has_text="goal at").first.click()
+    page.settle()
+    assert page.stiffness_max == pytest.approx(8500.0, rel=1e-6)
+    page.page.fill("#goal", "stiff")
+    page.page.click("#seek")
+    assert "a goal is a stiffness" in page.status
+    page.page.fill("#filter", "motor inertia")
+    assert page.page.locator(".number").count() == 2
+
+
+def test_a_chart_is_pinned_for_comparison(page) -> None:
+    page.page.click("#pin")
+    page.page.evaluate("() => zwidth.store.setNumbers({ 'loop.delay_samples': 1 })")
+    page.settle()
+    assert page.page.locator("#legend").text_content().startswith("pinned 1")
+    assert page.value("zwidth.chart.box.K[1]") > 7800.0, "both are in view"
+    page.page.click("[aria-label='Remove pinned 1']")
+    page.settle()
+    assert page.page.locator("#legend").text_content() == ""
+
+
+def test_files_are_dropped_and_opened(page) -> None:
+    page.drop(paddle_toml=PLANT)
+    page.wait("zwidth.device?.name === 'paddle'")
+    page.settle()
+    own = zwidth.Loop(zwidth.Plant.one_mass(mass=0.03, damping=1.0), sampling_period=0.001).chart()
+    assert page.stiffness_max == pytest.approx(own.stiffness_max, rel=1e-12)
+    page.drop(points_csv="stiffness_N_per_m,damping_Ns_per_m,edge\n15000,10,upper\n")
+    page.wait("zwidth.chart.points.length === 1")
+    page.drop(broken_toml="name = 3\n[plant]\nmass_kg = 'heavy'\n")
+    page.wait("document.getElementById('status').classList.contains('wrong')")
+    assert "mass_kg" in page.status
+    page.page.select_option("#device-choice", "hapkit-course")
+    page.wait("zwidth.device?.label === 'hapkit-course'")
+    page.settle()
+    assert page.status == ""
+
+
+def test_a_link_holds_the_numbers_and_files(page) -> None:
+    page.drop(paddle_toml=PLANT)
+    page.wait("zwidth.device?.name === 'paddle'")
+    page.page.evaluate(
+        "() => zwidth.store.set({ settings: { 'plant.mass_kg': 0.05 }, wall: { stiffness: 900, damping: 3 } })"
+    )
+    page.settle()
+    shown = page.stiffness_max
+    page.page.click("#share")
+    page.wait("location.hash.length > 20")
+    link = page.value("location.hash")
+    other = page.new_tab(link)
+    assert page.value("zwidth.view.head.chart.stiffness_max", other) == pytest.approx(shown, rel=1e-12)
+    assert page.value("zwidth.state.wall", other) == {"stiffness": 900, "damping": 3}
+    cut = page.new_tab(link[:40])
+    assert (
+        "cut off" in cut.locator("#status").text_content() or page.value("zwidth.state.device", cut) == "five-bar"
+    )
+
+
+@pytest.mark.parametrize(
+    ("choice", "part"),
+    [
+        ("device.toml", b"[[mechanism.links]]"),
+        ("figure.svg", b"<svg"),
+        ("figure.png", b"\x89PNG"),
+        ("figure.pdf", b"%PDF"),
+        ("data.json", b'"stiffness_max_N_per_m"'),
+        ("data.csv", b"arc,stiffness_N_per_m"),
+        ("python.py", b"zwidth.load"),
+    ],
+)
+def test_files_are_kept(page, choice, part) -> None:
+    with page.page.expect_download() as waiting:
+        page.page.select_option("#export", choice)
+    assert part in Path(waiting.value.path()).read_bytes()
+    assert waiting.value.suggested_filename.startswith("five-bar")
+
+
+def test_a_lost_connection_comes_back_with_the_state_kept(page) -> None:
+    page.page.evaluate("() => zwidth.store.setNumbers({ 'loop.delay_samples': 0.5 })")
+    page.settle()
+    before = page.stiffness_max
+    page.page.evaluate("() => { zwidth.view = null; zwidth.connection.socket.close(); }")
+    page.wait("zwidth.view")
+    page.settle()
+    assert page.stiffness_max == before
+    assert page.value("zwidth.state.settings['loop.delay_samples']") == 0.5
+    assert page.status == ""
+
+
+def test_two_tabs_do_not_disturb_each_other_in_the_browser(page) -> None:
+    other = page.new_tab()
+    other.evaluate("() => zwidth.store.setNumbers({ 'loop.delay_samples': 1 })")
+    page.wait("zwidth.view.head.chart.stiffness_max < 2000", other)
+    assert page.stiffness_max == pytest.approx(7849.4414930, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "scheme"), [(1400, 900, "dark"), (390, 844, "light"), (820, 1180, "light")]
+)
+def test_the_page_fits_and_follows_the_colour_scheme(browser, workbench, width, height, scheme) -> None:
+    with Page(browser, workbench, width, height, color_scheme=scheme) as page:
+        assert page.value("document.documentElement.dataset.theme") == scheme
+        assert page.value("document.documentElement.scrollWidth") <= width, "nothing is cut off at the side"
+        assert inked(page, "chart") > 500
+        assert inked(page, "scene") > 300
+        page.page.click("#theme")
+        assert page.value("document.documentElement.dataset.theme") != scheme
+
+
+def inked(page: Page, canvas: str) -> int:
+    """Number of pixels that a canvas has drawn."""
+    return int(
+        page.page.evaluate(
+            """(name) => {
+              const canvas = document.getElementById(name);
+              const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+              let count = 0;
+              for (let i = 3; i < data.length; i += 4) count += data[i] > 0;
+              return count;
+            }""",
+            canvas,
+        )
+    )

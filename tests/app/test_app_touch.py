@@ -1,0 +1,162 @@
+"""What is touched and heard in the page agrees with the simulation in Python."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.page_driver import Page
+
+import zwidth
+from zwidth.contact.environments import wall as wall_law
+from zwidth.contact.simulate import simulate
+from zwidth.model.operator import Operator
+
+MOUSE = Operator(0.05, 300.0, 4.0)
+# Let go 1 mm inside a wall, the periods of one call at a time, by the page's own machine.
+RUN = """async ([stiffness, damping, periods, push]) => {
+  const { TouchMachine, OUTPUTS } = await import("./touch_machine.js");
+  const machine = new TouchMachine(await zwidth.contact.touch.module);
+  machine.load(zwidth.contact.touch.blocks);
+  const wall = { law: 1, stiffness, damping, position: 0 };
+  machine.push = push;
+  const found = [];
+  for (let done = 0; done < periods; done += 100) found.push(...machine.run(100, wall, push));
+  return found;
+}"""
+HEAR = """async ([stiffness, damping, seconds, push]) => {
+  const { Touch } = await import("./touch.js");
+  const touch = new Touch(() => {});
+  touch.load(zwidth.contact.touch.blocks);
+  touch.wall = { law: 1, stiffness, damping, position: 0 };
+  const context = new OfflineAudioContext(1, 48000 * seconds, 48000);
+  touch.setPitch(zwidth.contact.touch.factor);
+  touch.target = 0;
+  await context.audioWorklet.addModule("touch_worklet.js");
+  const node = new AudioWorkletNode(context, "touch", {
+    numberOfInputs: 0,
+    outputChannelCount: [1],
+    processorOptions: { module: await touch.module, blocks: touch.blocks, wall: touch.wall, factor: touch.factor, push },
+  });
+  node.connect(context.destination);
+  const buffer = await context.startRendering();
+  return [...buffer.getChannelData(0)];
+}"""
+
+
+@pytest.fixture
+def page(browser, workbench):
+    with Page(browser, workbench) as opened:
+        yield opened
+
+
+def touch(page: Page, stiffness: float, damping: float) -> None:
+    """Choose a wall and take the device into the hand."""
+    page.page.evaluate(f"() => zwidth.store.set({{ wall: {{ stiffness: {stiffness}, damping: {damping} }} }})")
+    page.settle()
+    page.page.click("button:has-text('Touch')")
+    page.wait("zwidth.contact.touch.running && zwidth.contact.touch.machine")
+    page.settle()
+
+
+def test_the_chart_is_the_one_held_by_the_hand_that_touches(page) -> None:
+    free = page.stiffness_max
+    touch(page, 4000.0, 10.0)
+    held = zwidth.load("five-bar").at(operator=MOUSE).chart()
+    assert page.stiffness_max == pytest.approx(held.stiffness_max, rel=1e-12)
+    assert "A mouse gives no force" in page.page.locator("#contact-text").text_content()
+    page.page.click("button:has-text('Touch')")
+    page.settle()
+    assert page.stiffness_max == pytest.approx(free, rel=1e-12)
+
+
+@pytest.mark.parametrize(("stiffness", "damping", "stable"), [(4000.0, 10.0, True), (9000.0, 10.0, False)])
+def test_what_is_touched_is_what_python_simulates(page, stiffness, damping, stable) -> None:
+    touch(page, stiffness, damping)
+    periods, push = 400, 3.0
+    found = np.array(page.page.evaluate(RUN, [stiffness, damping, periods, push])).reshape(-1, 7)
+    loop = zwidth.load("five-bar").at(operator=MOUSE).loop
+    made = simulate(
+        loop, wall_law, wall_law.values(stiffness=stiffness, damping=damping), duration=0.5, hand=hand(push)
+    )
+    count = min(len(found), len(made.reading))
+    assert count == 401 - 1
+    assert np.array_equal(found[:count, 0], made.reading[:count]), "to the bit"
+    assert np.array_equal(found[:count, 3], made.force[:count]), "to the bit"
+    verdict = page.value("zwidth.view.head.chart.wall.verdict")
+    assert verdict == ("stable" if stable else "unstable")
+    late = np.abs(np.diff(found[200:, 0])).max()
+    assert bool(late < np.abs(np.diff(found[:200, 0])).max()) is stable
+
+
+def hand(push: float):
+    """A hand whose push is constant."""
+    from zwidth.contact.hand import Hand
+
+    return Hand(push=push)
+
+
+def test_an_unstable_wall_is_heard_at_the_predicted_frequency(page) -> None:
+    touch(page, 8600.0, 10.0)
+    predicted = page.value("zwidth.view.head.chart.wall.frequency")
+    samples = np.array(page.page.evaluate(HEAR, [8600.0, 10.0, 1.0, 2.0]))
+    assert np.abs(samples).max() > 0.01, "silent"
+    spectrum = np.abs(np.fft.rfft(samples * np.hanning(len(samples))))
+    heard = float(np.argmax(spectrum[20:]) + 20)  # Hz, one second
+    assert heard == pytest.approx(predicted, rel=0.02)
+
+
+def test_a_vibration_too_low_to_be_heard_is_shifted_by_the_stated_factor(page) -> None:
+    touch(page, 4000.0, 1.5)
+    predicted = page.value("zwidth.view.head.chart.wall.frequency")
+    factor = page.value("zwidth.contact.touch.factor")
+    assert predicted < 60.0
+    assert factor in (2.0, 4.0, 8.0, 16.0)
+    assert f"{factor:.1f} times higher" in page.page.locator("#contact-text").text_content()
+    samples = np.array(page.page.evaluate(HEAR, [4000.0, 1.5, 1.0, 2.0]))
+    spectrum = np.abs(np.fft.rfft(samples * np.hanning(len(samples))))
+    heard = float(np.argmax(spectrum[40:]) + 40)
+    assert heard == pytest.approx(factor * predicted, rel=0.1)
+
+
+def test_the_mouse_moves_the_device_and_sound_takes_it_over(page) -> None:
+    touch(page, 2000.0, 8.0)
+    for share in np.linspace(0.5, 0.8, 12):
+        page.page.mouse.move(*page.at("motion", float(share), 0.1))
+        page.page.wait_for_timeout(20)
+    page.wait("zwidth.contact.view.now > 0.0001")
+    target = page.value("zwidth.contact.view.target")
+    assert target > 0.003
+    page.page.click("button:has-text('Sound')")
+    page.wait("zwidth.contact.touch.sound")
+    before = page.value("zwidth.contact.view.filled")
+    page.wait(f"zwidth.contact.view.filled > {before} + 50")
+    page.page.click("button:has-text('Sound')")
+    page.wait("!zwidth.contact.touch.sound")
+    before = page.value("zwidth.contact.view.filled")
+    page.wait(f"zwidth.contact.view.filled > {before} + 50")
+    page.page.focus("#motion")
+    page.page.keyboard.press("ArrowLeft")
+    assert page.value("zwidth.contact.view.target") < target
+
+
+def test_a_contact_is_let_go_and_shown(page) -> None:
+    page.page.evaluate("() => zwidth.store.set({ wall: { stiffness: 9000, damping: 10 } })")
+    page.settle()
+    page.page.click("button:has-text('Let go')")
+    page.wait("zwidth.contact.view.motion")
+    made = zwidth.load("five-bar").at().simulate(stiffness=9000.0, damping=10.0)
+    assert page.value("zwidth.contact.view.motion.position.length") == len(made.position)
+    text = page.page.locator("#contact-text").text_content()
+    assert text.startswith("not stable")
+    work = page.page.evaluate("async () => (await import('./contact_view.js')).workOf(zwidth.contact.view.motion)")
+    assert work == pytest.approx(float(np.sum(made.force[:-1] * np.diff(made.position))), rel=1e-9)
+    assert work > 0.0, "an unstable wall makes energy"
+
+
+def test_what_the_kernel_does_not_cover_is_said(page) -> None:
+    page.page.evaluate(
+        "() => zwidth.store.set({ settings: { 'loop.velocity': { method: 'foaw', samples: 8, noise_m: 1e-6 } }, wall: { stiffness: 900, damping: 3 } })"
+    )
+    page.page.click("button:has-text('Touch')")
+    page.page.wait_for_timeout(600)
+    assert not page.value("zwidth.contact.touch.running")
