@@ -60,6 +60,10 @@ class Page:
         """Largest stiffness of the view that is shown [N/m]."""
         return float(self.value("zwidth.view.head.chart.stiffness_max"))
 
+    def change(self, **state: Any) -> None:
+        """Change the state, as what the user does ends in."""
+        self.page.evaluate("(change) => zwidth.store.set(change)", state)
+
     def settle(self) -> None:
         """Wait until the view is that of the state."""
         self.wait("zwidth.connection.waiting.size === 0 && !zwidth.waits")

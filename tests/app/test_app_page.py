@@ -105,9 +105,7 @@ def test_the_other_faces_of_a_wall_are_shown(page) -> None:
 
 
 def test_the_handle_and_the_direction_are_dragged(page) -> None:
-    handle = page.value(
-        "(() => { const p = zwidth.deviceView.place(zwidth.deviceView.points('handle')); return [p.x, p.y]; })()"
-    )
+    handle = page.value("Object.values(zwidth.deviceView.place(zwidth.deviceView.points('handle')))")
     box = page.page.locator("#scene").bounding_box()
     start = (box["x"] + handle[0], box["y"] + handle[1])
     page.drag(start, (start[0] + 30.0, start[1] + 20.0), steps=12)
@@ -117,7 +115,7 @@ def test_the_handle_and_the_direction_are_dragged(page) -> None:
     assert position[1] < 0.25
     made = zwidth.load("five-bar").at(tuple(position)).chart()
     assert page.stiffness_max == pytest.approx(made.stiffness_max, rel=1e-9)
-    tip = page.value("(() => { const p = zwidth.deviceView.tip(); return [p.x, p.y]; })()")
+    tip = page.value("Object.values(zwidth.deviceView.tip())")
     page.drag((box["x"] + tip[0], box["y"] + tip[1]), (start[0] + 110.0, start[1] + 20.0), steps=12)
     page.settle()
     assert abs(page.value("zwidth.state.direction")[0]) > 0.9
@@ -205,9 +203,7 @@ def test_files_are_dropped_and_opened(page) -> None:
 def test_a_link_holds_the_numbers_and_files(page) -> None:
     page.drop(paddle_toml=PLANT)
     page.wait("zwidth.device?.name === 'paddle'")
-    page.page.evaluate(
-        "() => zwidth.store.set({ settings: { 'plant.mass_kg': 0.05 }, wall: { stiffness: 900, damping: 3 } })"
-    )
+    page.change(settings={"plant.mass_kg": 0.05}, wall={"stiffness": 900, "damping": 3})
     page.settle()
     shown = page.stiffness_max
     page.page.click("#share")

@@ -35,7 +35,8 @@ HEAR = """async ([stiffness, damping, seconds, push]) => {
   const node = new AudioWorkletNode(context, "touch", {
     numberOfInputs: 0,
     outputChannelCount: [1],
-    processorOptions: { module: await touch.module, blocks: touch.blocks, wall: touch.wall, factor: touch.factor, push },
+    processorOptions: { module: await touch.module, blocks: touch.blocks, wall: touch.wall, push,
+      factor: touch.factor },
   });
   node.connect(context.destination);
   const buffer = await context.startRendering();
@@ -51,7 +52,7 @@ def page(browser, workbench):
 
 def touch(page: Page, stiffness: float, damping: float) -> None:
     """Choose a wall and take the device into the hand."""
-    page.page.evaluate(f"() => zwidth.store.set({{ wall: {{ stiffness: {stiffness}, damping: {damping} }} }})")
+    page.change(wall={"stiffness": stiffness, "damping": damping})
     page.settle()
     page.page.click("button:has-text('Touch')")
     page.wait("zwidth.contact.touch.running && zwidth.contact.touch.machine")
@@ -140,7 +141,7 @@ def test_the_mouse_moves_the_device_and_sound_takes_it_over(page) -> None:
 
 
 def test_a_contact_is_let_go_and_shown(page) -> None:
-    page.page.evaluate("() => zwidth.store.set({ wall: { stiffness: 9000, damping: 10 } })")
+    page.change(wall={"stiffness": 9000, "damping": 10})
     page.settle()
     page.page.click("button:has-text('Let go')")
     page.wait("zwidth.contact.view.motion")
@@ -154,9 +155,8 @@ def test_a_contact_is_let_go_and_shown(page) -> None:
 
 
 def test_what_the_kernel_does_not_cover_is_said(page) -> None:
-    page.page.evaluate(
-        "() => zwidth.store.set({ settings: { 'loop.velocity': { method: 'foaw', samples: 8, noise_m: 1e-6 } }, wall: { stiffness: 900, damping: 3 } })"
-    )
+    foaw = {"method": "foaw", "samples": 8, "noise_m": 1e-6}
+    page.change(settings={"loop.velocity": foaw}, wall={"stiffness": 900, "damping": 3})
     page.page.click("button:has-text('Touch')")
-    page.page.wait_for_timeout(600)
+    page.wait("document.getElementById('status').classList.contains('wrong')")
     assert not page.value("zwidth.contact.touch.running")
