@@ -47,7 +47,7 @@ class Page:
         """Wait until an expression is true; the page's policy forbids Playwright's own way."""
         end = time.monotonic() + seconds
         while not self.value(f"Boolean({expression})", tab):
-            assert time.monotonic() < end, f"{expression} did not become true; status: {self.status}"
+            assert time.monotonic() < end, f"{expression} did not become true: {self.complaints}"
             time.sleep(0.02)
 
     @property

@@ -31,7 +31,7 @@ LEFT_OUT: Final = (
     "loop.delay_samples",
     "loop.actuator.time_constant_s",
     "loop.encoder.resolution_m",
-    "friction.coulomb_N.0",
+    "friction.coulomb_N",
 )
 # Units of what has a size and no sign, also where a matrix stands for it.
 SIZES: Final = frozenset({"kg", "kg m^2", "N/m", "N m/rad", "N s/m", "N m s/rad"})
@@ -220,9 +220,10 @@ def _with_range(one: DeviceNumber, period: float) -> DeviceNumber:
     if one.choices is not None or not isfinite(one.value):
         return one
     value, positive = float(one.value), one.lowest is not None and one.lowest >= 0.0
-    if value > 0.0 and one.unit in SIZES and not one.also:
-        positive = True
     usual = USUAL.get(one.unit, 1.0) * (period if one.unit == "s" and isfinite(period) else 1.0)
+    if not one.given or (value > 0.0 and one.unit in SIZES and not one.also):
+        positive = True
+        usual *= 0.01 if one.unit == "m" else 1.0  # the step of an encoder
     scale: Scale = "linear"
     if value > 0.0 and positive and not _may_be_zero(one):
         low, high, scale = value / FACTOR, value * FACTOR, "logarithmic"

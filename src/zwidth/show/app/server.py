@@ -32,7 +32,7 @@ TYPES: Final = {
     ".wasm": "application/wasm",
     ".svg": "image/svg+xml",
     ".ino": "text/plain; charset=utf-8",
-    ".csv": "text/csv; charset=utf-8",
+    ".json": "application/json",
 }
 POLICY: Final = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; "

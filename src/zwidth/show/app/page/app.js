@@ -14,6 +14,7 @@ import { NumbersPanel } from "./numbers_panel.js";
 import { DeviceView } from "./device_view.js";
 import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
+import { Tour } from "./tour.js";
 import { saveBytes } from "./files.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
@@ -22,6 +23,9 @@ import { saveBytes } from "./files.js";
 const FAST = ["frequency", "decay", "models", "hands"]; // layers that come with every view
 const SLOW = ["guarantees", "bounds"]; // and those that follow when the hand rests
 const RESTS = 250; // ms without a change after which they are asked for
+
+// A state that says nothing but which device.
+const NOWHERE = { from_file: false, settings: {}, position: null, direction: null, axis: null, assembly: null, model: null, operator: null, hand: null };
 
 /** @param {string} id @returns {any} */
 const byId = (id) => document.getElementById(id);
@@ -75,6 +79,7 @@ export class App {
           try {
             const frame = await this.connection.ask("contact", { state: this.sent(), ...options }, this.progress);
             this.say("");
+            this.tour.look(this.state, undefined, frame.head.stable === true);
             return frame;
           } catch (error) {
             this.fail(error);
@@ -85,6 +90,10 @@ export class App {
         say: (sentence, wrong) => this.say(sentence, wrong),
       },
     );
+    this.tour = new Tour(byId("card"), {
+      onState: (next) => this.store.set({ ...NOWHERE, ...next }),
+      onEnd: () => byId("tour").focus(),
+    });
     this.connection = new Connection(token, {
       onOpen: () => this.refresh(),
       onLost: () => this.say("The connection to zwidth is lost; the page keeps its numbers and tries again.", true),
@@ -150,6 +159,7 @@ export class App {
       this.view = frame;
       this.chart.setFrame(frame);
       this.deviceView.setFrame(frame, this.opened);
+      this.tour.look(this.state, frame.head.chart.wall?.verdict, false);
       this.contact.update(frame, this.state.wall ?? null);
       this.say("");
       this.drawSoon();
@@ -333,6 +343,7 @@ export class App {
     byId("undo").addEventListener("click", () => this.store.undo());
     byId("redo").addEventListener("click", () => this.store.redo());
     byId("share").addEventListener("click", () => void this.share());
+    byId("tour").addEventListener("click", () => void this.tour.begin());
     byId("pin").addEventListener("click", () => this.pin());
     byId("theme").addEventListener("click", () => this.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
     byId("sort").addEventListener("click", () => void this.sort());
@@ -438,7 +449,7 @@ export class App {
   /** @param {string} device */
   choose(device) {
     const from_file = this.connection.files.has(device);
-    this.store.set({ device, from_file, settings: {}, position: null, direction: null, axis: null, assembly: null, model: null, operator: null, hand: null });
+    this.store.set({ ...NOWHERE, device, from_file });
   }
 
   /** @param {string} theme */
