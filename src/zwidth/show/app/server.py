@@ -75,11 +75,12 @@ class Settings:
 
 
 def page_files() -> dict[str, bytes]:
-    """Everything that a page can fetch: its name, and its contents."""
-    folder = files("zwidth.show.app") / "page"
+    """Everything that a page can fetch: its name, and its contents. The tour goes through bundled devices, and its
+    words lie with them."""
+    folder, tour = files("zwidth.show.app") / "page", files("zwidth.device") / "zoo" / "tour.json"
     return {
         entry.name: entry.read_bytes()
-        for entry in folder.iterdir()
+        for entry in (*folder.iterdir(), tour)
         if entry.is_file() and entry.name.endswith(tuple(TYPES))
     }
 
