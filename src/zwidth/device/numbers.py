@@ -232,7 +232,7 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
     document, path = device.document, dotted(steps, device.document)
     image = schema.mirror_image(steps)
     table = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))
-    limits, whole = _limits(document, steps)
+    limits, whole = number_limits(document, steps)
     number = value if isinstance(value, int | float) else None
     low, high, scale = (None, None, "linear") if number is None else _slider(document, steps, number)
     return DeviceNumber(
@@ -256,7 +256,7 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
     )
 
 
-def _limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float, float, tuple[str, ...]], bool]:
+def number_limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float, float, tuple[str, ...]], bool]:
     """Lowest and highest value that the schema allows, which of them is excluded; whether the number is whole."""
     kinds = [one for one in schema.subschemas(steps, document) if one.get("type") in ("number", "integer")]
     for kind in kinds:
@@ -278,7 +278,7 @@ def _limit(kind: dict[str, Any], ours: str, standard: str) -> float | None:
 def _slider(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[float | None, float | None, Scale]:
     """Ends of a slider and its scale: a quarter of a magnitude to four times it, by its logarithm; of a number of
     either sign twice as much to both sides as it is large."""
-    (lowest, highest, excluded), whole = _limits(document, steps)
+    (lowest, highest, excluded), whole = number_limits(document, steps)
     scale: Scale = "linear"
     if not isfinite(value):
         return None, None, "logarithmic"

@@ -73,7 +73,7 @@ def sensitivities(
         stiffest, obstacle = optimum(loop, peak), ""
     except OptimumError as error:
         stiffest, obstacle = None, str(error)
-    numbers, varied = [], list(_numbers(device.document))
+    numbers, varied = [], list(property_numbers(device.document))
     changed = None
     if stiffest is not None:
         changes = dict(_changes(device.document, varied))
@@ -181,22 +181,22 @@ def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]])
     """Each number that can be varied, by its path; and the matrices and vectors of a plant, scaled as wholes."""
     for path, steps, value in varied:
         if not number_obstacle(steps, value):
-            yield path, Change(tuple(_places(steps, 1.0)), value, abs(value) or typical_size(document, steps))
+            yield path, Change(tuple(moved_places(steps, 1.0)), value, abs(value) or typical_size(document, steps))
     known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
     for name, paths in _groups(document).items():
         if name.startswith("plant."):
             parts = [known[path] for path in paths if path in known]
-            yield name, Change(tuple(place for part in parts for place in _places(*part)), 1.0, 1.0)
+            yield name, Change(tuple(place for part in parts for place in moved_places(*part)), 1.0, 1.0)
 
 
-def _places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
+def moved_places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
     """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
     yield steps, multiple
     if (image := mirror_image(steps)) is not None:
         yield image, multiple
 
 
-def _numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
+def property_numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
     """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
     and above the diagonal."""
     for steps, value in address.numbers(document):
@@ -223,7 +223,7 @@ def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
     """Path -> paths of its members: each list and matrix, and each key over all elements of a list of tables."""
     members: dict[str, list[str]] = {}
-    for path, steps, _ in _numbers(document):
+    for path, steps, _ in property_numbers(document):
         whole = steps
         while whole and isinstance(whole[-1], int):
             whole = whole[:-1]

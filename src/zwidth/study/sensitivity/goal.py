@@ -1,0 +1,249 @@
+"""What each number of a device would have to be, the others as they are, for a wanted largest stiffness.
+
+    K_max(p) = goal,   the p nearest to the device's own, by |ln(p / own)|
+
+K_max need not grow or fall with a number all the way: a stiffer drive may help and then harm. So a number is tried
+outwards to both sides on a logarithmic grid, to where there is no such device; charts of all numbers together.
+The crossing of the goal next to the device's own value is refined. Every value that is returned has been charted
+exactly; a sensitivity, the slope at the device's own value, would only tell where to look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf, isfinite, isnan, log, nan
+from typing import Final
+
+import numpy as np
+
+from zwidth.chart.chart import largest_stiffness
+from zwidth.device.device import Device
+from zwidth.device.faults import KeyPath, fail
+from zwidth.device.load import device_of_point
+from zwidth.device.numbers import number_limits, typical_size
+from zwidth.device.schema.device_file import key_unit
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.argument_checks import require
+from zwidth.progress import Progress
+from zwidth.study.sensitivity.changed_stiffness import ChangedStiffness
+from zwidth.study.sensitivity.goal_result import (
+    NO_INFLUENCE,
+    ORDER,
+    OUT_OF_RANGE,
+    REACHED,
+    Goal,
+    GoalNumber,
+    Status,
+)
+from zwidth.study.sensitivity.number_text import number_obstacle
+from zwidth.study.sensitivity.sensitivities import moved_places, property_numbers
+
+WIDEST: Final = 10.0  # factor up and down within which a number is searched
+STEPS: Final = 24  # values on each side
+AT_A_TIME: Final = 8  # of them; most numbers cross the goal in the first, or never
+EXACT: Final = 1e-8  # relative distance from the goal at which a value is taken
+NARROWEST: Final = (
+    1e-11  # of a bracket, in the variable below; within it the largest stiffness jumps over the goal
+)
+STRAIGHT: Final = 20  # charts of a bracket after which it is halved only
+ALIKE: Final = 1e-9  # relative differences of largest stiffnesses that are rounding
+JUMPS: Final = "the largest stiffness jumps over the goal near this value"
+NOWHERE: Final = "it does not change the largest stiffness"
+
+
+@dataclass
+class _Search:
+    """The search along one number.
+
+    value = own exp(t), or typical size times t where it is 0; t = 0 is the device itself.
+
+    samples  t -> ln(K_max / goal), -inf where no wall is stable, nan where there is no device
+    jumps    brackets in which the goal is jumped over
+    """
+
+    path: str
+    steps: KeyPath
+    own: float
+    size: float
+    lowest: float
+    highest: float
+    samples: dict[float, float]
+    jumps: set[tuple[float, float]] = field(default_factory=set)
+
+    def value(self, t: float) -> float:
+        return self.size * t if self.own == 0.0 else self.own * float(np.exp(t))
+
+    def grid(self, first: int) -> Iterator[float]:
+        """The next values outwards, to both sides, that the schema allows; to none where there was no device."""
+        for k in range(first + 1, first + AT_A_TIME + 1):
+            away = k * log(WIDEST) / STEPS
+            if self.own == 0.0:
+                away = WIDEST ** (3.0 * k / STEPS - 2.0)  # a hundredth to ten times the typical size
+            for t in (away, -away):
+                farthest = max((known for known in self.samples if known * t >= 0.0), key=abs)
+                if isnan(self.samples[farthest]):
+                    continue
+                if self.lowest < self.value(t) < self.highest or self.value(t) in (self.lowest, self.highest):
+                    yield t
+
+    def brackets(self) -> list[tuple[float, float]]:
+        """Neighbours (nearer, farther) between which the goal is crossed nearer than where it is reached already,
+        the nearest first; none that are narrowed down to a jump."""
+        reached, found = self.reached, []
+        for side in (1.0, -1.0):
+            known = sorted((t for t in self.samples if t * side >= 0.0), key=abs)
+            for a, b in pairwise(known):
+                crossed = self.samples[a] * self.samples[b] < 0.0 and min(map(self._error, (a, b))) > EXACT
+                if crossed and (a, b) not in self.jumps and (reached is None or abs(a) < abs(reached)):
+                    found.append((a, b))
+        return sorted(found, key=lambda ends: (abs(ends[0]), abs(ends[1])))
+
+    @property
+    def reached(self) -> float | None:
+        """The nearest place at which the goal is reached; None where none is known, or nothing matters."""
+        if self.alike:
+            return None
+        return min((t for t in self.samples if self._error(t) <= EXACT), key=abs, default=None)
+
+    @property
+    def alike(self) -> bool:
+        """Whether the largest stiffness is the same at all places that are known."""
+        known = [level for level in self.samples.values() if level == level]
+        return all(level == known[0] or abs(level - known[0]) <= ALIKE for level in known)
+
+    def inside(self, a: float, b: float, tries: int) -> float:
+        """Where to look next in a bracket: where a straight line through its ends crosses, or in the middle, which
+        is certain to narrow it."""
+        f, g = self.samples[a], self.samples[b]
+        if not isfinite(f * g) or tries % 3 == 2 or tries > STRAIGHT:
+            return 0.5 * (a + b)
+        t = a - f * (b - a) / (g - f)
+        return min(max(t, min(a, b) + 1e-3 * abs(b - a)), max(a, b) - 1e-3 * abs(b - a))
+
+    def _error(self, t: float) -> float:
+        return abs(self.samples[t])
+
+
+def numbers_for_goal(
+    device: Device, point: OperatingPoint | None, goal_stiffness: float, progress: Progress | None = None
+) -> Goal:
+    """What each number that `sensitivities` knows would have to be for a largest stiffness.
+
+    point           one posture and one direction; None: the device's reference. The handle stays there
+    goal_stiffness  [N/m], above what the device has or below: then a number tells what it could be relaxed to
+    progress        called with "numbers", those that are decided, and all of them
+
+    A number is searched from a tenth of its value to ten times that, within the schema's limits; one that is 0 up
+    to ten times a typical size. Beyond a value with which there is no such device nothing is tried. The crossing
+    nearest to the device's own value is found unless two lie between neighbours of a grid of 24 values to each
+    side. The largest stiffness with the value is the goal to 1e-8.
+
+    Raises  ValueError   for a goal that is not a positive finite number
+            DeviceError  for a measured device, whose numbers are in its response
+            what `sensitivities` raises for the device itself
+    """
+    require("device", device, Device)
+    if isinstance(goal_stiffness, bool) or not isinstance(goal_stiffness, int | float | np.number):
+        raise TypeError(f"goal_stiffness must be a number [N/m], got {goal_stiffness!r}")
+    goal = float(goal_stiffness)
+    if not 0.0 < goal < inf:
+        raise ValueError(f"goal_stiffness must be a positive, finite stiffness in N/m, got {goal:g}")
+    at = point or device.at()
+    device = device_of_point(device, at)
+    if at.response is not None:
+        raise fail(device.label, "response", "has no numbers to change; a goal is for a device given by a model")
+    peak = largest_stiffness(at.loop)
+    own = 0.0 if peak is None else peak.stiffness
+    searches, fixed = [], []
+    for path, steps, value in property_numbers(device.document):
+        if obstacle := number_obstacle(steps, value):
+            reason = f"not varied: {obstacle}"
+            fixed.append(GoalNumber(path, value, key_unit(steps), nan, nan, nan, OUT_OF_RANGE, reason))
+        else:
+            searches.append(_search(device, path, steps, value, own, goal))
+    charts = ChangedStiffness(
+        device, at, {one.path: tuple(steps for steps, _ in moved_places(one.steps, 1.0)) for one in searches}
+    )
+    found = _found(searches, charts, goal, progress)
+    numbers = sorted([*found, *fixed], key=lambda one: _rank(one, goal))
+    return Goal(goal, own, tuple(numbers)).about(at)
+
+
+def _rank(number: GoalNumber, goal: float) -> tuple[int, float]:
+    """Sorting key: the smallest change of those that reach the goal, the nearest miss of the others."""
+    K = number.stiffness_max
+    missed = abs(log(K / goal)) if K > 0.0 else inf
+    return ORDER.index(number.status), number.distance if number.status == REACHED else missed
+
+
+def _search(device: Device, path: str, steps: KeyPath, value: float, own: float, goal: float) -> _Search:
+    (lowest, highest, excluded), _ = number_limits(device.document, steps)
+    lowest = np.nextafter(lowest, inf) if "lowest" in excluded else lowest
+    highest = np.nextafter(highest, -inf) if "highest" in excluded else highest
+    size = abs(value) or typical_size(device.document, steps)
+    return _Search(path, steps, value, size, float(lowest), float(highest), {0.0: _level(own, goal)})
+
+
+def _level(stiffness: float, goal: float) -> float:
+    """ln(K / goal); -inf where no wall is stable."""
+    return log(stiffness / goal) if stiffness > 0.0 else -inf if stiffness == 0.0 else nan
+
+
+def _found(
+    searches: list[_Search], charts: ChangedStiffness, goal: float, progress: Progress | None
+) -> list[GoalNumber]:
+    """Search outwards, a few values at a time, and refine what is crossed before going on."""
+    left = searches
+    for first in range(0, STEPS, AT_A_TIME):
+        _sample([(one, t) for one in left for t in one.grid(first)], charts, goal)
+        tries = 0
+        while crossed := [(one, ends[0]) for one in left if (ends := one.brackets())]:
+            for one, (a, b) in crossed:
+                if abs(b - a) <= NARROWEST * max(1.0, abs(a)):
+                    one.jumps.add((a, b))
+            _sample(
+                [(one, one.inside(*ends, tries)) for one, ends in crossed if ends not in one.jumps], charts, goal
+            )
+            tries += 1
+        left = [one for one in left if one.reached is None]
+        if progress is not None:
+            done = len(searches) if first + AT_A_TIME >= STEPS else len(searches) - len(left)
+            progress("numbers", done, len(searches))
+    return [_number(one, charts, goal) for one in searches]
+
+
+def _sample(places: list[tuple[_Search, float]], charts: ChangedStiffness, goal: float) -> None:
+    K = charts.stiffnesses([(one.path, one.value(t)) for one, t in places])
+    for (one, t), stiffness in zip(places, K.tolist(), strict=True):
+        one.samples[t] = _level(stiffness, goal)
+
+
+def _number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
+    """What a search came to."""
+    known = {t: level for t, level in one.samples.items() if isfinite(level)}
+    best = one.reached
+    status: Status = REACHED if best is not None else OUT_OF_RANGE
+    reason = ""
+    if best is None:
+        if known and one.alike and len(one.samples) > 1:
+            return GoalNumber(
+                one.path,
+                one.own,
+                key_unit(one.steps),
+                nan,
+                nan,
+                goal * float(np.exp(known[0.0])),
+                NO_INFLUENCE,
+                NOWHERE,
+            )
+        best = min(known, key=lambda t: (abs(known[t]), abs(t)), default=0.0)
+        ends = sorted(one.value(t) for t, level in one.samples.items() if level == level)
+        refused = charts.refusals.get(one.path, "")
+        reason = JUMPS if one.jumps else f"from {ends[0]:.4g} to {ends[-1]:.4g} it is not reached"
+        reason += f"; beyond, {refused}" if refused and not one.jumps else ""
+    value = one.value(best)
+    factor = value / one.own if one.own else nan
+    stiffness = goal * float(np.exp(one.samples[best]))
+    return GoalNumber(one.path, one.own, key_unit(one.steps), value, factor, stiffness, status, reason)
