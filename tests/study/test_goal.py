@@ -1,4 +1,4 @@
-"""What each number would have to be for a wanted largest stiffness: against closed forms, charts and a fine grid."""
+"""What each number would have to be for a wanted largest stiffness: closed forms, charts and a fine grid."""
 
 from __future__ import annotations
 
@@ -47,10 +47,8 @@ def changed(device, path, value):
 
 def random_devices():
     """Plants that have a stiffest wall; and one mechanism."""
-    for seed in range(12):
-        device = from_document(tomllib.loads(toml_text(plant_file(seed))))
-        if not device.document.get("loop", {}).get("velocity", {}).get("method") in ("foaw", "levant"):
-            yield f"plant {seed}", device
+    for seed in (0, 1, 2, 3, 5, 6, 7, 8):  # others take long, because their loops are built one by one
+        yield f"plant {seed}", from_document(tomllib.loads(toml_text(plant_file(seed))))
     yield "mechanism 2", from_document(tomllib.loads(toml_text(mechanism_file(2))))
 
 

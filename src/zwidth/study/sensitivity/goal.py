@@ -3,7 +3,7 @@
     K_max(p) = goal,   the p nearest to the device's own, by |ln(p / own)|
 
 K_max need not grow or fall with a number all the way: a stiffer drive may help and then harm. So a number is tried
-outwards to both sides on a logarithmic grid, to where there is no such device; charts of all numbers together.
+outwards to both sides on a grid, to where there is no such device; the charts of all numbers together.
 The crossing of the goal next to the device's own value is refined. Every value that is returned has been charted
 exactly; a sensitivity, the slope at the device's own value, would only tell where to look.
 """
@@ -44,9 +44,10 @@ WIDEST: Final = 10.0  # factor up and down within which a number is searched
 STEPS: Final = 24  # values on each side
 AT_A_TIME: Final = 8  # of them; most numbers cross the goal in the first, or never
 EXACT: Final = 1e-8  # relative distance from the goal at which a value is taken
-NARROWEST: Final = (
-    1e-11  # of a bracket, in the variable below; within it the largest stiffness jumps over the goal
-)
+NARROW: Final = 1e-8  # of a bracket, in the variable below
+JUMP: Final = 1e-3  # relative difference over a narrow bracket above which the largest stiffness jumps there
+NARROWEST: Final = 1e-13  # of any bracket
+NEAR_JUMP: Final = 1e-3  # distance from a jump within which rounding may decide on which side of it a value lies
 STRAIGHT: Final = 20  # charts of a bracket after which it is halved only
 ALIKE: Final = 1e-9  # relative differences of largest stiffnesses that are rounding
 JUMPS: Final = "the largest stiffness jumps over the goal near this value"
@@ -78,7 +79,7 @@ class _Search:
     def grid(self, first: int) -> Iterator[float]:
         """The next values outwards, to both sides, that the schema allows; to none where there was no device."""
         for k in range(first + 1, first + AT_A_TIME + 1):
-            away = k * log(WIDEST) / STEPS
+            away = log(WIDEST) * (k / STEPS) ** 2  # closer together near the device, where the nearest is sought
             if self.own == 0.0:
                 away = WIDEST ** (3.0 * k / STEPS - 2.0)  # a hundredth to ten times the typical size
             for t in (away, -away):
@@ -112,6 +113,11 @@ class _Search:
         """Whether the largest stiffness is the same at all places that are known."""
         known = [level for level in self.samples.values() if level == level]
         return all(level == known[0] or abs(level - known[0]) <= ALIKE for level in known)
+
+    def jumps_between(self, a: float, b: float) -> bool:
+        """Whether a bracket holds a jump, and no place at which the goal is reached."""
+        width = abs(b - a) / max(1.0, abs(a))
+        return width <= NARROWEST or (width <= NARROW and not abs(self.samples[a] - self.samples[b]) < JUMP)
 
     def inside(self, a: float, b: float, tries: int) -> float:
         """Where to look next in a bracket: where a straight line through its ends crosses, or in the middle, which
@@ -201,7 +207,7 @@ def _found(
         tries = 0
         while crossed := [(one, ends[0]) for one in left if (ends := one.brackets())]:
             for one, (a, b) in crossed:
-                if abs(b - a) <= NARROWEST * max(1.0, abs(a)):
+                if one.jumps_between(a, b):
                     one.jumps.add((a, b))
             _sample(
                 [(one, one.inside(*ends, tries)) for one, ends in crossed if ends not in one.jumps], charts, goal
@@ -238,7 +244,9 @@ def _number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
                 NO_INFLUENCE,
                 NOWHERE,
             )
-        best = min(known, key=lambda t: (abs(known[t]), abs(t)), default=0.0)
+        edges = [end for bracket in one.jumps for end in bracket]
+        clear = [t for t in known if t == 0.0 or all(abs(t - end) > NEAR_JUMP for end in edges)]
+        best = min(clear, key=lambda t: (abs(known[t]), abs(t)), default=0.0)
         ends = sorted(one.value(t) for t, level in one.samples.items() if level == level)
         refused = charts.refusals.get(one.path, "")
         reason = JUMPS if one.jumps else f"from {ends[0]:.4g} to {ends[-1]:.4g} it is not reached"
