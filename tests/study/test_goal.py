@@ -132,6 +132,27 @@ def test_no_grid_finds_a_nearer_crossing(name):
                 assert own < 1.3 * K or "jumps" in one.reason, (one, t)
 
 
+@pytest.mark.parametrize(
+    ("drive", "share"),
+    [("left", 0.975), ("left", 1.05), ("left", 1.1), ("left", 1.2), ("right", 0.95), ("right", 1.1)],
+)
+def test_of_several_crossings_the_nearest_is_taken(drive, share):
+    """The stiffness of either drive helps, harms and helps again: the goal is crossed on both sides, or twice."""
+    device, path = load("five-bar"), f"mechanism.drives.motor-{drive}.stiffness_Nm_per_rad"
+    now, goal = address.get(device.document, path), share * largest(device)
+
+    def missing(t):
+        return largest(changed(device, path, now * float(np.exp(t)))) - goal
+
+    places = np.linspace(-2.3, 2.3, 116)
+    levels = [missing(t) for t in places]
+    ends = zip(places, places[1:], levels, levels[1:], strict=False)
+    crossings = [brentq(missing, a, b, xtol=1e-9) for a, b, f, g in ends if f * g < 0.0]
+    assert len(crossings) > 1
+    found = by_path(numbers_for_goal(device, None, goal))[path]
+    assert log(found.factor) == pytest.approx(min(crossings, key=abs), abs=1e-6)
+
+
 def test_a_number_that_changes_nothing_says_so():
     device = load("five-bar")
     found = by_path(numbers_for_goal(device, None, 9000.0))
