@@ -119,3 +119,25 @@ def test_what_cannot_be_meant_is_refused(tmp_path):
     assert refusal_lines("sensitivity", TWO_MASS, "--top", "0")
     assert refusal_lines("sensitivity", TWO_MASS, "--output", tmp_path / "a.xyz")
     assert refusal_lines("sensitivity", TWO_MASS, "--at", "0,0")
+    assert "above 0" in refusal_lines("sensitivity", TWO_MASS, "--goal", "0")[-1]
+
+
+def test_what_each_number_would_have_to_be(tmp_path):
+    free = (ONE_MASS, "--set", "plant.damping_Ns_per_m=unset")
+    assert document_of("sensitivity", *free)["goal"] is None
+    wanted = 1.44 * document_of("sensitivity", *free)["stiffness_max_N_per_m"]
+    found = {one["path"]: one for one in document_of("sensitivity", *free, "--goal", wanted)["goal"]}
+    assert found["plant.mass_kg"]["factor"] == pytest.approx(1.44, rel=1e-6)
+    assert found["loop.sampling_period_s"]["factor"] == pytest.approx(1 / 1.2, rel=1e-6)
+    assert found["plant.mass_kg"]["stiffness_max_N_per_m"] == pytest.approx(wanted, rel=1e-6)
+    assert found["loop.delay_samples"]["status"] == "out of range"
+    printed = run_command("sensitivity", *free, "--goal", wanted, "--top", "1").out
+    assert "would have to be" in printed
+    assert "0.8333" in printed  # the period changes least
+    assert "1 more" in printed
+    assert "no number alone" in run_command("sensitivity", *free, "--goal", "1e12").out
+    document_of("sensitivity", *free, "--goal", wanted, "--output", tmp_path / "goal.csv")
+    rows = list(csv.DictReader((tmp_path / "goal.csv").read_text().splitlines()))
+    assert [row["path"] for row in rows][:2] == ["loop.sampling_period_s", "plant.mass_kg"]
+    document_of("sensitivity", *free, "--goal", wanted, "--output", tmp_path / "goal.svg")
+    assert (tmp_path / "goal.svg").read_text().count("plant.mass") >= 1

@@ -70,6 +70,7 @@ def results():
         "limit cycles": rubbing().at().limit_cycles(2600.0, 0.0, simulate=False),
         "boundary": single.without_operator.measure_boundary(plan),
         "sensitivities": device().sensitivities(),
+        "goal": zwidth.study.numbers_for_goal(device(), None, 8000.0),
         "identification": arms.identify(
             "stiffness", bench_record(1, forward=0.45, friction=0.003, amplitude=0.045), joint="upper-right"
         ),
@@ -147,6 +148,7 @@ NAMES = [
     "limit cycles",
     "boundary",
     "sensitivities",
+    "goal",
     "identification",
     "felt chart",
     "guarantee",

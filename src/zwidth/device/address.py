@@ -73,7 +73,8 @@ def in_schema(path: str) -> bool:
 def assign(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """A copy of the document with one value set (`UNSET`: removed); exclusive keys are dropped.
 
-    A table of kinds whose keys of the other kind are dropped gets the `type` that the key belongs to; a velocity
+    A table of kinds whose keys of the other kind are dropped, or a new one, gets the `type` that the key belongs
+    to; a velocity
     that gets another `method` keeps of its keys those that the method reads.
 
     Raises DeviceError  if the schema has no such path, or a list no such element
@@ -113,9 +114,11 @@ def _set(document: dict[str, Any], path: str, value: Any) -> None:
     if tag == last == "method" and value in kinds:
         for key in schema.keys(tuple(outer)) - kinds[value]:
             table.pop(key, None)
-    dropped = [key for key in _exclusive_keys(tuple(outer), last) if table.pop(key, UNSET) is not UNSET]
-    if dropped:  # the table may now be of another kind, as a filter is that gets the other filter's key
-        table.update((tag, kind) for kind, keys in kinds.items() if last in keys)
+    dropped = [key for key in rivals((*outer, last)) if table.pop(key, UNSET) is not UNSET]
+    holders = [kind for kind, keys in kinds.items() if last in keys]
+    # the table may now be of another kind, as a filter is that gets the other filter's key, or a new one
+    if dropped or (tag == "type" and tag not in table and len(holders) == 1):
+        table.update((tag, kind) for kind in holders)
 
 
 def unset(document: dict[str, Any], path: str) -> dict[str, Any]:
@@ -151,6 +154,18 @@ def parse(setting: str | tuple[str, Any]) -> tuple[str, Any]:
         return path.strip(), _parsed(text.strip(), path.strip())
     path, value = setting
     return path, _parsed(value, path) if isinstance(value, str) else value
+
+
+def rivals(steps: KeyPath) -> list[str]:
+    """The keys of the same table that setting a key drops.
+
+    >>> rivals(("loop", "delay_s"))
+    ['delay_samples']
+    """
+    groups = EXCLUSIVE.get(tuple("*" if isinstance(step, int) else step for step in steps[:-1]), ())
+    if not any(steps[-1] in group for group in groups):
+        return []
+    return [rival for group in groups if steps[-1] not in group for rival in sorted(group)]
 
 
 def numbers(document: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, float]]:
@@ -275,13 +290,6 @@ def _children(place: Any, part: str) -> list[Any]:
         return [place[part]] if part in place else []
     index = _element(place, part) if isinstance(place, list) else None
     return [] if index is None else [place[index]]
-
-
-def _exclusive_keys(table: KeyPath, key: str | int) -> list[str]:
-    groups = EXCLUSIVE.get(tuple("*" if isinstance(step, int) else step for step in table), ())
-    if not any(key in group for group in groups):
-        return []
-    return [rival for group in groups if key not in group for rival in sorted(group)]
 
 
 def _parsed(text: str, path: str) -> Any:

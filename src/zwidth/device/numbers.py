@@ -1,254 +1,309 @@
-"""The numbers of a device as a list for people: what each is called, its unit and source, and how far to move it.
+"""Every number of a device file that a designer may move, with what is known of it: unit, meaning, source, range.
 
-Everything comes from the schema and the file: names from keys, units and hard limits from the schema, sources from
-the file's own [sources]. Ranges are for a slider and promise nothing; the file's checks have the last word.
+All of it is read off the schema and the file. Keys that the file leaves out are among them where the schema has a
+value that stands for "none", such as a delay of 0.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from fnmatch import fnmatchcase
-from math import isfinite
-from typing import Any, Final, Literal
+from math import ceil, floor, inf, isfinite
+from typing import Any, Final, Literal, TypeAlias
 
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
+from zwidth.device.load import check
+from zwidth.device.number_words import number_name, source_of
 from zwidth.device.schema import device_file as schema
 
-Scale = Literal["linear", "logarithmic"]
+SPAN: Final = 4.0  # a slider goes from a quarter of its number to four times that
+NEAR: Final = 0.01  # distance of a slider's end from a limit that is excluded, in shares of the number's own
 
-# Tables and keys whose numbers choose a posture, or say something of the file itself.
-NO_NUMBERS: Final = frozenset({"sources", "file_version", "assemblies", "reference", "workspace"})
-FACTOR: Final = 4.0  # by which a slider goes up and down from a positive number
-COORDINATES: Final = "xyz"
-# A slider's end for a number that is 0, by unit; times the sampling period where a unit is s.
-USUAL: Final = {"": 1.0, "s": 5.0, "m": 0.1, "rad": 1.0, "kg": 0.1}
-# Numbers that are 0 where a file leaves them out, and that designers ask for first.
-LEFT_OUT: Final = (
-    "loop.delay_samples",
-    "loop.actuator.time_constant_s",
-    "loop.encoder.resolution_m",
-    "friction.coulomb_N",
-)
-# Units of what has a size and no sign, also where a matrix stands for it.
-SIZES: Final = frozenset({"kg", "kg m^2", "N/m", "N m/rad", "N s/m", "N m s/rad"})
+Scale: TypeAlias = Literal["linear", "logarithmic"]
+
+# Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
+CIRCUMSTANCES: Final = {
+    ("mechanism", "assemblies"): "an approximate angle from which the posture is found",
+    ("mechanism", "reference"): "the operating point, not a property of the device",
+    ("mechanism", "workspace"): "the operating point, not a property of the device",
+}
+OTHERS: Final = {
+    ("file_version",): "the format of the file, not a property of the device",
+    ("response",): "part of the measurement, not a property of the device",
+}
 
 
 @dataclass(frozen=True)
 class DeviceNumber:
-    """One number of a device, or one word of a list, as people change it.
+    """A number of a device file, or a text that is one of a list.
 
-    path         dotted, as in --set;   group  tables that it stands in;   name  key in words, without its unit
-    value        as the file has it, or what leaving it out means;   unit  SI; "" for none
-    description  the schema's;   source  where it comes from; "" where the file does not say
-    low, high    ends of a slider, None for a word;   scale  how a slider goes from one to the other
-    whole        only whole numbers are allowed
-    lowest, highest  hard limits; None: none
-    choices      words that are allowed; None for a number
-    also         paths that move with it: the mirror image in a symmetric matrix
-    given        whether the file gives it
+    path         as --set takes it
+    group        words of the tables it stands in, elements of lists by name
+    name         its key in words, without the unit: "sampling period"; an element of a list with its index
+    value        in `unit`; a text where it is one of a list, None where such a text is not given
+    unit         SI, as the schema names it; "" if it has none
+    description  the schema's sentence on the key
+    source       where the file says that it comes from; "" if it does not
+    lowest, highest  limits of the schema, -inf and inf where it has none
+    excluded     which of the two limits are not allowed themselves: "lowest", "highest"
+    low, high    ends of a slider, within these limits; None for texts and for what is infinite
+    scale        of that slider
+    whole        whether only whole numbers are allowed
+    choices      the texts that are allowed; () for a number
+    also         paths that must be given the same value: the mirror image in a symmetric matrix
+    given        whether the file has it; otherwise `value` is what leaving it out amounts to
     """
 
     path: str
     group: tuple[str, ...]
     name: str
-    value: Any
+    value: float | str | None
     unit: str
     description: str
     source: str
+    lowest: float
+    highest: float
+    excluded: tuple[str, ...]
     low: float | None
     high: float | None
     scale: Scale
     whole: bool
-    lowest: float | None
-    highest: float | None
-    choices: tuple[str, ...] | None
+    choices: tuple[str, ...]
     also: tuple[str, ...]
     given: bool
 
     def document(self) -> dict[str, Any]:
-        """Everything by key."""
-        return asdict(self)
+        """The record as JSON can hold it: None for a limit that there is none of, "inf" for an infinite value."""
+        own = asdict(self)
+        infinite = isinstance(self.value, float) and not isfinite(self.value)
+        return own | {
+            "group": list(self.group),
+            "value": str(self.value) if infinite else self.value,
+            "lowest": self.lowest if isfinite(self.lowest) else None,
+            "highest": self.highest if isfinite(self.highest) else None,
+            "excluded": list(self.excluded),
+            "choices": list(self.choices) or None,
+            "also": list(self.also),
+        }
 
 
-def device_numbers(device: Device) -> list[DeviceNumber]:
-    """Every number and every word of a list that can be changed, in the file's order; then those of the computer
-    that the file leaves out.
+def device_numbers(device: Device) -> tuple[DeviceNumber, ...]:
+    """The numbers of a device, and its texts that are one of a list, in the order of its file; of each table those
+    that it leaves out come last.
 
-    Numbers that choose a posture are left out: positions, directions, start angles, the box of the workspace.
+    Not in the list: what `unchangeable` gives a reason for; a key left out, if no value says the same as
+    leaving it out; parts of the device that take more than one number to be there.
+
+    >>> from zwidth.device.load import from_document
+    >>> plain = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
+    >>> [(one.path, one.low, one.high) for one in device_numbers(plain) if one.given]
+    [('plant.mass_kg', 0.025, 0.4), ('loop.sampling_period_s', 0.00025, 0.004)]
     """
-    found = [_entry(device, steps, value) for steps, value in _values(device.document)]
-    period = device.controller.sampling_period
-    made = [_with_range(one, period) for one in found if one is not None]
-    known = {one.path for one in made}
-    for path in LEFT_OUT:
-        if path not in known and _can_be(device, path, 0.0):
-            entry = _entry(device, address.resolve(device.document, path), 0.0, given=False)
-            if entry is not None:
-                made.append(_with_range(entry, period))
-    return made
-
-
-def _values(value: Any, steps: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
-    """Path and value of every number and every chosen word, in the document's order."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            if key not in NO_NUMBERS:
-                yield from _values(inner, (*steps, key))
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from _values(inner, (*steps, index))
-    elif isinstance(value, str | int | float) and not isinstance(value, bool):
-        yield steps, value
-
-
-def _entry(device: Device, steps: KeyPath, value: Any, *, given: bool = True) -> DeviceNumber | None:
-    """The record of one value, without its range; None for a word that is not one of a list, and for an element
-    whose mirror image stands before it."""
     document = device.document
-    choices = _choices(steps)
-    if isinstance(value, str) and len(choices) < 2:
-        return None
-    mirror = schema.mirror_image(steps)
-    if mirror is not None and _is_below(steps):
-        return None
-    path = dotted(steps, document)
-    kinds = schema.subschemas(steps)
-    unit = schema.key_unit(steps)
-    lowest, highest = _limits(kinds)
-    *tables, name = path.split(".")
-    while (
-        tables and isinstance(steps[len(tables)], int) and not isinstance(_at(document, steps, len(tables)), dict)
-    ):
-        name = f"{tables.pop()}.{name}"
+    given = list(_values(document, document, ()))
+    absent = list(_absent(document, {steps for steps, _ in given}))
+    last = {steps[:end]: n for n, (steps, _) in enumerate(given) for end in range(len(steps))}
+    placed = [(n, 0, _record(device, steps, value, True)) for n, (steps, value) in enumerate(given)]
+    for steps, value in absent:
+        own = next(steps[:end] for end in reversed(range(len(steps))) if steps[:end] in last)
+        placed.append((last[own], 1, _record(device, steps, value, False)))
+    return tuple(record for _, _, record in sorted(placed, key=lambda one: one[:2]))
+
+
+def circumstance(steps: KeyPath) -> str:
+    """Why a number of a device file chooses where the device is and is none of its properties; "" if it is one."""
+    return next((why for head, why in CIRCUMSTANCES.items() if steps[: len(head)] == head), "")
+
+
+def unchangeable(steps: KeyPath) -> str:
+    """Why `device_numbers` leaves a number of a device file out; "" if it does not."""
+    if schema.below_diagonal(steps):
+        return "it moves with its mirror image in a symmetric matrix"
+    return circumstance(steps) or next((why for head, why in OTHERS.items() if steps[: len(head)] == head), "")
+
+
+def typical_size(document: dict[str, Any], steps: KeyPath) -> float:
+    """Size that a number which is 0 may have: the largest number under its key in the same part of the file, else
+    of its unit in the file, else 1. That of a delay in samples is 1."""
+    if steps[-1] == "delay_samples":
+        return 1.0
+    own, unit = _key(steps), schema.key_unit(steps)
+    finite = [(path, abs(v)) for path, v in address.numbers(document) if isfinite(v)]
+    beside = [v for path, v in finite if _key(path) == own and path[0] == steps[0]]
+    alike = [v for path, v in finite if schema.key_unit(path) == unit]
+    return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
+
+
+def _key(steps: KeyPath) -> str:
+    return next(str(step) for step in reversed(steps) if isinstance(step, str))
+
+
+def _values(document: dict[str, Any], place: Any, path: KeyPath) -> Iterator[tuple[KeyPath, float | str]]:
+    """Steps and value of each number, and of each text that is one of a list, that the file gives."""
+    if isinstance(place, dict | list):
+        for step, inner in place.items() if isinstance(place, dict) else enumerate(place):
+            yield from _values(document, inner, (*path, step))
+    elif unchangeable(path) or isinstance(place, bool):
+        return
+    elif isinstance(place, int | float) or (isinstance(place, str) and _choices(document, path)):
+        yield path, place
+
+
+def _absent(document: dict[str, Any], given: set[KeyPath]) -> Iterator[tuple[KeyPath, float | str | None]]:
+    """Steps of each key that the file leaves out and that may be set alone, and what leaving it out amounts to."""
+    found = set[KeyPath]()
+    tables = ((), *_tables(document, ()))
+    for steps in dict.fromkeys(key for table in tables for key in _absent_keys(document, table)):
+        rivals = {(*steps[:-1], key) for key in address.rivals(steps)}
+        if unchangeable(steps) or rivals & (given | found):
+            continue
+        for value in _standing_for_nothing(document, steps):
+            found.add(steps)
+            yield steps, value
+
+
+def _tables(place: Any, path: KeyPath) -> Iterator[KeyPath]:
+    """Path of every table of a document below the whole."""
+    if isinstance(place, dict | list):
+        for step, inner in place.items() if isinstance(place, dict) else enumerate(place):
+            if isinstance(inner, dict):
+                yield (*path, step)
+            yield from _tables(inner, (*path, step))
+
+
+def _absent_keys(document: dict[str, Any], table: KeyPath) -> Iterator[KeyPath]:
+    """Every key of a table that it leaves out, and those inside a table that it leaves out."""
+    place: Any = document
+    for step in table:
+        place = place.get(step) if isinstance(place, dict) else place[step]
+        if place is None:
+            break
+    kinds = schema.subschemas(table, document)
+    for key in dict.fromkeys(key for kind in kinds for key in kind.get("properties", {})):
+        steps = (*table, key)
+        if isinstance(place, dict) and key in place:
+            continue
+        if any("properties" in one for one in schema.subschemas(steps, document)):
+            inside = _absent_keys(document, steps)
+            # a text changes nothing of a part that is not there
+            there = schema.default(steps, document) is not None
+            yield from (own for own in inside if there or not _choices(document, own))
+        else:
+            yield steps
+
+
+def _standing_for_nothing(document: dict[str, Any], steps: KeyPath) -> Iterator[float | str | None]:
+    """The value that says the same as leaving a key out, where it may be set alone; else nothing."""
+    choices, default = _choices(document, steps), schema.default(steps, document)
+    tried = [default]
+    if choices:
+        tried = [default or choices[0]]
+    elif default is None and schema.may_be_zero(steps) and schema.zero_is_none(steps):
+        default = 0.0
+        # with 0 it may go unseen that other keys are missing
+        tried = [default, typical_size(document, steps)]
+    if any(not isinstance(one, int | float | str) or isinstance(one, bool) for one in tried):
+        return
+    if isinstance(default, str) and not choices:
+        return
+    try:
+        for one in tried:
+            check(address.assign(document, dotted(steps, document), one), "")
+    except DeviceError:
+        return
+    yield default
+
+
+def _choices(document: dict[str, Any], steps: KeyPath) -> tuple[str, ...]:
+    """The texts that may stand at a path; () where any text may, or none.
+
+    Those of all kinds where the text says which kind of table it is.
+    """
+    of_kinds = steps[-1] in schema.TAGS
+    found: dict[str, None] = {}
+    for kind in schema.subschemas(steps, None if of_kinds else document):
+        found |= dict.fromkeys(map(str, kind.get("enum", [kind["const"]] if "const" in kind else [])))
+    return tuple(found) if len(found) > 1 else ()
+
+
+def _record(device: Device, steps: KeyPath, value: float | str | None, given: bool) -> DeviceNumber:
+    document, path = device.document, dotted(steps, device.document)
+    image = schema.mirror_image(steps)
+    table = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))
+    limits, whole = number_limits(document, steps)
+    number = value if isinstance(value, int | float) else None
+    low, high, scale = (None, None, "linear") if number is None else _slider(document, steps, number)
     return DeviceNumber(
         path=path,
-        group=tuple(tables) or ("device",),
-        name=_words(name, unit),
-        value=value,
-        unit=unit,
-        description=_description(steps),
-        source=_source(device, path) if given else "",
-        low=None,
-        high=None,
-        scale="linear",
-        whole=bool(kinds) and all(kind.get("type") in ("integer", "null") for kind in kinds),
-        lowest=lowest,
-        highest=highest,
-        choices=choices if isinstance(value, str) else None,
-        also=() if mirror is None else (dotted(mirror, document),),
+        group=tuple(dotted(steps[:table], document).split(".")) if table else ("device",),
+        name=number_name(steps),
+        value=value if number is None or whole else float(number),
+        unit=schema.key_unit(steps),
+        description=schema.key_sentence(steps),
+        source=source_of(steps, document, device.sources),
+        lowest=limits[0],
+        highest=limits[1],
+        excluded=limits[2],
+        low=low,
+        high=high,
+        scale=scale,
+        whole=whole,
+        choices=_choices(document, steps) if number is None else (),
+        also=() if image is None else (dotted(image, document),),
         given=given,
     )
 
 
-def _at(document: Any, steps: KeyPath, depth: int) -> Any:
-    """The value at the first `depth` + 1 steps of a path; None where the document has none."""
-    for step in steps[: depth + 1]:
-        try:
-            document = document[step]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return document
+def number_limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float, float, tuple[str, ...]], bool]:
+    """Lowest and highest value that the schema allows, which of them is excluded; whether the number is whole."""
+    kinds = [one for one in schema.subschemas(steps, document) if one.get("type") in ("number", "integer")]
+    for kind in kinds:
+        above, below = (_limit(kind, "ge", "minimum"), _limit(kind, "le", "maximum"))
+        over, under = (_limit(kind, "gt", "exclusiveMinimum"), _limit(kind, "lt", "exclusiveMaximum"))
+        excluded = [*(["lowest"] if over is not None else []), *(["highest"] if under is not None else [])]
+        lowest = next((x for x in (over, above) if x is not None), -inf)
+        highest = next((x for x in (under, below) if x is not None), inf)
+        return (lowest, highest, tuple(excluded)), kind["type"] == "integer"
+    return (-inf, inf, ()), False
 
 
-def _is_below(steps: KeyPath) -> bool:
-    row, column = steps[-2:]
-    return isinstance(row, int) and isinstance(column, int) and row > column
+def _limit(kind: dict[str, Any], ours: str, standard: str) -> float | None:
+    """A limit under its name in JSON Schema, or under pydantic's where another check stands before it."""
+    value = kind.get(standard, kind.get(ours))
+    return None if value is None else float(value)
 
 
-def _choices(steps: KeyPath) -> tuple[str, ...]:
-    """The words that the schema allows at a path; () where any word may stand."""
-    words: list[str] = []
-    for kind in schema.subschemas(steps):
-        words += [kind["const"]] if isinstance(kind.get("const"), str) else []
-        words += [word for word in kind.get("enum", ()) if isinstance(word, str)]
-    return tuple(dict.fromkeys(words))
-
-
-def _limits(kinds: list[dict[str, Any]]) -> tuple[float | None, float | None]:
-    """Hard limits that every kind of number allowed there has; None where one has none."""
-    numbers = [kind for kind in kinds if kind.get("type") in ("number", "integer")]
-    lows = [_first(kind, "ge", "minimum", "gt", "exclusiveMinimum") for kind in numbers]
-    highs = [_first(kind, "le", "maximum", "lt", "exclusiveMaximum") for kind in numbers]
-    lowest = None if not lows or None in lows else min(low for low in lows if low is not None)
-    highest = None if not highs or None in highs else max(high for high in highs if high is not None)
-    return lowest, highest
-
-
-def _first(kind: dict[str, Any], *keys: str) -> float | None:
-    return next((float(kind[key]) for key in keys if key in kind), None)
-
-
-def _words(name: str, unit: str) -> str:
-    """A key in words, without the unit that it ends in; elements of a vector by their coordinate.
-
-    >>> _words("sampling_period_s", "s"), _words("center_of_mass_m.1", "m"), _words("mass_kg.0.1", "kg")
-    ('sampling period', 'center of mass y', 'mass [0, 1]')
-    """
-    key, *elements = name.split(".")
-    ending = "_" + unit.replace("/", "_per_").replace("^", "").replace("kg m2", "kg_m2").replace(" ", "")
-    words = key.removesuffix(ending).replace("_", " ")
-    if not elements:
-        return words
-    if len(elements) == 1 and unit == "m" and elements[0] in ("0", "1", "2"):
-        return f"{words} {COORDINATES[int(elements[0])]}"
-    return f"{words} [{', '.join(elements)}]"
-
-
-def _description(steps: KeyPath) -> str:
-    """The schema's sentence on the key, or on the list that the number stands in."""
-    while steps:
-        if text := schema.key_description(steps):
-            return re.sub(r" \[[^\]]*\]$", "", text)
-        steps = steps[:-1]
-    return ""
-
-
-def _source(device: Device, path: str) -> str:
-    """The source of the first entry of [sources] that names the path or what it stands in."""
-    for pattern, text in device.sources.items():
-        if fnmatchcase(path, pattern) or fnmatchcase(path, f"{pattern}.*"):
-            return text
-    return device.source
-
-
-def _with_range(one: DeviceNumber, period: float) -> DeviceNumber:
-    """The record with a slider's ends, within the hard limits."""
-    if one.choices is not None or not isfinite(one.value):
-        return one
-    value, positive = float(one.value), one.lowest is not None and one.lowest >= 0.0
-    usual = USUAL.get(one.unit, 1.0) * (period if one.unit == "s" and isfinite(period) else 1.0)
-    if not one.given or (value > 0.0 and one.unit in SIZES and not one.also):
-        positive = True
-        usual *= 0.01 if one.unit == "m" else 1.0  # the step of an encoder
+def _slider(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[float | None, float | None, Scale]:
+    """Ends of a slider and its scale: a quarter of a magnitude to four times it, by its logarithm; of a number of
+    either sign twice as much to both sides as it is large."""
+    (lowest, highest, excluded), whole = number_limits(document, steps)
     scale: Scale = "linear"
-    if value > 0.0 and positive and not _may_be_zero(one):
-        low, high, scale = value / FACTOR, value * FACTOR, "logarithmic"
-    elif positive:
-        low, high = 0.0, FACTOR * value if value > 0.0 else usual
-        high = max(high, 3.0) if one.path.endswith("delay_samples") else high
+    if not isfinite(value):
+        return None, None, "logarithmic"
+    if value > 0.0 and (lowest >= 0.0 or _on_diagonal(steps)):
+        low, high = value / SPAN, value * SPAN
+        scale = "linear" if whole else "logarithmic"
+    elif value == 0.0 and (lowest >= 0.0 or _on_diagonal(steps)):
+        low, high = 0.0, SPAN * (1.0 if whole else typical_size(document, steps))
     else:
-        reach = 2.0 * abs(value) if value else usual
-        low, high = value - reach, value + reach
-    low = low if one.lowest is None else max(low, one.lowest)
-    high = high if one.highest is None else min(high, one.highest)
-    if one.whole:
-        low, high, scale = float(round(low)), float(max(round(high), round(low) + 1)), "linear"
-    return DeviceNumber(**{**asdict(one), "low": low, "high": high, "scale": scale})
+        away = 2.0 * abs(value) or typical_size(document, steps)  # not to 0: a vector may not be all zeros
+        low, high = value - away, value + away
+    low = max(low, lowest + NEAR * (value - lowest) if "lowest" in excluded else lowest)
+    high = min(high, highest - NEAR * (highest - value) if "highest" in excluded else highest)
+    return (ceil(low), floor(high), scale) if whole else (low, high, scale)
 
 
-def _may_be_zero(one: DeviceNumber) -> bool:
-    """Whether the number may be 0, as delays, friction and damping may."""
-    return schema.may_be_zero(tuple(int(part) if part.isdigit() else part for part in one.path.split(".")))
-
-
-def _can_be(device: Device, path: str, value: float) -> bool:
-    """Whether the device may have this number, which its file leaves out."""
-    try:
-        device.with_({path: value})
-    except (DeviceError, ValueError, TypeError):
-        return False
-    return True
+def _on_diagonal(steps: KeyPath) -> bool:
+    """Whether a number stands on the diagonal of a symmetric matrix, which may be written as its diagonal or, of
+    one row, as a number."""
+    for depth in range(3):
+        whole, indices = steps[: len(steps) - depth], steps[len(steps) - depth :]
+        kinds = schema.subschemas(whole)
+        rows = any(one.get("items", {}).get("type") == "array" for one in kinds)
+        if rows and any(one.get("type") == "number" for one in kinds):
+            return len(set(indices)) <= 1
+        if not isinstance(whole[-1], int):
+            break
+    return False

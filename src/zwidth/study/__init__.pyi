@@ -26,6 +26,8 @@ from .robust.robust_study import robust_study as robust_study
 from .safe_walls.safe_walls import SafeWallsError as SafeWallsError
 from .safe_walls.safe_walls import safe_walls as safe_walls
 from .safe_walls.table import SafeWalls as SafeWalls
+from .sensitivity.goal import numbers_for_goal as numbers_for_goal
+from .sensitivity.goal_result import Goal as Goal
 from .sensitivity.result import Sensitivities as Sensitivities
 from .sensitivity.sensitivities import sensitivities as sensitivities
 from .sensitivity.what_if import Variant as Variant

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, ConfigDict
@@ -74,13 +75,16 @@ def schema() -> dict[str, Any]:
     return DeviceFile.model_json_schema()
 
 
-def subschemas(path: tuple[str | int, ...]) -> list[dict[str, Any]]:
-    """Every subschema that may describe the value at a path of keys and indices; none: no such key."""
-    alternatives = list(_alternatives(schema()))
+def subschemas(path: tuple[str | int, ...], document: dict[str, Any] | None = None) -> list[dict[str, Any]]:
+    """Every subschema that may describe the value at a path of keys and indices; none: no such key.
+
+    document  a device's: of a table that comes in kinds, only that of the kind that the document has there
+    """
+    alternatives, place = list(_alternatives(schema())), document
     for part in path:
-        alternatives = [
-            inner for outer in alternatives for step in _step(outer, part) for inner in _alternatives(step)
-        ]
+        tables = [outer for outer in alternatives if _of_kind(outer, place)]
+        alternatives = [inner for outer in tables for step in _step(outer, part) for inner in _alternatives(step)]
+        place = _inside(place, part)
     return alternatives
 
 
@@ -102,18 +106,25 @@ def kinds(path: tuple[str | int, ...]) -> tuple[str, dict[str, set[str]]]:
     return "", {}
 
 
-def key_description(path: tuple[str | int, ...]) -> str:
-    """What the key at a path means, with its unit; "" if the schema says nothing."""
-    outer = [step for subschema in subschemas(path[:-1]) for step in _step(subschema, path[-1])]
-    for subschema in outer:
-        if "description" in subschema:
-            unit = subschema.get("unit")
-            return (
-                f"{subschema['description']} [{unit}]" if unit and unit != "1" else str(subschema["description"])
-            )
+def key_sentence(path: tuple[str | int, ...]) -> str:
+    """What the key at a path means, or the list that it stands in; "" if the schema says nothing."""
+    for end in range(len(path), 0, -1):
+        outer = [step for subschema in subschemas(path[: end - 1]) for step in _step(subschema, path[end - 1])]
+        for subschema in outer:
+            if "description" in subschema:
+                return str(subschema["description"])
+        if outer and isinstance(path[end - 1], str) and not _free(path[: end - 1]):
+            break
     return ""
 
 
+def key_description(path: tuple[str | int, ...]) -> str:
+    """What the key at a path means, with its unit; "" if the schema says nothing."""
+    sentence, unit = key_sentence(path), key_unit(path)
+    return f"{sentence} [{unit}]" if sentence and unit else sentence
+
+
+@cache
 def key_unit(path: tuple[str | int, ...]) -> str:
     """The unit of the number at a path, or of the list that it stands in; "" if the schema states none."""
     for end in range(len(path), 0, -1):
@@ -136,6 +147,25 @@ def may_be_zero(path: tuple[str | int, ...]) -> bool:
     return any(one.get("ge", one.get("minimum")) == 0 for one in numbers)
 
 
+def zero_is_none(path: tuple[str | int, ...]) -> bool:
+    """Whether leaving out a key that may be 0 says the same as 0: unless its sentence tells what else it says.
+
+    >>> drive = ("mechanism", "drives", 0)
+    >>> zero_is_none((*drive, "coulomb_Nm")), zero_is_none((*drive, "damping_resistance_ohm"))
+    (True, False)
+    """
+    return not re.search(r"omitted[^:;]*: (?!none\b|no\b|0\b)", key_sentence(path))
+
+
+def default(path: tuple[str | int, ...], document: dict[str, Any] | None = None) -> Any:
+    """What the schema takes for a key that is left out; None where it takes nothing.
+
+    document  as for `subschemas`
+    """
+    outer = [step for subschema in subschemas(path[:-1], document) for step in _step(subschema, path[-1])]
+    return next((one["default"] for one in outer if one.get("default") is not None), None)
+
+
 def mirror_image(path: tuple[str | int, ...]) -> tuple[str | int, ...] | None:
     """The path of an element's mirror image in a symmetric matrix: a list of lists for which one number may stand.
     None for the diagonal, and for what stands in none.
@@ -149,6 +179,30 @@ def mirror_image(path: tuple[str | int, ...]) -> tuple[str | int, ...] | None:
         return None
     symmetric = any(kind.get("type") == "number" for kind in subschemas(path[:-2]))
     return (*path[:-2], path[-1], path[-2]) if symmetric else None
+
+
+def below_diagonal(path: tuple[str | int, ...]) -> bool:
+    """Whether the path is an element below the diagonal of a symmetric matrix, which moves with the one above."""
+    return mirror_image(path) is not None and int(path[-2]) > int(path[-1])
+
+
+def _free(path: tuple[str | int, ...]) -> bool:
+    """Whether the table at a path takes keys of any name, as assemblies do."""
+    return any(isinstance(subschema.get("additionalProperties"), dict) for subschema in subschemas(path))
+
+
+def _of_kind(subschema: dict[str, Any], table: Any) -> bool:
+    """Whether a table of a document is of the kind that a subschema describes, or of any where nothing says so."""
+    properties = subschema.get("properties", {}) if isinstance(table, dict) else {}
+    tags = [(tag, properties[tag]) for tag in TAGS if "const" in properties.get(tag, {})]
+    return all(one["const"] == table.get(tag, one.get("default")) for tag, one in tags)
+
+
+def _inside(place: Any, part: str | int) -> Any:
+    """What a document has at a step; None where it has nothing."""
+    if isinstance(place, dict):
+        return place.get(str(part))
+    return place[part] if isinstance(place, list) and isinstance(part, int) and part < len(place) else None
 
 
 def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:

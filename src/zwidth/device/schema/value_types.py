@@ -253,7 +253,8 @@ Vector = Annotated[
 ]
 Item = TypeVar("Item")
 Few = Annotated[tuple[Item, ...], BeforeValidator(_few), WithJsonSchema({"anyOf": [_NUMBER, _LIST]})]
-Frictions = Few[DryFriction]
+_LEVEL: Final[dict[str, Any]] = {**_NUMBER, "minimum": 0}
+Frictions = Annotated[Few[DryFriction], WithJsonSchema({"anyOf": [_LEVEL, {**_LIST, "items": _LEVEL}]})]
 SymmetricMatrix = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_matrix),

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
+from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount, as_written, signed, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from zwidth.study.sensitivity.goal_result import Goal, GoalNumber
     from zwidth.study.sensitivity.result import Sensitivities, Sensitivity
 
 # Kind of optimum (see `study.sensitivity.optimum`) -> where on the edge the stiffest wall lies.
@@ -27,6 +29,20 @@ PLACES: Final = {
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0, so that there is no largest stiffness to change"
 
 
+def _positive(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """A callback that refuses a stiffness of 0 or below."""
+    if value is not None and value <= 0.0:
+        raise click.BadParameter(f"must be above 0 N/m, got {value:g}")
+    return value
+
+
+class Found(NamedTuple):
+    """The sensitivities, and what each number would have to be where a goal is given."""
+
+    sensitivities: Sensitivities
+    goal: Goal | None
+
+
 class SensitivityCommand(Command):
     """Find which numbers of DEVICE to change first: the change of the largest stiffness with each of them."""
 
@@ -35,6 +51,7 @@ class SensitivityCommand(Command):
     summary = "Find which numbers of DEVICE to change first."
     examples = (
         "zwidth sensitivity my-device.toml --top 5",
+        "zwidth sensitivity my-device.toml --goal 10000",
         "zwidth sensitivity my-device.toml --set loop.delay_samples=1 --output bars.svg",
     )
     options = (
@@ -44,6 +61,13 @@ class SensitivityCommand(Command):
             type=click.IntRange(min=1),
             default=12,
             help="Rows of the printed table (default 12).",
+        ),
+        click.option(
+            "--goal",
+            metavar="K",
+            type=Finite(),
+            callback=_positive,
+            help="Also find what each number would have to be for this largest stiffness [N/m].",
         ),
     )
     keys = (
@@ -55,16 +79,34 @@ class SensitivityCommand(Command):
         "held_by",
         "rival_stiffness_N_per_m",
         "one_sided",
+        "goal",
     )
     may_be_undecided = True
 
-    def compute(self, case: CommandLine) -> Sensitivities:
-        return case.device.sensitivities(case.point, case.progress)
+    def compute(self, case: CommandLine) -> Found:
+        found = case.device.sensitivities(case.point, case.progress)
+        if case["goal"] is None:
+            return Found(found, None)
+        from zwidth.study.sensitivity.goal import numbers_for_goal
 
-    def reason(self, case: CommandLine, result: Sensitivities) -> str | None:
-        return None if result.peak is not None else NO_WALL
+        return Found(found, numbers_for_goal(case.device, case.point, case["goal"], case.progress))
 
-    def pages(self, case: CommandLine, result: Sensitivities, document: Mapping[str, Any]) -> Iterator[Any]:
+    def document(self, case: CommandLine, result: Found) -> dict[str, Any]:
+        goal = None if result.goal is None else result.goal.entries()
+        return result.sensitivities.document() | {"goal": goal}
+
+    def table(self, case: CommandLine, result: Found, document: Mapping[str, Any]) -> Mapping[str, Sequence[Any]]:
+        return (result.goal or result.sensitivities).table()
+
+    def reason(self, case: CommandLine, result: Found) -> str | None:
+        return None if result.sensitivities.peak is not None else NO_WALL
+
+    def pages(self, case: CommandLine, result: Found, document: Mapping[str, Any]) -> Iterator[Any]:
+        yield from self._sensitivities(case, result.sensitivities)
+        if result.goal is not None:
+            yield from _goal_pages(result.goal, case["top"])
+
+    def _sensitivities(self, case: CommandLine, result: Sensitivities) -> Iterator[Any]:
         peak = result.peak
         if peak is None:
             return
@@ -75,13 +117,42 @@ class SensitivityCommand(Command):
         yield table(["number", "value", "sensitivity", "+1 % gives"], [_row(result, number) for number in shown])
         yield from _remarks(result, len(known) - len(shown))
 
-    def draw(self, case: CommandLine, result: Sensitivities) -> Figure:
-        from zwidth.show.figures.sensitivity import draw_sensitivities
+    def draw(self, case: CommandLine, result: Found) -> Figure:
+        from zwidth.show.figures.sensitivity import draw_goal, draw_sensitivities
         from zwidth.show.figures.style import figure
 
-        drawing, ax = figure(6.2, 0.9 + 0.27 * max(min(case["top"], len(result.numbers)), 3))
-        draw_sensitivities(ax, result, case["top"])
+        goal, found = result.goal, result.sensitivities
+        count = len(found.numbers if goal is None else goal.reached)
+        drawing, ax = figure(6.2, 0.9 + 0.27 * max(min(case["top"], count), 3))
+        if goal is None:
+            draw_sensitivities(ax, found, case["top"])
+        else:
+            draw_goal(ax, goal, case["top"])
         return drawing
+
+
+def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
+    """What each number would have to be, for people."""
+    wanted = amount(goal.goal, "N/m")
+    shown = goal.reached[:top]
+    if shown:
+        yield f"for a largest stiffness of {wanted} one of these numbers would have to be"
+        yield table(["number", "value", "would have to be", "factor"], [_goal_row(one) for one in shown])
+    else:
+        yield f"no number alone gives a largest stiffness of {wanted}"
+    more = len(goal.reached) - len(shown)
+    if more > 0:
+        yield f"{more} more; show them with --top N, or get all with --json or --output"
+    near = next((one for one in goal.numbers if one.status == "out of range"), None)
+    if near is not None and near.value != near.now:
+        value = f"{typed(as_written(near.value))} {near.unit}".rstrip()
+        reached = amount(near.stiffness_max, "N/m")
+        yield f"of the others {near.path} comes nearest, {reached} with {value}"
+
+
+def _goal_row(number: GoalNumber) -> tuple[str, str, str, str]:
+    now, wanted = (f"{typed(as_written(v))} {number.unit}".rstrip() for v in (number.now, number.value))
+    return number.path, now, wanted, amount(number.factor) if number.factor == number.factor else ""
 
 
 def _row(sensitivities: Sensitivities, number: Sensitivity) -> tuple[str, str, str, str]:

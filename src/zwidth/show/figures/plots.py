@@ -127,6 +127,12 @@ def _guarantees(ax: Axes, result: Any) -> None:
     draw_guarantees(ax, result)
 
 
+def _goal(ax: Axes, result: Any) -> None:
+    from zwidth.show.figures.sensitivity import draw_goal
+
+    draw_goal(ax, result)
+
+
 def _sensitivities(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.sensitivity import draw_sensitivities
 
@@ -298,6 +304,7 @@ DRAWINGS: Final[dict[str, Draw]] = {
     "BoundsComparison": _bounds,
     "Guarantees": _guarantees,
     "Sensitivities": _sensitivities,
+    "Goal": _goal,
     "WallVerdicts": _verdicts,
     "MeasureValues": _measure_values,
     "Description": _description,

@@ -20,7 +20,8 @@ from zwidth.show.figures.style import (
     text_width,
     wrapped,
 )
-from zwidth.show.units import MINUS, NONE, signed
+from zwidth.show.units import MINUS, NONE, quantity, signed
+from zwidth.study.sensitivity.goal_result import Goal
 from zwidth.study.sensitivity.result import Sensitivities
 
 NUMBER_ROOM: Final = 0.24  # of what the bars span, for the numbers beside them
@@ -38,6 +39,21 @@ def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *,
         (n.path, n.logarithmic) for n in sensitivities.numbers if not isnan(n.logarithmic) and n.logarithmic != 0.0
     ]
     shown = list(sensitivities.ranking if grouped else single)[:top]
+    _draw_bars(ax, shown, "Change of the largest stiffness for 1 % more [%]")
+
+
+def draw_goal(ax: Axes, goal: Goal, top: int = 12) -> None:
+    """How far each number has to be changed for a wanted largest stiffness, the smallest change on top.
+
+    top  how many numbers at most; those that do not reach it, and those that are 0 now, are left out
+    """
+    shown = [(one.path, 100.0 * (one.factor - 1.0)) for one in goal.reached if one.factor == one.factor][:top]
+    wanted = quantity(goal.goal, "N/m")
+    _draw_bars(ax, shown, f"Change of one number for a largest stiffness of {wanted} [%]")
+
+
+def _draw_bars(ax: Axes, shown: list[tuple[str, float]], label: str) -> None:
+    """A bar for each number, with its value beside it, from the top."""
     rows = list(range(len(shown), 0, -1))
     values = [value for _, value in shown]
     widest = max((abs(value) for value in values), default=1.0)
@@ -78,7 +94,7 @@ def draw_sensitivities(ax: Axes, sensitivities: Sensitivities, top: int = 12, *,
     ax.spines["left"].set_visible(False)
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}".replace("-", MINUS))
     ax.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    ax.set_xlabel("\n".join(wrapped("Change of the largest stiffness for 1 % more [%]", beside, AXIS_SIZE)))
+    ax.set_xlabel("\n".join(wrapped(label, beside, AXIS_SIZE)))
     if not shown:
         ax.set_yticks([])
         ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)

@@ -1,245 +1,257 @@
-"""What each number of a device would have to be for its largest stiffness to reach a goal.
+"""What each number of a device would have to be, the others as they are, for a wanted largest stiffness.
 
-    K_max(p) = goal,     p alone changed, the value nearest to its own in |ln(p / p0)|
+    K_max(p) = goal,   the p nearest to the device's own, by |ln(p / own)|
 
-No derivative is followed: the largest stiffness bends and jumps where another part of the edge takes over. It is
-computed for values spread evenly in ln p to both sides, for all numbers at once; the nearest interval in which it
-passes the goal is then divided until its ends agree.
+K_max need not grow or fall with a number all the way: a stiffer drive may help and then harm. So a number is tried
+outwards to both sides on a grid, to where there is no such device; the charts of all numbers together.
+The crossing of the goal next to the device's own value is refined. Every value that is returned has been charted
+exactly; a sensitivity, the slope at the device's own value, would only tell where to look.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from math import isfinite, nan
-from typing import Any, Final, Literal
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf, isfinite, isnan, log, nan
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
-from zwidth.device.faults import KeyPath, dotted
+from zwidth.device.faults import KeyPath, fail
 from zwidth.device.load import device_of_point
-from zwidth.device.schema.device_file import mirror_image
+from zwidth.device.numbers import number_limits, typical_size
+from zwidth.device.schema.device_file import key_unit
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
-from zwidth.result import Result
-from zwidth.study.designs.built_designs import build_at_point
-from zwidth.study.designs.design_groups import DesignColumn, DesignGrouping
-from zwidth.study.sensitivity.number_text import number_obstacle, number_unit
-from zwidth.study.sensitivity.sensitivities import varied_numbers
+from zwidth.study.sensitivity.changed_stiffness import ChangedStiffness
+from zwidth.study.sensitivity.goal_result import (
+    NO_INFLUENCE,
+    ORDER,
+    OUT_OF_RANGE,
+    REACHED,
+    Goal,
+    GoalNumber,
+    Status,
+)
+from zwidth.study.sensitivity.number_text import number_obstacle
+from zwidth.study.sensitivity.sensitivities import moved_places, property_numbers
 
-Floats = NDArray[np.float64]
-Status = Literal["reached", "jumps over it", "out of range", "no influence", "cannot be varied"]
-
-FACTOR: Final = 10.0  # by which a number is changed at most, up and down
-NEAR: Final = 2.0  # factor within which all numbers are tried first
+WIDEST: Final = 10.0  # factor up and down within which a number is searched
 STEPS: Final = 24  # values on each side
-PARTS: Final = 9  # into which an interval is divided in each round
-ROUNDS: Final = 10  # of dividing: 10^(1/24) shrinks to 3e-11
-AGREES: Final = 1e-6  # relative, by which the stiffness found may miss the goal; beyond, it jumps there
-UNMOVED: Final = 1e-9  # relative change of the largest stiffness that is none
+AT_A_TIME: Final = 8  # of them; most numbers cross the goal in the first, or never
+EXACT: Final = 1e-8  # relative distance from the goal at which a value is taken
+NARROW: Final = 1e-8  # of a bracket, in the variable below
+JUMP: Final = 1e-3  # relative difference over a narrow bracket above which the largest stiffness jumps there
+NARROWEST: Final = 1e-13  # of any bracket
+NEAR_JUMP: Final = 1e-3  # distance from a jump within which rounding may decide on which side of it a value lies
+STRAIGHT: Final = 20  # charts of a bracket after which it is halved only
+ALIKE: Final = 1e-9  # relative differences of largest stiffnesses that are rounding
+JUMPS: Final = "the largest stiffness jumps over the goal near this value"
+NOWHERE: Final = "it does not change the largest stiffness"
 
 
-@dataclass(frozen=True)
-class GoalNumber:
-    """One number, and what it would have to be.
+@dataclass
+class _Search:
+    """The search along one number.
 
-    path, unit    as in `Sensitivity`;   value  what it is
-    wanted        the value that reaches the goal, or comes nearest to it within the range; nan where none is known
-    stiffness_max  of the device with it [N/m]
-    status, reason  whether the goal is reached, and in words why not
+    value = own exp(t), or typical size times t where it is 0; t = 0 is the device itself.
+
+    samples  t -> ln(K_max / goal), -inf where no wall is stable, nan where there is no device
+    jumps    brackets in which the goal is jumped over
     """
 
     path: str
-    value: float
-    unit: str
-    wanted: float
-    stiffness_max: float
-    status: Status
-    reason: str = ""
+    steps: KeyPath
+    own: float
+    size: float
+    lowest: float
+    highest: float
+    samples: dict[float, float]
+    jumps: set[tuple[float, float]] = field(default_factory=set)
 
+    def value(self, t: float) -> float:
+        return self.size * t if self.own == 0.0 else self.own * float(np.exp(t))
 
-@dataclass(frozen=True, repr=False)
-class Goal(Result):
-    """What each number would have to be, those that reach the goal by the smallest change first.
+    def grid(self, first: int) -> Iterator[float]:
+        """The next values outwards, to both sides, that the schema allows; to none where there was no device."""
+        for k in range(first + 1, first + AT_A_TIME + 1):
+            away = log(WIDEST) * (k / STEPS) ** 2  # closer together near the device, where the nearest is sought
+            if self.own == 0.0:
+                away = WIDEST ** (3.0 * k / STEPS - 2.0)  # a hundredth to ten times the typical size
+            for t in (away, -away):
+                farthest = max((known for known in self.samples if known * t >= 0.0), key=abs)
+                if isnan(self.samples[farthest]):
+                    continue
+                if self.lowest < self.value(t) < self.highest or self.value(t) in (self.lowest, self.highest):
+                    yield t
 
-    stiffness  the goal [N/m];   now  the largest stiffness as it is [N/m]
-    """
+    def brackets(self) -> list[tuple[float, float]]:
+        """Neighbours (nearer, farther) between which the goal is crossed nearer than where it is reached already,
+        the nearest first; none that are narrowed down to a jump."""
+        reached, found = self.reached, []
+        for side in (1.0, -1.0):
+            known = sorted((t for t in self.samples if t * side >= 0.0), key=abs)
+            for a, b in pairwise(known):
+                crossed = self.samples[a] * self.samples[b] < 0.0 and min(map(self._error, (a, b))) > EXACT
+                if crossed and (a, b) not in self.jumps and (reached is None or abs(a) < abs(reached)):
+                    found.append((a, b))
+        return sorted(found, key=lambda ends: (abs(ends[0]), abs(ends[1])))
 
-    stiffness: float
-    now: float
-    numbers: tuple[GoalNumber, ...]
+    @property
+    def reached(self) -> float | None:
+        """The nearest place at which the goal is reached; None where none is known, or nothing matters."""
+        if self.alike:
+            return None
+        return min((t for t in self.samples if self._error(t) <= EXACT), key=abs, default=None)
 
-    def document(self) -> dict[str, Any]:
-        """The numbers by key and unit."""
-        columns = self.table()
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        return {"goal_N_per_m": self.stiffness, "stiffness_max_N_per_m": self.now, "goal": rows}
+    @property
+    def alike(self) -> bool:
+        """Whether the largest stiffness is the same at all places that are known."""
+        known = [level for level in self.samples.values() if level == level]
+        return all(level == known[0] or abs(level - known[0]) <= ALIKE for level in known)
 
-    def table(self) -> dict[str, list[Any]]:
-        """One number a row."""
-        return {
-            "path": [one.path for one in self.numbers],
-            "value": [one.wanted for one in self.numbers],
-            "factor": [one.wanted / one.value if one.value else nan for one in self.numbers],
-            "unit": [one.unit or None for one in self.numbers],
-            "stiffness_max_N_per_m": [one.stiffness_max for one in self.numbers],
-            "status": [one.status for one in self.numbers],
-            "reason": [one.reason or None for one in self.numbers],
-        }
+    def jumps_between(self, a: float, b: float) -> bool:
+        """Whether a bracket holds a jump, and no place at which the goal is reached."""
+        width = abs(b - a) / max(1.0, abs(a))
+        return width <= NARROWEST or (width <= NARROW and not abs(self.samples[a] - self.samples[b]) < JUMP)
 
-    def __repr__(self) -> str:
-        reached = [one for one in self.numbers if one.status == "reached"]
-        lines = [f"Goal: {self.stiffness:.6g} N/m, from {self.now:.6g} N/m; {len(reached)} numbers reach it alone"]
-        return "\n".join(
-            [*lines, *(f"  {one.path} = {one.wanted:.6g} {one.unit}".rstrip() for one in reached[:3])]
-        )
+    def inside(self, a: float, b: float, tries: int) -> float:
+        """Where to look next in a bracket: where a straight line through its ends crosses, or in the middle, which
+        is certain to narrow it."""
+        f, g = self.samples[a], self.samples[b]
+        if not isfinite(f * g) or tries % 3 == 2 or tries > STRAIGHT:
+            return 0.5 * (a + b)
+        t = a - f * (b - a) / (g - f)
+        return min(max(t, min(a, b) + 1e-3 * abs(b - a)), max(a, b) - 1e-3 * abs(b - a))
+
+    def _error(self, t: float) -> float:
+        return abs(self.samples[t])
 
 
 def numbers_for_goal(
-    device: Device, point: OperatingPoint | None, goal: float, progress: Progress | None = None
+    device: Device, point: OperatingPoint | None, goal_stiffness: float, progress: Progress | None = None
 ) -> Goal:
-    """The value of each number, alone changed, at which the largest stiffness is the goal.
+    """What each number that `sensitivities` knows would have to be for a largest stiffness.
 
-    point     as of `sensitivities`
-    goal      [N/m], positive; below the present largest stiffness it says how far a number may go
-    progress  called with "goal", rounds done, and rounds of all
-    Raises    ValueError  for a goal that is not positive and finite, and for a measured response, whose numbers
-                          are not varied; what `Device.at` raises
+    point           one posture and one direction; None: the device's reference. The handle stays there
+    goal_stiffness  [N/m], above what the device has or below: then a number tells what it could be relaxed to
+    progress        called with "numbers", those that are decided, and all of them
+
+    A number is searched from a tenth of its value to ten times that, within the schema's limits; one that is 0 up
+    to ten times a typical size. Beyond a value with which there is no such device nothing is tried. The crossing
+    nearest to the device's own value is found unless two lie between neighbours of a grid of 24 values to each
+    side. The largest stiffness with the value is the goal to 1e-8.
+
+    Raises  ValueError   for a goal that is not a positive finite number
+            DeviceError  for a measured device, whose numbers are in its response
+            what `sensitivities` raises for the device itself
     """
-    if not (isfinite(goal) and goal > 0.0):
-        raise ValueError(f"goal must be a stiffness above 0 N/m, got {goal:g}")
-    where = point or device.at()
-    if where.response is not None:
-        raise ValueError("what each number would have to be is computed for a device's model, not for a response")
-    device = device_of_point(device, where)
-    search = _Search(device, where, goal, {})
-    search.add([(None, 0.0)])
-    now = search.known[None, 0.0]
-    numbers = [(path, steps, value) for path, steps, value in varied_numbers(device.document)]
-    free = {steps: value for _, steps, value in numbers if value != 0.0 and not number_obstacle(steps, value)}
-    grid = np.log(FACTOR) * np.arange(-STEPS, STEPS + 1) / STEPS
-    near = grid[np.abs(grid) <= np.log(NEAR)]
-    search.add((steps, value * np.exp(x)) for steps, value in free.items() for x in near if x != 0.0)
-    intervals = {steps: _nearest(search, steps, value, near, now) for steps, value in free.items()}
-    far = {steps: free[steps] for steps, ends in intervals.items() if ends is None}
-    search.add((steps, value * np.exp(x)) for steps, value in far.items() for x in grid if x != 0.0)
-    intervals |= {steps: _nearest(search, steps, value, grid, now) for steps, value in far.items()}
-    for done in range(ROUNDS):
+    require("device", device, Device)
+    if isinstance(goal_stiffness, bool) or not isinstance(goal_stiffness, int | float | np.number):
+        raise TypeError(f"goal_stiffness must be a number [N/m], got {goal_stiffness!r}")
+    goal = float(goal_stiffness)
+    if not 0.0 < goal < inf:
+        raise ValueError(f"goal_stiffness must be a positive, finite stiffness in N/m, got {goal:g}")
+    at = point or device.at()
+    device = device_of_point(device, at)
+    if at.response is not None:
+        raise fail(device.label, "response", "has no numbers to change; a goal is for a device given by a model")
+    peak = largest_stiffness(at.loop)
+    own = 0.0 if peak is None else peak.stiffness
+    searches, fixed = [], []
+    for path, steps, value in property_numbers(device.document):
+        if obstacle := number_obstacle(steps, value):
+            reason = f"not varied: {obstacle}"
+            fixed.append(GoalNumber(path, value, key_unit(steps), nan, nan, nan, OUT_OF_RANGE, reason))
+        else:
+            searches.append(_search(device, path, steps, value, own, goal))
+    charts = ChangedStiffness(
+        device, at, {one.path: tuple(steps for steps, _ in moved_places(one.steps, 1.0)) for one in searches}
+    )
+    found = _found(searches, charts, goal, progress)
+    numbers = sorted([*found, *fixed], key=lambda one: _rank(one, goal))
+    return Goal(goal, own, tuple(numbers)).about(at)
+
+
+def _rank(number: GoalNumber, goal: float) -> tuple[int, float]:
+    """Sorting key: the smallest change of those that reach the goal, the nearest miss of the others."""
+    K = number.stiffness_max
+    missed = abs(log(K / goal)) if K > 0.0 else inf
+    return ORDER.index(number.status), number.distance if number.status == REACHED else missed
+
+
+def _search(device: Device, path: str, steps: KeyPath, value: float, own: float, goal: float) -> _Search:
+    (lowest, highest, excluded), _ = number_limits(device.document, steps)
+    lowest = np.nextafter(lowest, inf) if "lowest" in excluded else lowest
+    highest = np.nextafter(highest, -inf) if "highest" in excluded else highest
+    size = abs(value) or typical_size(device.document, steps)
+    return _Search(path, steps, value, size, float(lowest), float(highest), {0.0: _level(own, goal)})
+
+
+def _level(stiffness: float, goal: float) -> float:
+    """ln(K / goal); -inf where no wall is stable."""
+    return log(stiffness / goal) if stiffness > 0.0 else -inf if stiffness == 0.0 else nan
+
+
+def _found(
+    searches: list[_Search], charts: ChangedStiffness, goal: float, progress: Progress | None
+) -> list[GoalNumber]:
+    """Search outwards, a few values at a time, and refine what is crossed before going on."""
+    left = searches
+    for first in range(0, STEPS, AT_A_TIME):
+        _sample([(one, t) for one in left for t in one.grid(first)], charts, goal)
+        tries = 0
+        while crossed := [(one, ends[0]) for one in left if (ends := one.brackets())]:
+            for one, (a, b) in crossed:
+                if one.jumps_between(a, b):
+                    one.jumps.add((a, b))
+            _sample(
+                [(one, one.inside(*ends, tries)) for one, ends in crossed if ends not in one.jumps], charts, goal
+            )
+            tries += 1
+        left = [one for one in left if one.reached is None]
         if progress is not None:
-            progress("goal", done, ROUNDS)
-        inner = {steps: np.linspace(*ends, PARTS + 1) for steps, ends in intervals.items() if ends is not None}
-        search.add((steps, free[steps] * np.exp(x)) for steps, xs in inner.items() for x in xs[1:-1])
-        for steps, xs in inner.items():
-            intervals[steps] = _nearest(search, steps, free[steps], xs, now)
-    found = [
-        _number(search, path, steps, value, intervals.get(steps), now, grid) for path, steps, value in numbers
-    ]
-    return Goal(goal, now, tuple(sorted(found, key=_rank)))
+            done = len(searches) if first + AT_A_TIME >= STEPS else len(searches) - len(left)
+            progress("numbers", done, len(searches))
+    return [_number(one, charts, goal) for one in searches]
 
 
-def _nearest(
-    search: _Search, steps: KeyPath, value: float, grid: Floats, now: float
-) -> tuple[float, float] | None:
-    """The interval of ln p / p0 nearest to 0 at whose ends the stiffness is on both sides of the goal."""
-    K = np.array([now if x == 0.0 else search.known[steps, value * np.exp(x)] for x in grid])
-    with np.errstate(invalid="ignore"):
-        passed = np.flatnonzero((K[:-1] - search.goal) * (K[1:] - search.goal) <= 0.0)
-    if not len(passed):
-        return None
-    nearest = min(passed, key=lambda k: min(abs(grid[k]), abs(grid[k + 1])))
-    return float(grid[nearest]), float(grid[nearest + 1])
+def _sample(places: list[tuple[_Search, float]], charts: ChangedStiffness, goal: float) -> None:
+    K = charts.stiffnesses([(one.path, one.value(t)) for one, t in places])
+    for (one, t), stiffness in zip(places, K.tolist(), strict=True):
+        one.samples[t] = _level(stiffness, goal)
 
 
-def _number(
-    search: _Search,
-    path: str,
-    steps: KeyPath,
-    value: float,
-    ends: tuple[float, float] | None,
-    now: float,
-    grid: Floats,
-) -> GoalNumber:
-    """What was found for one number."""
-    unit, obstacle = number_unit(steps), number_obstacle(steps, value)
-    if obstacle or value == 0.0:
-        return GoalNumber(path, value, unit, nan, nan, "cannot be varied", obstacle or "0 has no multiples")
-    if ends is None:
-        known = {x: now if x == 0.0 else search.known[steps, value * np.exp(x)] for x in grid}
-        tried = {x: K for x, K in known.items() if isfinite(K)}
-        if max(abs(K - now) for K in tried.values()) <= UNMOVED * abs(now):
-            return GoalNumber(path, value, unit, nan, nan, "no influence", "it has no influence")
-        best = min(tried, key=lambda x: (abs(tried[x] - search.goal), abs(x)))
-        reason = f"not from a tenth to ten times its value; at best {tried[best]:.4g} N/m"
-        return GoalNumber(path, value, unit, value * float(np.exp(best)), tried[best], "out of range", reason)
-    at = {x: now if x == 0.0 else search.known[steps, value * np.exp(x)] for x in ends}
-    x = min(at, key=lambda end: abs(at[end] - search.goal))
-    if abs(at[x] - search.goal) <= AGREES * search.goal:
-        return GoalNumber(path, value, unit, value * float(np.exp(x)), at[x], "reached")
-    low, high = sorted(at.values())
-    reason = f"the largest stiffness jumps there, from {low:.4g} to {high:.4g} N/m"
-    return GoalNumber(path, value, unit, value * float(np.exp(x)), at[x], "jumps over it", reason)
-
-
-def _rank(one: GoalNumber) -> tuple[int, float]:
-    order = ("reached", "jumps over it", "out of range", "no influence", "cannot be varied")
-    change = abs(np.log(one.wanted / one.value)) if isfinite(one.wanted) and one.value else np.inf
-    return order.index(one.status), float(change)
-
-
-@dataclass(frozen=True)
-class _Search:
-    """Largest stiffness of the device with one number changed, kept by path and value; nan where there is none.
-
-    known  (steps, value) -> K_max [N/m]; (None, 0.0) for the device as it is
-    """
-
-    device: Device
-    point: OperatingPoint
-    goal: float
-    known: dict[tuple[KeyPath | None, float], float]
-
-    def add(self, wanted: Iterable[tuple[KeyPath | None, float]]) -> None:
-        """Compute devices together, those that cannot be built so alone."""
-        new = [key for key in dict.fromkeys(wanted) if key not in self.known]
-        grouping = DesignGrouping(
-            {key: part for key, part in self.device.document.items() if key != "sources"}, self.device.label, {}
-        )
-        for built in build_at_point(grouping.groups(list(self._columns(new))), self.point):
-            stiffness = np.asarray(built.point.measure("stiffness_max").values, dtype=float)
-            for row, K in zip(built.rows.tolist(), stiffness.tolist(), strict=True):
-                self.known[new[row]] = K
-        for key in new:
-            if key not in self.known:
-                self.known[key] = self._alone(*key)
-
-    def _columns(self, keys: list[tuple[KeyPath | None, float]]) -> Iterable[DesignColumn]:
-        """Each number that one of these changes, as it is but in the rows that change it."""
-        values: dict[KeyPath, list[float]] = {}
-        places: dict[KeyPath, NDArray[np.int64]] = {}
-        for row, (steps, value) in enumerate(keys):
-            for each in () if steps is None else (steps, mirror_image(steps)):
-                if each is not None:
-                    own = values.setdefault(each, [self._at(each)])
-                    places.setdefault(each, np.zeros(len(keys), dtype=np.int64))[row] = len(own)
-                    own.append(value)
-        for each, own in values.items():
-            yield DesignColumn(dotted(each, self.device.document), own, places[each])
-
-    def _at(self, steps: KeyPath) -> float:
-        place: Any = self.device.document
-        for step in steps:
-            place = place[step]
-        return float(place)
-
-    def _alone(self, steps: KeyPath | None, value: float) -> float:
-        if steps is None:
-            return self.point.chart(decay=False).stiffness_max
-        changed: Mapping[str, float] = {
-            dotted(each, self.device.document): value for each in (steps, mirror_image(steps)) if each is not None
-        }
-        try:
-            return self.device.with_(changed).at_point(self.point).chart(decay=False).stiffness_max
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-            return nan
+def _number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
+    """What a search came to."""
+    known = {t: level for t, level in one.samples.items() if isfinite(level)}
+    best = one.reached
+    status: Status = REACHED if best is not None else OUT_OF_RANGE
+    reason = ""
+    if best is None:
+        if known and one.alike and len(one.samples) > 1:
+            return GoalNumber(
+                one.path,
+                one.own,
+                key_unit(one.steps),
+                nan,
+                nan,
+                goal * float(np.exp(known[0.0])),
+                NO_INFLUENCE,
+                NOWHERE,
+            )
+        edges = [end for bracket in one.jumps for end in bracket]
+        clear = [t for t in known if t == 0.0 or all(abs(t - end) > NEAR_JUMP for end in edges)]
+        best = min(clear, key=lambda t: (abs(known[t]), abs(t)), default=0.0)
+        ends = sorted(one.value(t) for t, level in one.samples.items() if level == level)
+        refused = charts.refusals.get(one.path, "")
+        reason = JUMPS if one.jumps else f"from {ends[0]:.4g} to {ends[-1]:.4g} it is not reached"
+        reason += f"; beyond, {refused}" if refused and not one.jumps else ""
+    value = one.value(best)
+    factor = value / one.own if one.own else nan
+    stiffness = goal * float(np.exp(one.samples[best]))
+    return GoalNumber(one.path, one.own, key_unit(one.steps), value, factor, stiffness, status, reason)

@@ -21,6 +21,7 @@ from zwidth.device import address, build
 from zwidth.device.device import Device
 from zwidth.device.faults import dotted
 from zwidth.device.load import check
+from zwidth.device.schema.device_file import key_unit
 from zwidth.loop.controller import Controller
 from zwidth.loop.measured.held_response import response_of_port
 from zwidth.loop.measured.measured_port import MeasuredPort, changed_port, command_port
@@ -28,7 +29,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.operator import Operator
 from zwidth.model.response import Response
 from zwidth.progress import Progress
-from zwidth.study.sensitivity.number_text import number_obstacle, number_unit
+from zwidth.study.sensitivity.number_text import number_obstacle
 from zwidth.study.sensitivity.result import Sensitivities, Sensitivity
 
 STEP: Final = 4e-3  # relative, of the differences; of a delay of 0 in samples
@@ -95,7 +96,7 @@ def _sensitivity(
     largest: float,
 ) -> Sensitivity:
     """The sensitivity to one number; with the reason where there is none."""
-    path, unit = dotted(steps, device.document), number_unit(steps)
+    path, unit = dotted(steps, device.document), key_unit(steps)
     if steps not in DELAYS and (reason := number_obstacle(steps, value)):
         return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
     T = port.period

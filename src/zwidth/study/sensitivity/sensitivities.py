@@ -22,23 +22,18 @@ from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import device_of_point
-from zwidth.device.schema.device_file import mirror_image
+from zwidth.device.numbers import circumstance, typical_size
+from zwidth.device.schema.device_file import below_diagonal, key_unit, mirror_image
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 from zwidth.study.sensitivity.changed_devices import Change, ChangedDevices
 from zwidth.study.sensitivity.derivative import Derivative, central_derivative, one_sided_derivative
 from zwidth.study.sensitivity.measured_sensitivities import measured_sensitivities
-from zwidth.study.sensitivity.number_text import number_obstacle, number_unit
+from zwidth.study.sensitivity.number_text import number_obstacle
 from zwidth.study.sensitivity.optimum import OptimumError, optimum, second_peak_stiffness
 from zwidth.study.sensitivity.result import Group, Sensitivities, Sensitivity
 
-# Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
-NO_PROPERTY: Final = {
-    "assemblies": "an approximate angle from which the posture is found",
-    "reference": "the operating point, not a property of the device",
-    "workspace": "the operating point, not a property of the device",
-}
 ZERO: Final = "0 has no logarithm; the derivative by the number itself is given instead"
 WORTHLESS: Final = 1e-3  # largest estimated error of a derivative, per relative change; above it none is given
 
@@ -78,7 +73,7 @@ def sensitivities(
         stiffest, obstacle = optimum(loop, peak), ""
     except OptimumError as error:
         stiffest, obstacle = None, str(error)
-    numbers, varied = [], list(varied_numbers(device.document))
+    numbers, varied = [], list(property_numbers(device.document))
     changed = None
     if stiffest is not None:
         changes = dict(_changes(device.document, varied))
@@ -123,7 +118,7 @@ class _StiffnessDerivatives:
 
     def sensitivity(self, path: str, steps: KeyPath, value: float) -> Sensitivity:
         """The sensitivity to one number; of a number that cannot be varied, with the reason."""
-        unit, reason = number_unit(steps), number_obstacle(steps, value)
+        unit, reason = key_unit(steps), number_obstacle(steps, value)
         slope, side = Derivative(nan, nan), ""
         if not reason:
             slope, side, reason = self._slope(path)
@@ -186,26 +181,26 @@ def _changes(document: dict[str, Any], varied: list[tuple[str, KeyPath, float]])
     """Each number that can be varied, by its path; and the matrices and vectors of a plant, scaled as wholes."""
     for path, steps, value in varied:
         if not number_obstacle(steps, value):
-            yield path, Change(tuple(_places(steps, 1.0)), value, abs(value) or _scale(document, steps))
+            yield path, Change(tuple(moved_places(steps, 1.0)), value, abs(value) or typical_size(document, steps))
     known = {path: (steps, value) for path, steps, value in varied if value != 0.0}
     for name, paths in _groups(document).items():
         if name.startswith("plant."):
             parts = [known[path] for path in paths if path in known]
-            yield name, Change(tuple(place for part in parts for place in _places(*part)), 1.0, 1.0)
+            yield name, Change(tuple(place for part in parts for place in moved_places(*part)), 1.0, 1.0)
 
 
-def _places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
+def moved_places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, float]]:
     """A number as a multiple of an argument, and its mirror image where it stands in a symmetric matrix."""
     yield steps, multiple
     if (image := mirror_image(steps)) is not None:
         yield image, multiple
 
 
-def varied_numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
+def property_numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
     """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
     and above the diagonal."""
     for steps, value in address.numbers(document):
-        if not _no_property(steps) and not _mirrored(steps):
+        if not _no_property(steps) and not below_diagonal(steps):
             yield dotted(steps, document), steps, float(value)
     if not {"delay_samples", "delay_s"} & document.get("loop", {}).keys():
         yield "loop.delay_samples", ("loop", "delay_samples"), 0.0
@@ -215,7 +210,7 @@ def _no_property(steps: KeyPath) -> str:
     """Why a number is not a property of the linear device; "" if it is one."""
     if what := nonlinear_kind(steps):
         return f"{what}, which the chart leaves out: it is linear"
-    return NO_PROPERTY.get(str(steps[1]), "") if steps[0] == "mechanism" and len(steps) > 1 else ""
+    return circumstance(steps)
 
 
 def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -225,32 +220,10 @@ def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield dotted(steps, document), reason
 
 
-def _mirrored(steps: KeyPath) -> bool:
-    """Whether the path is an element below the diagonal of a symmetric matrix."""
-    return mirror_image(steps) is not None and int(steps[-2]) > int(steps[-1])
-
-
-def _scale(document: dict[str, Any], steps: KeyPath) -> float:
-    """Step scale of a number that is 0: the largest number of its list, else of its unit in the file, else 1."""
-    if steps[-1] == "delay_samples":
-        return 1.0
-    beside = [abs(v) for path, v in address.numbers(document) if _key(path) == _key(steps) and path[0] == steps[0]]
-    alike = [
-        abs(v)
-        for path, v in address.numbers(document)
-        if number_unit(path) == number_unit(steps) and np.isfinite(v)
-    ]
-    return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
-
-
-def _key(steps: KeyPath) -> str:
-    return next(str(step) for step in reversed(steps) if isinstance(step, str))
-
-
 def _groups(document: dict[str, Any]) -> dict[str, list[str]]:
     """Path -> paths of its members: each list and matrix, and each key over all elements of a list of tables."""
     members: dict[str, list[str]] = {}
-    for path, steps, _ in varied_numbers(document):
+    for path, steps, _ in property_numbers(document):
         whole = steps
         while whole and isinstance(whole[-1], int):
             whole = whole[:-1]
