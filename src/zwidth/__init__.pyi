@@ -40,6 +40,7 @@ from .model.reduction import ModelError as ModelError
 from .model.response import Response as Response
 from .model.response import ResponseError as ResponseError
 from .model.sweep_response import sweep_response as sweep_response
+from .show.app.workbench import Workbench as Workbench
 from .study.designs.study_file import read_study as read_study
 from .study.designs.sweep import run_study as run_study
 from .study.designs.sweep import sweep as sweep

@@ -22,7 +22,7 @@ def test_the_tour_has_the_six_causes() -> None:
 
 @cache
 def answer(number: int, solved: bool) -> Any:
-    """The verdict on the wall of a step, as it begins or as it is solved; of a step about rest whether it rests."""
+    """The verdict on the wall of a step, as it begins or solved; of a step about rest whether it rests."""
     step = STEPS[number]
     state, solution = step["state"], step["solution"] if solved else {}
     settings = {**state["settings"], **solution.get("settings", {})}
@@ -65,7 +65,7 @@ def test_numbers_in_the_texts_are_true() -> None:
     made = humming.simulate(stiffness=2600.0, damping=0.0)
     assert made.judgement.frequency == pytest.approx(40.0, abs=1.0)
     assert abs(made.force).max() == 5.0, "as loud as the motor's limit allows"
-    assert 2600.0 * 5e-5 / 2.0 == pytest.approx(0.065)
+    assert pytest.approx(0.065) == 2600.0 * 5e-5 / 2.0
 
 
 def test_the_tour_is_gone_through_in_the_page(browser, workbench) -> None:

@@ -34,6 +34,9 @@ OTHERS: Final = {
     ("response",): "part of the measurement, not a property of the device",
 }
 
+# Usual size of a length that is 0 and has no sign: the step or the noise of an encoder [m].
+STEP: Final = 1e-4
+
 
 @dataclass(frozen=True)
 class DeviceNumber:
@@ -286,7 +289,8 @@ def _slider(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[flo
         low, high = value / SPAN, value * SPAN
         scale = "linear" if whole else "logarithmic"
     elif value == 0.0 and (lowest >= 0.0 or _on_diagonal(steps)):
-        low, high = 0.0, SPAN * (1.0 if whole else typical_size(document, steps))
+        usual = STEP if schema.key_unit(steps) == "m" else 1.0 if whole else typical_size(document, steps)
+        low, high = 0.0, SPAN * usual
     else:
         away = 2.0 * abs(value) or typical_size(document, steps)  # not to 0: a vector may not be all zeros
         low, high = value - away, value + away

@@ -140,8 +140,9 @@ class Lane:
 class Connection:
     """What one page has asked and been told; `receive` takes its messages one after another."""
 
-    def __init__(self, pool: SparePool, send: Send) -> None:
-        self.send, self._lock = send, asyncio.Lock()
+    def __init__(self, pool: SparePool, send: Send, received: dict[str, Any]) -> None:
+        """received  takes the state that the page shows, as `state`"""
+        self.send, self._lock, self.received = send, asyncio.Lock(), received
         self.files: dict[str, FileRequest] = {}
         self.view = Lane(pool, self._send, self.files, confirms=True)
         self.beside = Lane(pool, self._send, self.files, confirms=False)
@@ -176,6 +177,8 @@ class Connection:
         if isinstance(request, FileRequest):
             await self._take_file(request)
         else:
+            if request.kind == "view":
+                self.received["state"] = request.state
             (self.beside if request.kind in BESIDE else self.view).ask(request)
 
     async def end(self) -> None:

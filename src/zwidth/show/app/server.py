@@ -151,7 +151,7 @@ def make_app(settings: Settings) -> FastAPI:
             await websocket.close(code=1008)
             return
         await websocket.accept()
-        opened = Connection(pool, websocket.send_bytes)
+        opened = Connection(pool, websocket.send_bytes, received)
         open_pages.add(opened)
         try:
             while True:

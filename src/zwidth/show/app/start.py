@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from zwidth.device import address
+from zwidth.device.device import Device
 from zwidth.device.read import bundled_names, device_text, first_bundled, parse_document
 from zwidth.device.text_file import read_text
 from zwidth.show.app.connection import LARGEST_FILE
@@ -32,15 +33,14 @@ def start_of(device: str | None, settings: Sequence[str]) -> dict[str, Any]:
     return {"state": state, "files": files}
 
 
-def start_of_document(document: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The same for a device in memory, whose text is written from its document."""
+def start_of_device(device: Device) -> dict[str, Any]:
+    """The same for a device in memory: its file is written from its document."""
     import tomlkit
 
-    file = f"{name}.toml"
-    return {
-        "state": {"device": file, "from_file": True, "settings": {}},
-        "files": [{"name": file, "text": tomlkit.dumps(dict(document))}],
-    }
+    file = f"{device.name[:80]}.toml".replace("/", "-").replace("\\", "-")
+    files = [{"name": file, "text": tomlkit.dumps(device.document)}]
+    files += _named_files(device.document, Path(device.label).parent)
+    return {"state": {"device": file, "from_file": True, "settings": {}}, "files": files}
 
 
 def _named_files(document: Mapping[str, Any], folder: Path) -> list[dict[str, str]]:
