@@ -81,7 +81,7 @@ export class App {
             return null;
           }
         },
-        onVibration: () => {},
+        onVibration: (trail, step) => this.deviceView.setVibration(trail, step),
         say: (sentence, wrong) => this.say(sentence, wrong),
       },
     );

@@ -30,8 +30,14 @@ export const HANDLE_VELOCITY = 5;
 export const ENERGY = 6;
 export const MOST_PERIODS = 4096; // in one call
 
+const TRAIL_STEP = 0.00025; // s between two amplitudes that are kept, or a period where that is longer
 const PAGE = 65536; // bytes of a page of WebAssembly's memory
 const LOST = 1.0; // m from the wall, beyond which the device is put back: a run that grew without bounds
+
+/** Periods between two rows of a trail. @param {number} period  [s] */
+export function strideOf(period) {
+  return Math.max(1, Math.floor(TRAIL_STEP / period + 1e-9));
+}
 
 export class TouchMachine {
   /** @param {WebAssembly.Module} module  of touch.wasm */
@@ -43,6 +49,9 @@ export class TouchMachine {
     this.at = { counts: 0, numbers: 0, memory: 0, ports: 0, noise: 0, outputs: 0 };
     this.random = 0x9e3779b9;
     this.push = 0;
+    /** @type {number[]} */
+    this.trail = []; // amplitudes during the last call of `run`, row by row; NaN: put back to the start
+    this.since = 0; // periods since the last of them
   }
 
   /**
@@ -54,6 +63,7 @@ export class TouchMachine {
     const before = this.blocks && this.state();
     const same = before !== null && this.blocks !== null && String(this.blocks.counts) === String(blocks.counts);
     this.blocks = blocks;
+    this.since = 0;
     const encoders = blocks.noise.length;
     let end = Number(this.kernel.__heap_base.value);
     const room = (/** @type {number} */ count) => {
@@ -82,6 +92,7 @@ export class TouchMachine {
   reset() {
     if (this.blocks) this.floats(this.at.memory, this.blocks.memory.length).set(this.blocks.memory);
     this.push = 0;
+    this.trail = Array(this.blocks?.counts[0] ?? 0).fill(NaN);
   }
 
   /** The memory of the device: states, queue, estimates. */
@@ -116,12 +127,22 @@ export class TouchMachine {
     ports[blocks.ports.stiffness] = wall.stiffness;
     ports[blocks.ports.damping] = wall.damping;
     ports[blocks.ports.wall_position] = wall.position;
-    ports[blocks.ports.push] = this.push;
-    ports[blocks.ports.last_push] = push;
-    this.push = push;
     this.drawNoise(count);
     const { counts, numbers, memory, noise, outputs } = this.at;
-    this.kernel.touch_periods(counts, numbers, memory, this.at.ports, noise, outputs, count);
+    const before = this.push;
+    const stride = strideOf(blocks.period);
+    this.trail = [];
+    for (let done = 0; done < count; ) {
+      const some = Math.min(stride - this.since, count - done);
+      ports[blocks.ports.push] = this.push;
+      this.push = before + ((push - before) * (done + some)) / count;
+      ports[blocks.ports.last_push] = this.push;
+      this.kernel.touch_periods(counts, numbers, memory, this.at.ports, noise + 8 * blocks.noise.length * done, outputs + 8 * OUTPUTS * done, some);
+      done += some;
+      this.since = (this.since + some) % stride;
+      if (this.since === 0) this.trail.push(...this.amplitudes());
+    }
+    this.push = push;
     const found = this.floats(outputs, OUTPUTS * count);
     const last = found[OUTPUTS * (count - 1) + READING];
     if (!(Math.abs(last) < LOST)) this.reset();
