@@ -52,7 +52,13 @@ def test_a_view_is_the_chart_of_python(client) -> None:
     assert head["touch"]["period"] == 0.00125
 
 
-HAND = {"arm_mass": 0.05, "arm_stiffness": 300.0, "arm_damping": 4.0, "grasp_stiffness": 800.0, "grasp_damping": 1.0}
+HAND = {
+    "arm_mass": 0.05,
+    "arm_stiffness": 300.0,
+    "arm_damping": 4.0,
+    "grasp_stiffness": 800.0,
+    "grasp_damping": 1.0,
+}
 
 
 @pytest.mark.parametrize("device", ["five-bar", "stamper-delta", "openwrist"])
