@@ -153,3 +153,36 @@ def test_a_model_without_a_picture_says_so(page) -> None:
     page.wait("zwidth.deviceView.scene.still")
     assert page.value("zwidth.deviceView.caption()").startswith("its vibration is drawn for the full model alone")
     assert not page.value("Boolean(zwidth.deviceView.moment)")
+
+
+def test_vibrations_are_drawn_while_sound_is_on(page) -> None:
+    touch(page)
+    page.page.click("button:has-text('Sound')")
+    page.wait("zwidth.contact.touch.sound")
+    page.page.evaluate("() => { window.since = performance.now(); zwidth.deviceView.vibration.clear(); }")
+    page.wait("zwidth.deviceView.vibration.clip?.began > since && zwidth.deviceView.vibration.clip.size > 1e-9")
+
+
+def test_a_device_that_was_put_back_has_a_new_history(page) -> None:
+    touch(page)
+    page.wait("zwidth.deviceView.vibration.history.length > 100")
+    found = page.page.evaluate(
+        """async () => {
+          const { TouchMachine } = await import("./touch_machine.js");
+          const { Vibration } = await import("./vibration.js");
+          const machine = new TouchMachine(await zwidth.contact.touch.module);
+          machine.load(zwidth.contact.touch.blocks);
+          const vibration = new Vibration();
+          vibration.modes = zwidth.deviceView.vibration.modes;
+          const rows = () => vibration.history.length / vibration.modes;
+          const wall = { law: 1, stiffness: 1e5, damping: 0, position: 0 };
+          const found = [];
+          for (const periods of [20, 2000, 30]) {
+            machine.run(periods, wall, 1);
+            vibration.add(Float64Array.from(machine.trail), 0.00125);
+            found.push(rows());
+          }
+          return [...found, vibration.history.every(Number.isFinite)];
+        }"""
+    )
+    assert found == [20, 0, 30, True]
