@@ -5,7 +5,6 @@
 import { ContactView } from "./contact_view.js";
 import { number, quantity } from "./canvas.js";
 import { blocksOf, pitchFor, Touch } from "./touch.js";
-import { strideOf } from "./touch_machine.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").Hand} Hand */
@@ -32,8 +31,7 @@ export class ContactPanel {
     this.touch = new Touch((outputs, trail) => {
       this.view.add(outputs);
       this.view.draw();
-      const period = this.touch.blocks?.period ?? 0;
-      this.listeners.onVibration(trail, strideOf(period) * period);
+      this.listeners.onVibration(trail, this.touch.blocks?.period ?? 0);
     });
     this.go = this.button("Let go", "Simulate the device, let go 1 mm inside the wall");
     this.feel = this.button("Touch", "The mouse becomes a hand on a spring");

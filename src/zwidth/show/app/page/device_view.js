@@ -87,9 +87,9 @@ export class DeviceView {
   /** @param {Frame} frame @param {string} device */
   setFrame(frame, device) {
     this.frame = frame;
-    const { modes } = this.vibration;
     this.vibration.setFrame(frame);
-    if (modes !== this.vibration.modes) this.moment = null;
+    if (device !== this.kept) this.vibration.clear();
+    if (!this.vibration.clip) this.moment = null;
     if (this.scene?.kind === "mechanism" && (device !== this.kept || !this.fits())) this.fit(device);
   }
 
@@ -97,7 +97,7 @@ export class DeviceView {
    * Draw the device as it vibrates now.
    *
    * @param {Float64Array} trail  (k, n) amplitudes of the modes of the frame's layer `touch`
-   * @param {number} step         s between two rows
+   * @param {number} step         s between two rows, a sampling period
    */
   setVibration(trail, step) {
     if (!this.vibration.known) return;
@@ -303,10 +303,10 @@ export class DeviceView {
     if (line) drawText(context, line, width / 2, height - 24, { align: "center", colour: colours.ink, halo: colours.surface, size: 11 });
   }
 
-  /** The line above the picture. */
+  /** The line below the device. */
   caption() {
     if (this.scene?.still) return this.scene.still;
-    return this.moment ? captionOf(this.moment.gain, this.calm.matches) : "";
+    return this.moment ? captionOf(this.moment.gain, this.calm.matches ? 0 : this.moment.slower) : "";
   }
 
   /** @param {CanvasRenderingContext2D} context @param {string} name @param {number} radius @param {string} fill @param {string} line */

@@ -30,14 +30,8 @@ export const HANDLE_VELOCITY = 5;
 export const ENERGY = 6;
 export const MOST_PERIODS = 4096; // in one call
 
-const TRAIL_STEP = 0.00025; // s between two amplitudes that are kept, or a period where that is longer
 const PAGE = 65536; // bytes of a page of WebAssembly's memory
 const LOST = 1.0; // m from the wall, beyond which the device is put back: a run that grew without bounds
-
-/** Periods between two rows of a trail. @param {number} period  [s] */
-export function strideOf(period) {
-  return Math.max(1, Math.floor(TRAIL_STEP / period + 1e-9));
-}
 
 export class TouchMachine {
   /** @param {WebAssembly.Module} module  of touch.wasm */
@@ -50,8 +44,7 @@ export class TouchMachine {
     this.random = 0x9e3779b9;
     this.push = 0;
     /** @type {number[]} */
-    this.trail = []; // amplitudes during the last call of `run`, row by row; NaN: put back to the start
-    this.since = 0; // periods since the last of them
+    this.trail = []; // amplitudes after each period of the last `run`, row by row; NaN: put back to the start
   }
 
   /**
@@ -63,7 +56,6 @@ export class TouchMachine {
     const before = this.blocks && this.state();
     const same = before !== null && this.blocks !== null && String(this.blocks.counts) === String(blocks.counts);
     this.blocks = blocks;
-    this.since = 0;
     const encoders = blocks.noise.length;
     let end = Number(this.kernel.__heap_base.value);
     const room = (/** @type {number} */ count) => {
@@ -130,17 +122,12 @@ export class TouchMachine {
     this.drawNoise(count);
     const { counts, numbers, memory, noise, outputs } = this.at;
     const before = this.push;
-    const stride = strideOf(blocks.period);
     this.trail = [];
-    for (let done = 0; done < count; ) {
-      const some = Math.min(stride - this.since, count - done);
-      ports[blocks.ports.push] = this.push;
-      this.push = before + ((push - before) * (done + some)) / count;
-      ports[blocks.ports.last_push] = this.push;
-      this.kernel.touch_periods(counts, numbers, memory, this.at.ports, noise + 8 * blocks.noise.length * done, outputs + 8 * OUTPUTS * done, some);
-      done += some;
-      this.since = (this.since + some) % stride;
-      if (this.since === 0) this.trail.push(...this.amplitudes());
+    for (let done = 0; done < count; done++) {
+      ports[blocks.ports.push] = before + ((push - before) * done) / count;
+      ports[blocks.ports.last_push] = before + ((push - before) * (done + 1)) / count;
+      this.kernel.touch_periods(counts, numbers, memory, this.at.ports, noise + 8 * blocks.noise.length * done, outputs + 8 * OUTPUTS * done, 1);
+      this.trail.push(...this.amplitudes());
     }
     this.push = push;
     const found = this.floats(outputs, OUTPUTS * count);

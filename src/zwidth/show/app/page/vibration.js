@@ -5,7 +5,7 @@
  *
  * with the rates of the drawn points and the coordinates of the modes from the server, and the amplitudes of the modes
  * from the touch. The mean goes over whole cycles of the predicted vibration, which it leaves as it is; what the hand
- * moves slowly is taken away. A clip of the last moments is played slowly, then one of the moments after it.
+ * moves slowly is taken away. A clip of the last moments is played slowly, then one of the latest moments.
  */
 
 /** @typedef {import("./connection.js").Frame} Frame */
@@ -17,13 +17,15 @@
  * @property {number} count
  * @property {number} largest      row in which a point is farthest from its place
  * @property {number} size         and how far that is [m]
+ * @property {number} slower       how many times more slowly it is played
  * @property {number} began        [ms]
  */
-/** @typedef {{amplitudes: Float64Array, gain: number}} Moment  amplitudes as they are drawn, and by how much enlarged */
+/** @typedef {{amplitudes: Float64Array, gain: number, slower: number}} Moment  amplitudes as they are drawn, enlarged */
 
-export const SLOWER = 20;
+const SLOWER = 20; // times, at least
+const SEEN = 10; // Hz that the eye follows: faster vibrations are played more slowly
 const LONGEST = 1; // s of motion that a clip holds at most
-const SHORTEST = 0.05; // s
+const PLAYED = 1; // s in which a clip is played, at least
 const CYCLES = 4; // of the predicted vibration in a clip
 const AVERAGED = 2; // cycles in the slow mean
 const SLOWEST = 4; // Hz, below which the mean and the clip get no longer
@@ -65,7 +67,12 @@ export class Vibration {
       this.shapes[name] = product(rates, coordinates, modes);
     }
     const predicted = frame.head.chart.wall?.frequency || UNPREDICTED;
-    this.frequency = Math.min(Math.max(predicted, SLOWEST), FASTEST);
+    this.frequency = Math.max(predicted, SLOWEST);
+  }
+
+  /** How many times more slowly a clip is played. */
+  get slower() {
+    return Math.max(SLOWER, roundNumber(this.frequency / SEEN, true));
   }
 
   clear() {
@@ -97,7 +104,7 @@ export class Vibration {
    * @returns {Moment | null}  null: too little has been touched yet
    */
   at(now, scale, still) {
-    const rowAt = (/** @type {Clip} */ clip) => Math.max(now - clip.began, 0) / 1000 / SLOWER / this.step;
+    const rowAt = (/** @type {Clip} */ clip) => Math.max(now - clip.began, 0) / 1000 / clip.slower / this.step;
     const unseen = this.clip && this.clip.size * scale * MOST < 1;
     if (!this.clip || unseen || rowAt(this.clip) >= this.clip.count - 1) this.clip = this.newClip(now) ?? this.clip;
     const clip = this.clip;
@@ -111,14 +118,15 @@ export class Vibration {
       const [from, to] = [clip.rows[n * row + k], clip.rows[n * (row + 1) + k]];
       return gain * (from + share * (to - from));
     });
-    return { amplitudes, gain };
+    return { amplitudes, gain, slower: clip.slower };
   }
 
   /** The latest moments around which the mean is known; null: there are not enough. @param {number} now @returns {Clip | null} */
   newClip(now) {
     const [n, { history, step }] = [this.modes, this];
-    const half = Math.max(1, Math.round(AVERAGED / this.frequency / 2 / step));
-    const count = Math.max(2, Math.round(Math.min(Math.max(CYCLES / this.frequency, SHORTEST), LONGEST) / step));
+    const half = Math.max(1, Math.round(AVERAGED / Math.min(this.frequency, FASTEST) / 2 / step));
+    const { slower } = this;
+    const count = Math.max(2, Math.round(Math.min(Math.max(CYCLES / this.frequency, PLAYED / slower), LONGEST) / step));
     const first = history.length / n - half - count;
     if (!n || !(first >= half)) return null;
     const rows = new Float64Array(n * count);
@@ -137,7 +145,7 @@ export class Vibration {
       const reached = this.farthest(rows.subarray(n * i, n * (i + 1)));
       if (reached > size) [largest, size] = [i, reached];
     }
-    return Number.isFinite(size) ? { rows, count, largest, size, began: now } : null;
+    return Number.isFinite(size) ? { rows, count, largest, size, slower, began: now } : null;
   }
 
   /** The largest displacement of a point [m]. @param {Float64Array} amplitudes */
@@ -156,18 +164,23 @@ export class Vibration {
   }
 }
 
-/** What is said of a picture. @param {number} gain @param {boolean} still */
-export function captionOf(gain, still) {
+/** What is said of a picture. @param {number} gain @param {number} slower  0: it does not move */
+export function captionOf(gain, slower) {
   const size = gain === 1 ? "true to size" : gain > 1 ? `enlarged ${gain} times` : `reduced ${Math.round(1 / gain)} times`;
-  return `${still ? "largest displacement" : `slow motion 1:${SLOWER}`}, ${size}`;
+  return `${slower ? `slow motion 1:${slower}` : "largest displacement"}, ${size}`;
 }
 
-/** 1, 2 or 5 times a power of ten, by which so many css px come to DRAWN_SIZE at most. @param {number} size */
+/** By how much a displacement of so many css px is enlarged, so that it comes to DRAWN_SIZE at most. @param {number} size */
 export function gainFor(size) {
-  const wanted = Math.min(DRAWN_SIZE / size, MOST);
-  const power = 10 ** Math.floor(Math.log10(wanted) + 1e-9);
-  const digit = [5, 2, 1].find((each) => each * power <= wanted * (1 + 1e-9)) ?? 1;
-  return Number((digit * power).toPrecision(1));
+  return roundNumber(Math.min(DRAWN_SIZE / size, MOST), false);
+}
+
+/** The next of 1, 2, 5, 10, ... above or below a number, or itself. @param {number} value @param {boolean} above */
+function roundNumber(value, above) {
+  const power = 10 ** Math.floor(Math.log10(value) + 1e-9);
+  const around = [1, 2, 5, 10].map((digit) => Number((digit * power).toPrecision(1)));
+  const found = above ? around.find((each) => each >= value * (1 - 1e-9)) : around.reverse().find((each) => each <= value * (1 + 1e-9));
+  return found ?? around[0];
 }
 
 /**
