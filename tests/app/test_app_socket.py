@@ -10,6 +10,8 @@ import pytest
 from app.socket_client import FIVE_BAR, SocketClient
 
 import zwidth
+from zwidth.model.modes import undamped_modes
+from zwidth.model.operator import Operator
 from zwidth.show.app.frames import pack_frame, unpack_frame
 
 PLANT = """name = "paddle"
@@ -48,6 +50,44 @@ def test_a_view_is_the_chart_of_python(client) -> None:
     assert arrays["chart.rings_ends"][-1] == len(arrays["chart.rings"])
     assert arrays["scene.handle"] == pytest.approx(point.posture.position, abs=1e-12)
     assert head["touch"]["period"] == 0.00125
+
+
+HAND = {
+    "arm_mass": 0.05,
+    "arm_stiffness": 300.0,
+    "arm_damping": 4.0,
+    "grasp_stiffness": 800.0,
+    "grasp_damping": 1.0,
+}
+
+
+@pytest.mark.parametrize("device", ["five-bar", "stamper-delta", "openwrist"])
+@pytest.mark.parametrize("hand", [None, HAND], ids=["free", "held"])
+def test_modes_move_the_drawn_handle_as_they_move_the_plant(client, device, hand) -> None:
+    state = {"device": device, **({} if hand is None else {"hand": hand})}
+    _, arrays = client.ask("view", state=state, layers=["chart", "scene", "touch"])
+    moved = arrays["scene.handle_rates"][0] @ arrays["touch.coordinates"]
+    assert len(arrays["scene.strokes_rates"]) == len(arrays["scene.strokes"])
+    assert len(arrays["scene.joints_rates"]) == len(arrays["scene.joints"])
+    operator = None if hand is None else Operator(*HAND.values())
+    point = zwidth.load(device).at(operator=operator)
+    modes = undamped_modes(point.plant.mass, point.plant.stiffness)[1]
+    assert arrays["touch.coordinates"] == pytest.approx(modes, rel=1e-9, abs=1e-9 * np.abs(modes).max())
+    if point.turns:
+        assert not moved.any(), "the handle of a wrist stays where it is"
+    else:
+        expected = point.plant.handle @ modes
+        assert arrays["scene.direction"] @ moved == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+
+
+def test_vibration_is_sent_where_there_is_one_to_draw(client) -> None:
+    _, arrays = client.ask("view", state=FIVE_BAR, layers=["chart", "scene"])
+    assert "scene.strokes_rates" not in arrays, "a drag does without"
+    head, arrays = client.ask("view", state={**FIVE_BAR, "model": "rigid"}, layers=["chart", "scene", "touch"])
+    assert "full model alone, not for 'rigid'" in head["scene"]["still"]
+    assert "scene.strokes_rates" not in arrays
+    head, arrays = client.ask("view", state={"device": "published-two-mass"}, layers=["chart", "scene", "touch"])
+    assert head["scene"] == {"kind": "chain"}
 
 
 def test_layers_are_those_of_python(client) -> None:

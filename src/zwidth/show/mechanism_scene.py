@@ -13,6 +13,7 @@ from zwidth.model.mechanism import FIXED, Mechanism
 from zwidth.model.posture import LinkPoints, Posture, link_points
 
 Floats = NDArray[np.float64]
+Place = tuple[int, Floats]  # a link, -1 for the base, and a point (3,) of its frame [m]
 
 SAME_POINT: Final = 1e-6  # share of the mechanism's size below which points are one
 AXIS_LENGTH: Final = 0.05  # m, to either side, of joint axes that are drawn alone
@@ -48,9 +49,7 @@ def mechanism_scene(mechanism: Mechanism, posture: Posture) -> MechanismScene:
     """The scene of a single posture that is OK."""
     placed = link_points(mechanism, posture)
     bodies = drawn_links(mechanism)
-    strokes = [link_stroke(mechanism, placed, i) for i in bodies]
-    if not np.ptp(np.vstack(strokes), axis=0).any():  # a wrist, of which nothing has a length
-        strokes = [_axis_stroke(mechanism, placed, i) for i in bodies]
+    strokes = [_points(placed, places) for places in stroke_places(mechanism, placed)]
     everything = np.vstack([np.zeros((1, 3)), *strokes, posture.position[None]])
     flat = projection_axes(everything)
     planar = np.ptp(np.delete(everything, flat, axis=1)) <= SAME_POINT * max(float(np.ptp(everything)), 1e-9)
@@ -79,37 +78,67 @@ def drawn_links(mechanism: Mechanism) -> list[int]:
     return [i for i, name in enumerate(mechanism.links.names) if "/" not in name]
 
 
+def stroke_places(mechanism: Mechanism, points_of_links: LinkPoints) -> list[list[Place]]:
+    """Of each drawn link the places that its stroke goes through, each on the link that carries it."""
+    bodies = drawn_links(mechanism)
+    places = [_link_places(mechanism, points_of_links, i) for i in bodies]
+    everything = np.vstack([_points(points_of_links, each) for each in places])
+    if np.ptp(everything, axis=0).any():
+        return places
+    return [_axis_places(mechanism, i) for i in bodies]  # a wrist, of which nothing has a length
+
+
 def link_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
     """The points that a link joins, (k, 3), from its joint to the joints and points that it carries."""
-    links, closures = mechanism.links, mechanism.closures
-    start = points_of_links.origin[link]
-    points = [points_of_links.tip[link]]
-    points += [points_of_links.origin[child] for child in np.flatnonzero(links.parent == link)]
-    for owners, at in ((closures.a, closures.point_a), (closures.b, closures.point_b)):
-        points += [points_of_links.of(link, at[k]) for k in np.flatnonzero(owners == link)]
-    if mechanism.handle_link == link:
-        points.append(points_of_links.of(link, mechanism.handle_point))
-    stroke = [start]
-    for point in points:
-        if all(np.linalg.norm(point - other) > SAME_POINT for other in stroke):
-            stroke += [point, start]  # out and back: a link may branch
-    return np.array(stroke)
+    return _points(points_of_links, _link_places(mechanism, points_of_links, link))
 
 
-def _axis_stroke(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> Floats:
-    """The joint's axis through its origin, (2, 3), where there is nothing else to draw."""
-    axis = points_of_links.rotation[link] @ mechanism.links.axis[link]
-    return np.asarray(points_of_links.origin[link] + AXIS_LENGTH * np.array([-axis, axis]))
+def joint_places(mechanism: Mechanism) -> list[Place]:
+    """Where joints move and loops meet; a free link has no such place."""
+    closures, joint = mechanism.closures, mechanism.links.joint
+    moving = [int(i) for i in np.flatnonzero(joint != FIXED) if not _is_free(mechanism, int(i))]
+    meeting = [(int(a), p) for a, p in zip(closures.a, closures.point_a, strict=True)]
+    return [*((i, np.zeros(3)) for i in moving), *meeting]
 
 
 def joint_points(mechanism: Mechanism, points_of_links: LinkPoints) -> Floats:
-    """Where joints move and loops meet, (k, 3); a free link has no such place."""
-    closures, joint = mechanism.closures, mechanism.links.joint
-    moving = [i for i in np.flatnonzero(joint != FIXED) if not _is_free(mechanism, int(i))]
-    meeting = [
-        points_of_links.of(int(a), p) if a >= 0 else p for a, p in zip(closures.a, closures.point_a, strict=True)
-    ]
-    return np.array([*points_of_links.origin[moving], *meeting]).reshape(-1, 3)
+    """The points of `joint_places`, (k, 3)."""
+    return _points(points_of_links, joint_places(mechanism))
+
+
+def _link_places(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> list[Place]:
+    """A link's joint, then out to each place that it carries and back: a link may branch."""
+    links, closures = mechanism.links, mechanism.closures
+    start: Place = (link, np.zeros(3))
+    places: list[Place] = [(link, links.tip[link])]
+    places += [(int(child), np.zeros(3)) for child in np.flatnonzero(links.parent == link)]
+    for owners, at in ((closures.a, closures.point_a), (closures.b, closures.point_b)):
+        places += [(link, at[k]) for k in np.flatnonzero(owners == link)]
+    if mechanism.handle_link == link:
+        places.append((link, mechanism.handle_point))
+    stroke, known = [start], [_point(points_of_links, start)]
+    for place in places:
+        point = _point(points_of_links, place)
+        if all(np.linalg.norm(point - other) > SAME_POINT for other in known):
+            stroke += [place, start]
+            known.append(point)
+    return stroke
+
+
+def _axis_places(mechanism: Mechanism, link: int) -> list[Place]:
+    """The two ends of a joint's axis, where there is nothing else to draw."""
+    axis = AXIS_LENGTH * mechanism.links.axis[link]
+    return [(link, -axis), (link, axis)]
+
+
+def _points(points_of_links: LinkPoints, places: list[Place]) -> Floats:
+    """The places (k, 3) in the base frame."""
+    return np.array([_point(points_of_links, place) for place in places]).reshape(-1, 3)
+
+
+def _point(points_of_links: LinkPoints, place: Place) -> Floats:
+    link, local = place
+    return local if link < 0 else points_of_links.of(link, local)
 
 
 def projection_axes(points: Floats) -> list[int]:

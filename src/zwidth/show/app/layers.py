@@ -18,6 +18,7 @@ from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State
 from zwidth.show.mass_chain import as_chain
 from zwidth.show.mechanism_scene import mechanism_scene
+from zwidth.show.scene_rates import mode_strokes
 
 if TYPE_CHECKING:
     pass
@@ -75,6 +76,9 @@ def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents
             if chart is None and name in OF_CHART:
                 chart = point.chart(decay="decay" in layers)
             found, more = LAYERS[name](point, chart, state, device)
+            if name == "scene" and "touch" in layers:  # the page draws it vibrating, with the modes of that layer
+                still, rates = _scene_rates(point)
+                found, more = found | still, more | rates
         except (ArithmeticError, ValueError, NotImplementedError) as error:
             if name == "chart":
                 raise
@@ -264,6 +268,24 @@ def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
         "driven": made.driven,
         "handle": made.handle,
         "direction": rendered[3:] if point.turns else rendered[:3],
+    }
+
+
+def _scene_rates(point: OperatingPoint) -> Contents:
+    """How the scene's points move per unit of each coordinate of the plant; or `still`, why that is not drawn."""
+    if point.mechanism is None:
+        return {}, {}
+    if point.load is not None:
+        return {"still": "its vibration is not drawn under load"}, {}
+    if point.model not in ("full", None):
+        return {"still": f"its vibration is drawn for the full model alone, not for {point.model!r}"}, {}
+    assert point.posture is not None
+    rates = mode_strokes(point.mechanism, point.posture, point.plant.size)
+    return {}, {
+        "strokes_rates": rates.strokes,
+        "joints_rates": rates.joints,
+        "driven_rates": rates.driven,
+        "handle_rates": rates.handle[None],
     }
 
 

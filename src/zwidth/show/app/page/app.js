@@ -86,7 +86,7 @@ export class App {
             return null;
           }
         },
-        onVibration: () => {},
+        onVibration: (trail, step) => this.deviceView.setVibration(trail, step),
         say: (sentence, wrong) => this.say(sentence, wrong),
       },
     );

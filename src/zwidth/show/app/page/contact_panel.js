@@ -17,7 +17,7 @@ export class ContactPanel {
   /**
    * @param {{tools: HTMLElement, canvas: HTMLCanvasElement, text: HTMLElement}} elements
    * @param {{onHand: (hand: Hand | null) => void, onSimulate: (options: object) => Promise<Frame | null>,
-   *   onVibration: (amplitudes: Float64Array) => void, say: (sentence: string, wrong?: boolean) => void}} listeners
+   *   onVibration: (trail: Float64Array, step: number) => void, say: (sentence: string, wrong?: boolean) => void}} listeners
    */
   constructor(elements, listeners) {
     this.elements = elements;
@@ -28,10 +28,10 @@ export class ContactPanel {
       },
       onGrab: () => {},
     });
-    this.touch = new Touch((outputs, amplitudes) => {
+    this.touch = new Touch((outputs, trail) => {
       this.view.add(outputs);
-      this.listeners.onVibration(amplitudes);
       this.view.draw();
+      this.listeners.onVibration(trail, this.touch.blocks?.period ?? 0);
     });
     this.go = this.button("Let go", "Simulate the device, let go 1 mm inside the wall");
     this.feel = this.button("Touch", "The mouse becomes a hand on a spring");

@@ -2,10 +2,12 @@
  * The device in its posture: links, joints, handle, the rendered direction and the wall across it.
  *
  * A planar device is seen along the axis in which it is flat, and its handle goes where it is dragged; a spatial one
- * is turned by dragging beside it. What is drawn is in metres; `place` turns that into pixels.
+ * is turned by dragging beside it. What is drawn is in metres; `place` turns that into pixels. While the device is
+ * touched, links, joints and handle are drawn as they vibrate.
  */
 
 import { axisUnit, drawText, fitCanvas, niceStep, niceTicks, palette, quantity, tickLabels } from "./canvas.js";
+import { captionOf, Vibration } from "./vibration.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").Vector} Vector */
@@ -43,6 +45,10 @@ export class DeviceView {
     this.held = null;
     this.last = { x: 0, y: 0 };
     this.kept = ""; // device whose scale is kept
+    this.vibration = new Vibration();
+    /** @type {import("./vibration.js").Moment | null} */
+    this.moment = null; // of the vibration that is drawn
+    this.calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.listen();
   }
 
@@ -81,7 +87,32 @@ export class DeviceView {
   /** @param {Frame} frame @param {string} device */
   setFrame(frame, device) {
     this.frame = frame;
+    this.vibration.setFrame(frame);
+    if (device !== this.kept) this.vibration.clear();
+    if (!this.vibration.clip) this.moment = null;
     if (this.scene?.kind === "mechanism" && (device !== this.kept || !this.fits())) this.fit(device);
+  }
+
+  /**
+   * Draw the device as it vibrates now.
+   *
+   * @param {Float64Array} trail  (k, n) amplitudes of the modes of the frame's layer `touch`
+   * @param {number} step         s between two rows, a sampling period
+   */
+  setVibration(trail, step) {
+    if (!this.vibration.known) return;
+    this.vibration.add(trail, step);
+    const before = this.vibration.clip;
+    this.moment = this.vibration.at(performance.now(), this.scale, this.calm.matches);
+    if (!this.calm.matches || this.vibration.clip !== before) this.draw();
+  }
+
+  /** Points as they are drawn: those of the posture, displaced by the vibration. @param {string} name */
+  drawnPoints(name) {
+    const points = this.points(name);
+    if (!this.moment) return points;
+    const moved = this.vibration.displacements(name, this.moment.amplitudes);
+    return points.map((value, i) => value + moved[i]);
   }
 
   /** Whether all of the device is in the picture, and fills it well. */
@@ -236,7 +267,7 @@ export class DeviceView {
     if (this.map && this.scene.planar) this.drawMap(context, width, height, colours);
     if (this.scene.planar) this.drawGrid(context, width, height, colours);
     this.drawWall(context, colours);
-    const strokes = this.points("strokes");
+    const strokes = this.drawnPoints("strokes");
     const ends = this.points("strokes_ends");
     let start = 0;
     context.lineCap = "round";
@@ -263,11 +294,24 @@ export class DeviceView {
     this.drawHandle(context, colours);
     this.drawForces(context, width, colours);
     this.drawScale(context, width, height, colours);
+    this.drawCaption(context, width, height, colours);
+  }
+
+  /** What has been done to the picture of a vibration, or why there is none. @param {CanvasRenderingContext2D} context @param {number} width @param {number} height @param {any} colours */
+  drawCaption(context, width, height, colours) {
+    const line = this.caption();
+    if (line) drawText(context, line, width / 2, height - 24, { align: "center", colour: colours.ink, halo: colours.surface, size: 11 });
+  }
+
+  /** The line below the device. */
+  caption() {
+    if (this.scene?.still) return this.scene.still;
+    return this.moment ? captionOf(this.moment.gain, this.calm.matches ? 0 : this.moment.slower) : "";
   }
 
   /** @param {CanvasRenderingContext2D} context @param {string} name @param {number} radius @param {string} fill @param {string} line */
   dots(context, name, radius, fill, line) {
-    const points = this.points(name);
+    const points = this.drawnPoints(name);
     context.fillStyle = fill;
     context.strokeStyle = line;
     context.lineWidth = 1.5;
@@ -313,12 +357,13 @@ export class DeviceView {
   drawHandle(context, colours) {
     const handle = this.place(this.points("handle"));
     const tip = this.tip();
+    const drawn = this.place(this.drawnPoints("handle"));
     arrow(context, handle, tip, colours.vermilion, 2.5);
     context.fillStyle = colours.vermilion;
     context.strokeStyle = colours.surface;
     context.lineWidth = 2;
     context.beginPath();
-    context.arc(handle.x, handle.y, 9, 0, 2 * Math.PI);
+    context.arc(drawn.x, drawn.y, 9, 0, 2 * Math.PI);
     context.fill();
     context.stroke();
     const name = this.scene.turns ? "axis of moments" : "rendered direction";

@@ -50,7 +50,7 @@ export function pitchFor(frequency) {
 }
 
 export class Touch {
-  /** @param {(outputs: Float64Array, amplitudes: Float64Array, target: number) => void} onMotion */
+  /** @param {(outputs: Float64Array, trail: Float64Array, target: number) => void} onMotion  rows of the machine's trail */
   constructor(onMotion) {
     this.onMotion = onMotion;
     /** @type {Promise<WebAssembly.Module>} */
@@ -127,7 +127,7 @@ export class Touch {
     if (periods < 1 || !this.machine) return;
     this.late -= periods * this.blocks.period;
     const outputs = this.machine.run(periods, this.wall, push);
-    this.onMotion(outputs.slice(), this.machine.amplitudes(), this.target);
+    this.onMotion(outputs.slice(), Float64Array.from(this.machine.trail), this.target);
   }
 
   /**
@@ -148,7 +148,7 @@ export class Touch {
       processorOptions: { module: await this.module, blocks: this.blocks, wall: this.wall, memory, factor: this.factor },
     });
     node.port.onmessage = ({ data }) => {
-      if (data.outputs) this.onMotion(data.outputs, data.amplitudes, this.target);
+      if (data.outputs) this.onMotion(data.outputs, data.trail, this.target);
       else if (data.memory && this.machine && data.memory.length === this.blocks?.memory.length) this.machine.floats(this.machine.at.memory, data.memory.length).set(data.memory);
     };
     node.connect(own.destination);

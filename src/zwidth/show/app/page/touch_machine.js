@@ -43,6 +43,8 @@ export class TouchMachine {
     this.at = { counts: 0, numbers: 0, memory: 0, ports: 0, noise: 0, outputs: 0 };
     this.random = 0x9e3779b9;
     this.push = 0;
+    /** @type {number[]} */
+    this.trail = []; // amplitudes after each period of the last `run`, row by row; NaN: put back to the start
   }
 
   /**
@@ -82,6 +84,7 @@ export class TouchMachine {
   reset() {
     if (this.blocks) this.floats(this.at.memory, this.blocks.memory.length).set(this.blocks.memory);
     this.push = 0;
+    this.trail = Array(this.blocks?.counts[0] ?? 0).fill(NaN);
   }
 
   /** The memory of the device: states, queue, estimates. */
@@ -116,12 +119,17 @@ export class TouchMachine {
     ports[blocks.ports.stiffness] = wall.stiffness;
     ports[blocks.ports.damping] = wall.damping;
     ports[blocks.ports.wall_position] = wall.position;
-    ports[blocks.ports.push] = this.push;
-    ports[blocks.ports.last_push] = push;
-    this.push = push;
     this.drawNoise(count);
     const { counts, numbers, memory, noise, outputs } = this.at;
-    this.kernel.touch_periods(counts, numbers, memory, this.at.ports, noise, outputs, count);
+    const before = this.push;
+    this.trail = [];
+    for (let done = 0; done < count; done++) {
+      ports[blocks.ports.push] = before + ((push - before) * done) / count;
+      ports[blocks.ports.last_push] = before + ((push - before) * (done + 1)) / count;
+      this.kernel.touch_periods(counts, numbers, memory, this.at.ports, noise + 8 * blocks.noise.length * done, outputs + 8 * OUTPUTS * done, 1);
+      this.trail.push(...this.amplitudes());
+    }
+    this.push = push;
     const found = this.floats(outputs, OUTPUTS * count);
     const last = found[OUTPUTS * (count - 1) + READING];
     if (!(Math.abs(last) < LOST)) this.reset();

@@ -32,6 +32,8 @@ class TouchProcessor extends AudioWorkletProcessor {
     this.phase = 0;
     /** @type {number[]} */
     this.kept = [];
+    /** @type {number[]} */
+    this.trail = [];
     this.unreported = 0;
     this.ended = false;
     this.port.onmessage = (event) => this.told(event.data);
@@ -73,6 +75,7 @@ class TouchProcessor extends AudioWorkletProcessor {
       for (let k = 0; k < found.length / OUTPUTS; k++) this.velocities[(this.done + k) % KEPT] = found[OUTPUTS * k + HANDLE_VELOCITY];
       this.done += found.length / OUTPUTS;
       this.kept.push(...found);
+      this.trail.push(...this.machine.trail);
     }
     for (let i = 0; i < channel.length; i++) {
       const at = (this.time + i / sampleRate) / T;
@@ -115,8 +118,9 @@ class TouchProcessor extends AudioWorkletProcessor {
   report(frames) {
     this.unreported += frames / sampleRate;
     if (this.unreported < REPORTED) return;
-    this.port.postMessage({ outputs: Float64Array.from(this.kept), amplitudes: this.machine.amplitudes() });
+    this.port.postMessage({ outputs: Float64Array.from(this.kept), trail: Float64Array.from(this.trail) });
     this.kept = [];
+    this.trail = [];
     this.unreported = 0;
   }
 }
