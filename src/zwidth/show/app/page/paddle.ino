@@ -126,14 +126,18 @@ void rest(int periods) {
 
 // --- a trial ----------------------------------------------------------------------------------------------------
 
-// Zero crossings of an oscillation, from the first to the last.
+// Zero crossings of an oscillation, from the first to the last; one that comes late, after more than twice the mean
+// time between two, is that of the slow motion left when the oscillation has died out.
 struct Crossings {
   int side, number;
   unsigned long first, last;
+  bool over;
 
   void add(float excursion) {
     int now = excursion > CROSSING_M ? 1 : excursion < -CROSSING_M ? -1 : side;
-    if (now != side && side != 0) {
+    over = over || (number > 1 && (period - last) * (number - 1) > 2 * (last - first));
+    if (over || now == side) return;
+    if (side != 0) {
       last = period;
       if (number++ == 0) first = period;
     }
@@ -149,7 +153,7 @@ struct Crossings {
 bool runTrial(float stiffness, float damping) {
   readPosition();
   const float middle = x;
-  Crossings crossings = {0, 0, 0, 0};
+  Crossings crossings = {0, 0, 0, 0, false};
   float early = 0, late = 0;
   bool saturated = false, tooFar = false;
   lastX = x;
