@@ -17,7 +17,7 @@ from tests.app.paddle_simulation import FRICTION, MASS, SKETCH, compile_sketch, 
 
 RECORD: Final = SKETCH.with_name("paddle_record.txt")
 DURATION: Final = 19.5  # s
-# Each sweep begins at 60 to 75 % of the stiffness at which its damping becomes unstable, and has ended before the next.
+# Each begins at about two thirds of the largest stable stiffness, and has ended when the next is sent.
 SWEEPS: Final = (
     (0.3, "sweep 0.5 750 1500 120"),
     (5.1, "sweep 1 1450 2500 180"),

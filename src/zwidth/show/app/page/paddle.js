@@ -229,7 +229,7 @@ export class PaddleStream {
             this.take(decoder.decode(read.value, { stream: true }));
           }
         } catch (error) {
-          if (source === this.source) this.listeners.onFault(sentenceOf(error));
+          if (source === this.source) this.hear({ kind: "fault", sentence: sentenceOf(error) });
         } finally {
           this.reader.releaseLock();
           this.reader = null;
