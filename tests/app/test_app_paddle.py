@@ -45,6 +45,12 @@ def parsed(*lines: str) -> list[dict]:
     return in_node("console.log(JSON.stringify(given.map(paddle.parseLine)));", *lines)
 
 
+def samples(printed: str) -> np.ndarray:
+    """Time [s], position [m] and force [N] of each whole sample that was printed, (3, n)."""
+    rows = re.findall(r"^sample (\S+) (\S+) (\S+)$", printed, re.MULTILINE)
+    return np.array(rows).astype(float).T
+
+
 def trials(printed: str) -> list[tuple[float, float, str, float]]:
     """Stiffness [N/m], damping [N s/m], verdict and frequency [Hz] of each trial that was printed."""
     rows = [line.split()[1:] for line in printed.splitlines() if line.startswith("trial ")]
@@ -101,10 +107,7 @@ def test_a_wall_pushes_out_and_a_line_ends_a_sweep(program) -> None:
     assert 0 < len(trials(printed)) < 3
     assert printed.count("# sweep ended") == 1
     assert printed.count("# not understood") == 2
-    rows = np.array(
-        [line.split()[1:] for line in printed.splitlines() if re.fullmatch(r"sample \S+ \S+ \S+", line)]
-    )
-    time, _, force = rows.astype(float).T
+    time, _, force = samples(printed)
     assert np.allclose(np.diff(time), 0.01)
     inside = time > 3.1
     assert np.all(force[inside] <= 0.0), "a wall does not pull"
@@ -114,10 +117,7 @@ def test_a_wall_pushes_out_and_a_line_ends_a_sweep(program) -> None:
 def test_a_turn_of_the_sensor_is_counted(program) -> None:
     """The sensor begins again 380 counts, 4.5 mm, from the start, and the motion goes on."""
     printed = run_sketch(program, 19.5, (0.1, "sweep 0 5 900 5"))
-    rows = np.array(
-        [line.split()[1:] for line in printed.splitlines() if re.fullmatch(r"sample \S+ \S+ \S+", line)]
-    )
-    position = rows[:, 1].astype(float)
+    position = samples(printed)[1]
     assert np.abs(position).max() > 0.006
     assert np.abs(np.diff(position)).max() < 0.005
 
@@ -170,6 +170,12 @@ FAULTS = {
     "\x00\ufffd\x7f": '"???" must begin',
     "y" * 201: "is longer than 200 characters",
 }
+
+
+def test_the_lines_of_the_page_about_the_format_are_read() -> None:
+    text = (SKETCH.parents[5] / "docs" / "paddle.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^    (#.*|trial .*|sample .*)$", text, re.MULTILINE)
+    assert [one["kind"] for one in parsed(*lines)] == ["header", "comment", "sample", "trial"]
 
 
 def test_malformed_lines_are_faults_in_words() -> None:
