@@ -188,7 +188,7 @@ void sweep(float damping, float from, float to, float step) {
   lateBegins = 0;
   bool unstable = false;
   // counted, since a sum of many steps in single precision drifts
-  for (long k = 0; from + k * step <= to * 1.000001f && !unstable && !Serial.available(); ++k) {
+  for (long k = 0; from + k * step <= to * 1.000001f && !unstable; ++k) {
     unstable = runTrial(from + k * step, damping);
   }
   Serial.print("# sweep ended, periods that began late: ");

@@ -226,7 +226,7 @@ export class PaddleStream {
         try {
           for (let read = await this.reader.read(); !read.done; read = await this.reader.read()) {
             if (source !== this.source) break;
-            this.take(decoder.decode(read.value, { stream: true }));
+            this.take(decoder.decode(read.value));
           }
         } catch (error) {
           if (source === this.source) this.hear({ kind: "fault", sentence: sentenceOf(error) });
