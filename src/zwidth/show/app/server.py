@@ -33,6 +33,8 @@ TYPES: Final = {
     ".svg": "image/svg+xml",
     ".ino": "text/plain; charset=utf-8",
     ".json": "application/json",
+    ".csv": "text/csv; charset=utf-8",
+    ".txt": "text/plain; charset=utf-8",
 }
 POLICY: Final = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; "
