@@ -283,3 +283,35 @@ def inked(page: Page, canvas: str) -> int:
             canvas,
         )
     )
+
+
+def test_a_recorded_paddle_appears_as_points(page) -> None:
+    page.page.click("#paddle summary")
+    page.page.evaluate(
+        """async () => {
+          const record = await (await fetch("paddle_record.txt")).text();
+          await zwidth.paddle.stream.replay(record, Infinity);
+        }"""
+    )
+    page.settle()
+    assert page.value("zwidth.chart.points.length") == 20
+    assert page.value("zwidth.chart.points.some((point) => point.measured === 'unstable')")
+    with page.page.expect_download() as waiting:
+        page.page.click("#paddle button:has-text('Save trials')")
+    assert Path(waiting.value.path()).read_text().startswith("stiffness_N_per_m,damping_Ns_per_m")
+
+
+def test_a_handle_dragged_too_far_goes_back_to_where_it_was_last(page) -> None:
+    handle = page.value("Object.values(zwidth.deviceView.place(zwidth.deviceView.points('handle')))")
+    box = page.page.locator("#scene").bounding_box()
+    start = (box["x"] + handle[0], box["y"] + handle[1])
+    page.page.mouse.move(*start)
+    page.page.mouse.down()
+    page.page.mouse.move(start[0] + 20.0, start[1], steps=5)
+    page.settle()
+    page.page.mouse.move(box["x"] + box["width"] + 600.0, start[1], steps=5)
+    page.wait("zwidth.unreached")
+    page.page.mouse.up()
+    page.settle()
+    page.wait("!document.getElementById('status').classList.contains('wrong')")
+    assert 0.0 < page.value("zwidth.state.position")[0] < 0.35

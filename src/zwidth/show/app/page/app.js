@@ -14,6 +14,7 @@ import { NumbersPanel } from "./numbers_panel.js";
 import { DeviceView } from "./device_view.js";
 import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
+import { PaddlePanel } from "./paddle_panel.js";
 import { Tour } from "./tour.js";
 import { saveBytes } from "./files.js";
 
@@ -49,6 +50,9 @@ export class App {
     this.waits = false; // a view has come that is not drawn yet
     this.rests = 0;
     this.face = "chart";
+    this.unreached = false; // whether the handle is dragged to where it cannot be
+    /** @type {import("./state.js").Vector | null} */
+    this.reached = null; // where it was last
     this.chart = new ChartView(byId("chart"), {
       onWall: (wall, drag) => this.store.set({ wall }, drag),
       onRelease: () => this.store.release(),
@@ -60,6 +64,7 @@ export class App {
       onRelease: () => {
         this.deviceView.wanted = null;
         this.store.release();
+        if (this.unreached) this.store.set({ position: this.reached });
       },
     });
     this.numbers = new NumbersPanel(byId("number-list"), {
@@ -90,6 +95,15 @@ export class App {
         say: (sentence, wrong) => this.say(sentence, wrong),
       },
     );
+    this.paddle = new PaddlePanel(byId("paddle"), {
+      onTrials: (trials) => {
+        this.chart.points = trials.map((trial) => ({ stiffness: trial.stiffness, damping: trial.damping, measured: trial.verdict }));
+        this.chart.follow();
+        this.drawSoon();
+      },
+      wall: () => this.state.wall ?? null,
+      stiffnessMax: () => this.view?.head.chart.stiffness_max ?? 0,
+    });
     this.tour = new Tour(byId("card"), {
       onState: (next) => this.store.set({ ...NOWHERE, ...next }),
       onEnd: () => byId("tour").focus(),
@@ -153,6 +167,7 @@ export class App {
   async ask() {
     clearTimeout(this.rests);
     this.rests = setTimeout(() => void this.askMore(), RESTS);
+    const state = this.state;
     const layers = ["chart", "scene", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers(), ...(this.contact.touching ? ["touch"] : [])];
     try {
       const frame = await this.connection.ask("view", { state: this.sent(), layers });
@@ -163,7 +178,11 @@ export class App {
       this.contact.update(frame, this.state.wall ?? null);
       this.say("");
       this.drawSoon();
+      this.unreached = false;
+      this.reached = state.position ?? null;
     } catch (error) {
+      // a handle that is dragged beyond its reach goes back to where it was last
+      this.unreached = error instanceof Refusal && this.deviceView.held === "handle";
       this.fail(error);
     }
   }

@@ -178,9 +178,10 @@ export class DeviceView {
   /** @param {number} x @param {number} y @returns {"handle" | "tip" | "view"} */
   under(x, y) {
     const tip = this.tip();
-    if (Math.hypot(tip.x - x, tip.y - y) < REACH) return "tip";
     const handle = this.place(this.points("handle"));
-    return Math.hypot(handle.x - x, handle.y - y) < REACH ? "handle" : "view";
+    const [toTip, toHandle] = [Math.hypot(tip.x - x, tip.y - y), Math.hypot(handle.x - x, handle.y - y)];
+    if (Math.min(toTip, toHandle) > REACH) return "view";
+    return toHandle <= toTip ? "handle" : "tip";
   }
 
   /** Where the arrow of the rendered direction ends [css px]. */
