@@ -415,7 +415,7 @@ export class DeviceView {
         context.stroke();
         context.globalAlpha = 1;
         if (n && y > 16 && y < height - 26) drawText(context, labels[t], 4, y - 3, { colour: colours.grey, size: 11, halo: colours.surface });
-        else if (!n && x > 40 && x < width - 40) drawText(context, labels[t], x + 3, height - 5, { colour: colours.grey, size: 11, halo: colours.surface });
+        else if (!n && x > 40 && x < width - 80) drawText(context, labels[t], x + 3, height - 5, { colour: colours.grey, size: 11, halo: colours.surface });
       });
     }
     drawText(context, `${"xyz"[i]} → [${axis.unit}]`, width - 6, height - 5, { align: "right", colour: colours.grey, size: 11, halo: colours.surface });
@@ -461,8 +461,11 @@ export class DeviceView {
         p[i] = x[column] - dx / 2;
         p[j] = y[row] + dy / 2;
         const at = this.place(p);
+        // from one pixel's edge to another: a gap or an overlap would be seen as a line
+        const [left, top] = [Math.round(at.x), Math.round(at.y)];
+        const [right, bottom] = [Math.round(at.x + dx * this.scale), Math.round(at.y + dy * this.scale)];
         context.fillStyle = shade(high > low ? (value - low) / (high - low) : 0.5);
-        context.fillRect(Math.floor(at.x), Math.floor(at.y), Math.ceil(dx * this.scale) + 1, Math.ceil(dy * this.scale) + 1);
+        context.fillRect(left, top, right - left, bottom - top);
       }
     }
     context.globalAlpha = 1;
