@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from app.page_driver import Page
 from app.test_app_socket import PLANT
@@ -315,3 +316,31 @@ def test_a_handle_dragged_too_far_goes_back_to_where_it_was_last(page) -> None:
     page.settle()
     page.wait("!document.getElementById('status').classList.contains('wrong')")
     assert 0.0 < page.value("zwidth.state.position")[0] < 0.35
+
+
+def test_a_response_is_dropped_and_charted_beside_the_model(page) -> None:
+    frequency = np.geomspace(1.0, 490.0, 300)
+    plant = zwidth.Plant.one_mass(mass=0.03, damping=1.0)
+    measured = sampled_response(zwidth.Loop(plant, sampling_period=0.001), frequency)
+    rows = "\n".join(f"{f},{z.real},{z.imag}" for f, z in zip(frequency, measured, strict=True))
+    page.drop(paddle_toml=PLANT)
+    page.wait("zwidth.device?.name === 'paddle'")
+    page.settle()
+    modelled = page.stiffness_max
+    page.drop(sweep_csv=f"frequency_Hz,real_m_per_N,imag_m_per_N\n{rows}\n")
+    page.wait("zwidth.device?.given_by === 'response'")
+    page.settle()
+    assert page.value("zwidth.view.head.chart.sampling_period") == 0.001
+    nominal = page.value("Math.max(...zwidth.view.arrays['chart.rings'].values.filter((value, n) => n % 2 === 0))")
+    assert nominal == pytest.approx(modelled, rel=0.05)
+    assert page.page.locator("#legend").text_content().startswith("pinned 1")
+
+
+def sampled_response(loop, frequency):
+    """P(e^(jwT)) of a loop, as its circle's factors have it."""
+    from zwidth.chart.nyquist import terms_along
+    from zwidth.loop.circle_factors import circle_factors
+    from zwidth.loop.loop_table import table_of_loops
+
+    A, AP, _ = terms_along(circle_factors(table_of_loops(loop)), 2.0 * np.pi * frequency * loop.period).T
+    return AP / A

@@ -1,7 +1,8 @@
 """The page against how it looked: thumbnails, for gross changes only.
 
 Letters and lines may differ from one machine to the next; a view that is missing, a colour scheme that is not
-followed or a layout that falls apart may not. `ZWIDTH_WRITE_SCREENS=1` writes the thumbnails anew: look at them then.
+followed or a layout that falls apart may not. `ZWIDTH_WRITE_SCREENS=1` writes the thumbnails anew: look at them
+then.
 """
 
 from __future__ import annotations

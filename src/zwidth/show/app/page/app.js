@@ -25,6 +25,8 @@ const FAST = ["frequency", "decay", "models", "hands"]; // layers that come with
 const SLOW = ["guarantees", "bounds"]; // and those that follow when the hand rests
 const RESTS = 250; // ms without a change after which they are asked for
 
+// Columns by which a table of measurements is a response and not a list of walls.
+const RESPONSE = /real_m_per_N|force_command_N/;
 // A state that says nothing but which device.
 const NOWHERE = { from_file: false, settings: {}, position: null, direction: null, axis: null, assembly: null, model: null, operator: null, hand: null };
 
@@ -567,12 +569,25 @@ export class App {
       const texts = await Promise.all([...files].map(async (file) => ({ name: file.name, text: await file.text() })));
       for (const { name, text } of texts) await this.connection.sendFile(name, text);
       const device = texts.find(({ name }) => name.toLowerCase().endsWith(".toml"));
+      const response = texts.find(({ text }) => RESPONSE.test(text.slice(0, text.indexOf("\n"))));
       if (device) this.choose(device.name);
+      else if (response) await this.showResponse(response.name);
       else await this.showPoints(texts[0].name);
     } catch (error) {
       this.fail(error);
     }
     byId("file").value = "";
+  }
+
+  /** A measured response, sampled as the present device; its chart stays for comparison. @param {string} file */
+  async showResponse(file) {
+    const name = `${file.replace(/\.\w+$/, "")}.toml`;
+    const quoted = (/** @type {string} */ text) => JSON.stringify(text);
+    const period = this.view?.head.chart.sampling_period ?? 0.001;
+    const text = `name = ${quoted(file)}\n\n[response]\nfile = ${quoted(file)}\n\n[loop]\nsampling_period_s = ${period}\n`;
+    await this.connection.sendFile(name, text);
+    this.pin();
+    this.choose(name);
   }
 
   /** @param {string} file */
