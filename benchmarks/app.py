@@ -160,7 +160,7 @@ def cases() -> Cases:
     def answer(asked: State) -> float:
         return float(len(pack_frame(*view(opened, asked, ("chart", "scene")))))
 
-    return {"app: a view": TimedCase(answer, one)}
+    return {"a view of a drag": TimedCase(answer, one)}
 
 
 def main() -> None:

@@ -51,7 +51,7 @@ def run_natively(device: TouchNumbers, ports: np.ndarray) -> np.ndarray:
 def cases() -> Cases:
     """A call of many periods."""
     device, ports = device_and_ports("five-bar")
-    name = f"touch: {PERIODS} periods of {SUBSTEPS} substeps"
+    name = f"{PERIODS} periods of {SUBSTEPS} substeps"
     return {name: TimedCase(lambda: float(run_natively(device, ports)[-1, 0]))}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import OrderedDict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -25,12 +24,11 @@ class OpenedDevices:
     """Devices by their names; files that the page sends lie in the working folder of this process, and no others
     are ever read.
 
-    folder  an empty folder, made the working folder: a device file's label is then its bare name, and the files
-            that it names lie beside it
+    folder  an empty folder, the working folder of the computing process: a device file's label is then its bare
+            name, and the files that it names lie beside it
     """
 
     def __init__(self, folder: Path) -> None:
-        os.chdir(folder)
         self.folder = folder
         self.texts: dict[str, str] = {}
         self._kept: OrderedDict[tuple[Any, ...], Device] = OrderedDict()

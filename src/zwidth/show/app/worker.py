@@ -161,6 +161,7 @@ def work() -> None:
         with ended_with_its_starter():
             from zwidth.show.app.answers import Answers
 
+            os.chdir(sys.argv[2])  # a device file's label is its bare name, see `opened`
             answers = Answers(Path(sys.argv[2]), lambda frame: send(PROGRESS, frame))
             answers.warm_up()
         send(READY)
