@@ -262,6 +262,7 @@ def test_two_tabs_do_not_disturb_each_other_in_the_browser(page) -> None:
 )
 def test_the_page_fits_and_follows_the_colour_scheme(browser, workbench, width, height, scheme) -> None:
     with Page(browser, workbench, width, height, color_scheme=scheme) as page:
+        page.settle()
         assert page.value("document.documentElement.dataset.theme") == scheme
         assert page.value("document.documentElement.scrollWidth") <= width, "nothing is cut off at the side"
         assert inked(page, "chart") > 500

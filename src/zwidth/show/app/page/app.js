@@ -49,7 +49,8 @@ export class App {
     this.view = null;
     this.opened = "";
     this.keys = "";
-    this.waits = false; // a view has come that is not drawn yet
+    this.waits = false; // something is to be drawn on the next frame
+    this.undrawn = 0; // views that have come and are not confirmed yet
     this.rests = 0;
     this.face = "chart";
     this.unreached = false; // whether the handle is dragged to where it cannot be
@@ -132,6 +133,7 @@ export class App {
 
   /** Ask anew for everything that is shown. */
   refresh() {
+    this.undrawn = 0;
     this.opened = "";
     this.changed(this.state);
   }
@@ -174,6 +176,7 @@ export class App {
     try {
       const frame = await this.connection.ask("view", { state: this.sent(), layers });
       this.view = frame;
+      this.undrawn++;
       this.chart.setFrame(frame);
       this.deviceView.setFrame(frame, this.opened);
       this.tour.look(this.state, frame.head.chart.wall?.verdict, false);
@@ -248,7 +251,7 @@ export class App {
     requestAnimationFrame(() => {
       this.waits = false;
       this.draw();
-      this.connection.confirm();
+      for (; this.undrawn > 0; this.undrawn--) this.connection.confirm();
     });
   }
 

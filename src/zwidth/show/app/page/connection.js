@@ -108,6 +108,12 @@ export class Connection {
       return;
     }
     this.waiting.delete(head.id);
+    for (const [number, each] of this.waiting) {
+      if (each.kind === head.kind && number < head.id && head.kind !== "file") {
+        this.waiting.delete(number);
+        each.reject(new Dropped("a newer request took its place"));
+      }
+    }
     if (head.ok) waiting.resolve(frame);
     else {
       if (head.kind === "view") this.confirm();
@@ -116,7 +122,8 @@ export class Connection {
   }
 
   /**
-   * Ask; a request of the same kind that still waits is dropped, since the server drops it too.
+   * Ask; a request of the same kind that still waits is dropped, since the server drops it too. Of views each that is
+   * answered is shown, so that the picture follows a hand that moves faster than they are computed.
    *
    * @param {string} kind
    * @param {object} content
@@ -126,7 +133,7 @@ export class Connection {
   ask(kind, content, progress) {
     const id = ++this.number;
     for (const [number, each] of this.waiting) {
-      if (each.kind === kind && kind !== "file") {
+      if (each.kind === kind && kind !== "file" && kind !== "view") {
         this.waiting.delete(number);
         each.reject(new Dropped("a newer request took its place"));
       }
