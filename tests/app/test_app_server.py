@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import re
+import signal
 import subprocess
 import sys
 
@@ -127,6 +128,16 @@ def test_another_address_needs_a_token_and_says_so() -> None:
             pass
         process.terminate()
         assert process.wait(20) in (0, -15)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="ctrl-C is no signal there that a test can send")
+def test_ctrl_c_ends_it_as_it_said() -> None:
+    command = [sys.executable, "-m", "zwidth", "app", "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert "ctrl-C ends it" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30)[1] == "zwidth: the workbench has ended\n"
+        assert process.returncode == 0
 
 
 def test_bad_command_lines_are_refused_on_one_line() -> None:

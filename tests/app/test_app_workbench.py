@@ -39,7 +39,7 @@ def test_a_device_in_memory_is_opened_and_comes_back_changed(browser, bench) -> 
 
 def test_a_notebook_shows_the_page_in_a_frame(bench) -> None:
     assert f'src="{bench.address}"' in bench._repr_html_()
-    with urllib.request.urlopen(bench.address) as answer:
+    with urllib.request.urlopen(bench.address, timeout=30) as answer:
         assert (
             "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
             in answer.headers["Content-Security-Policy"]
@@ -59,6 +59,12 @@ def test_a_device_that_was_not_moved_comes_back_itself() -> None:
         assert own.device is device
     with pytest.raises(OSError, match=r"refused|reset"):
         urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5)
+
+
+def test_a_server_that_does_not_start_is_said(monkeypatch) -> None:
+    monkeypatch.setattr("uvicorn.Server.run", lambda *_: None)
+    with pytest.raises(RuntimeError, match="did not start"):
+        zwidth.Workbench(zwidth.load("hapkit-course"))
 
 
 def test_what_is_no_device_is_refused() -> None:

@@ -6,6 +6,7 @@ import asyncio
 import socket
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import uvicorn
@@ -23,29 +24,47 @@ def serve(
     """Serve the page until ctrl-C. Raises BadInput where no port can be had."""
     listening = listen(host, port)
     settings = Settings(host, listening.getsockname()[1], token, start)
-    say(*announcement(settings))
     server = make_server(settings)
-    if browser:
-        webbrowser.open(address_of(settings))
-    asyncio.run(server.serve(sockets=[listening]))
+
+    def announce() -> None:
+        say(*announcement(settings))
+        if browser:
+            webbrowser.open(address_of(settings))
+
+    server.on_start = announce
+    # The server ends its connections and then raises what ended it; here that is what the user was told to type.
+    with suppress(KeyboardInterrupt):
+        asyncio.run(server.serve(sockets=[listening]))
     say("zwidth: the workbench has ended")
 
 
-def make_server(settings: Settings) -> uvicorn.Server:
-    """The server, quiet, with limits on what it reads."""
+class Server(uvicorn.Server):
+    """A server that calls `on_start` when it listens and ends in order at ctrl-C."""
+
+    on_start: Callable[[], None] | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen, then call `on_start`."""
+        await super().startup(sockets)
+        if self.on_start:
+            self.on_start()
+
+
+def make_server(settings: Settings) -> Server:
+    """The server, quiet, with limits on what it reads; what it needs is imported here, not at the first request."""
     assert LARGEST_MESSAGE > LARGEST_FILE
-    return uvicorn.Server(
-        uvicorn.Config(
-            make_app(settings),
-            log_level="error",
-            access_log=False,
-            ws="websockets-sansio",
-            ws_max_size=LARGEST_MESSAGE,
-            ws_per_message_deflate=False,
-            timeout_graceful_shutdown=2,
-            server_header=False,
-        )
+    config = uvicorn.Config(
+        make_app(settings),
+        log_level="error",
+        access_log=False,
+        ws="websockets-sansio",
+        ws_max_size=LARGEST_MESSAGE,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=2,
+        server_header=False,
     )
+    config.load()
+    return Server(config)
 
 
 def listen(host: str, port: int) -> socket.socket:

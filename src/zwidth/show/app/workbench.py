@@ -37,7 +37,8 @@ class Workbench:
 
         device  any device in memory; measurements that its file names are read from beside that file
         port    0: any that is free
-        Raises  BadInput  (show.cli.errors) where no port can be had; TypeError for what is no device
+        Raises  BadInput  (show.cli.errors) where no port can be had; TypeError for what is no device; RuntimeError
+                where the server does not start
         """
         require("device", device, Device)
         self._device = device
@@ -50,6 +51,9 @@ class Workbench:
         end = time.monotonic() + LONGEST_START
         while not self._server.started and self._thread.is_alive() and time.monotonic() < end:
             time.sleep(0.01)
+        if not self._server.started:
+            self.close()
+            raise RuntimeError(f"the workbench at {self.address} did not start within {LONGEST_START:g} s")
 
     @property
     def settings(self) -> dict[str, Any]:
