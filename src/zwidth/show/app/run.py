@@ -51,7 +51,7 @@ class Server(uvicorn.Server):
 
 
 def make_server(settings: Settings) -> Server:
-    """The server, quiet, with limits on what it reads; what it needs is imported here, not at the first request."""
+    """The server, quiet, with limits on what it reads; what it needs is imported here and now."""
     assert LARGEST_MESSAGE > LARGEST_FILE
     config = uvicorn.Config(
         make_app(settings),
