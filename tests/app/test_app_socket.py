@@ -155,7 +155,7 @@ def test_sensitivities_goal_map_and_contact_are_answered(client) -> None:
     assert np.isfinite(arrays["values"]).any()
     head, arrays = client.ask("contact", state=FIVE_BAR)
     made = zwidth.load("five-bar").at().simulate(stiffness=4000.0, damping=10.0)
-    assert np.array_equal(arrays["position_m"], made.position)
+    assert np.array_equal(arrays["reading"], made.position)
     assert head["stable"] is made.stable
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from app.page_driver import Page
 
+import zwidth
+
 WALL = {"stiffness": 8050.0, "damping": 10.0}  # not stable in the page's hand: it grows by 0.4 % in each period
 # Handle's output in every period, and amplitudes after it; run as the page runs it, with a push that grows.
 RUN = """async ([periods, push]) => {
@@ -187,3 +189,64 @@ def test_a_device_that_was_put_back_has_a_new_history(page) -> None:
         }"""
     )
     assert found == [20, 0, 30, True]
+
+
+def let_go(page: Page, **state: object) -> None:
+    """Let the device go at a wall and wait for the picture of its vibration."""
+    page.page.evaluate("(state) => zwidth.store.set(state)", state)
+    page.settle()
+    page.page.click("button:has-text('Let go')")
+    page.wait("zwidth.deviceView.replayed && zwidth.deviceView.moment")
+
+
+def assert_swings(page: Page, drawn: np.ndarray, moved: np.ndarray) -> None:
+    """Of a motion from its start on, what is left without the slow mean is drawn."""
+    half = page.value("zwidth.deviceView.vibration.lengths.half")
+    moved = moved[: len(drawn) + 2 * half + 1]
+    sums = np.append(0.0, np.cumsum((moved[1:] + moved[:-1]) / 2.0))
+    mean = (sums[2 * half :] - sums[: -2 * half]) / (2 * half)
+    swing = (moved[half : len(moved) - half] - mean)[
+        1:
+    ]  # an amplitude stands after its period: at the next sample
+    assert drawn == pytest.approx(swing, abs=0.02 * np.abs(swing).max())
+
+
+def test_a_device_that_is_let_go_vibrates_in_slow_motion_as_it_is_simulated(page) -> None:
+    let_go(page, wall=WALL)
+    made = zwidth.load("five-bar").at().simulate(stiffness=WALL["stiffness"], damping=WALL["damping"])
+    direction = np.array(page.value("[...zwidth.deviceView.points('direction')]"))
+    along = np.array(page.value(PLAYED)["rows"]) @ direction
+    assert_swings(page, along, made.handle)
+    began = page.value("zwidth.deviceView.vibration.clip.began")
+    page.wait(f"zwidth.deviceView.vibration.clip.began > {began}")  # again and again
+    page.change(wall={"stiffness": 3000, "damping": 10})
+    page.settle()
+    assert not page.value("zwidth.deviceView.moment"), "until another view comes"
+
+
+def test_masses_in_a_row_vibrate(page) -> None:
+    let_go(page, device="published-two-mass", settings={}, wall={"stiffness": 8000, "damping": 10})
+    found = page.value("Object.keys(zwidth.deviceView.vibration.shapes)")
+    assert found == ["masses"]
+    clip = page.page.evaluate(
+        """() => {
+          const { vibration } = zwidth.deviceView;
+          const { clip, modes } = vibration;
+          const row = (k) => clip.rows.subarray(modes * k, modes * (k + 1));
+          return Array.from({ length: clip.count }, (_, k) => [...vibration.displacements("masses", row(k))]);
+        }"""
+    )
+    rows = np.array(clip).reshape(len(clip), -1, 3)
+    assert np.all(rows[:, :, 1:] == 0.0)
+    made = zwidth.load("published-two-mass").at().simulate(stiffness=8000.0, damping=10.0)
+    assert_swings(page, rows[:, 0, 0], made.handle)
+    assert_swings(page, rows[:, 1, 0], made.position)
+    assert page.value("zwidth.deviceView.caption()").startswith("slow motion 1:20, at most ")
+
+
+def test_a_contact_whose_vibration_is_not_drawn_says_so(page) -> None:
+    page.page.evaluate("(state) => zwidth.store.set(state)", {"wall": WALL, "model": "rigid"})
+    page.settle()
+    page.page.click("button:has-text('Let go')")
+    page.wait("zwidth.contact.view.motion")
+    assert "; its vibration is drawn for the full model alone" in page.page.locator("#contact-text").text_content()

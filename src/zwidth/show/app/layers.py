@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,6 @@ from zwidth.show.app.request import State
 from zwidth.show.mass_chain import as_chain
 from zwidth.show.mechanism_scene import mechanism_scene
 from zwidth.show.scene_rates import mode_strokes
-
-if TYPE_CHECKING:
-    pass
 
 Floats = NDArray[np.float64]
 Contents = tuple[dict[str, Any], dict[str, Any]]
@@ -77,7 +74,7 @@ def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents
                 chart = point.chart(decay="decay" in layers)
             found, more = LAYERS[name](point, chart, state, device)
             if name == "scene" and "touch" in layers:  # the page draws it vibrating, with the modes of that layer
-                still, rates = _scene_rates(point)
+                still, rates = scene_rates(point)
                 found, more = found | still, more | rates
         except (ArithmeticError, ValueError, NotImplementedError) as error:
             if name == "chart":
@@ -271,21 +268,26 @@ def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
     }
 
 
-def _scene_rates(point: OperatingPoint) -> Contents:
+def scene_rates(point: OperatingPoint) -> Contents:
     """How the scene's points move per unit of each coordinate of the plant; or `still`, why that is not drawn."""
     if point.mechanism is None:
-        return {}, {}
+        chain = None if point.response is not None else as_chain(point.ungripped_plant)
+        if chain is None:
+            return {}, {}
+        rates = np.zeros((len(chain.mass), 3, point.plant.size))  # an arm's own coordinate is the last
+        np.fill_diagonal(rates[:, 0, :], 1.0)
+        return {}, {"masses_rates": rates}
     if point.load is not None:
         return {"still": "its vibration is not drawn under load"}, {}
     if point.model not in ("full", None):
         return {"still": f"its vibration is drawn for the full model alone, not for {point.model!r}"}, {}
     assert point.posture is not None
-    rates = mode_strokes(point.mechanism, point.posture, point.plant.size)
+    made = mode_strokes(point.mechanism, point.posture, point.plant.size)
     return {}, {
-        "strokes_rates": rates.strokes,
-        "joints_rates": rates.joints,
-        "driven_rates": rates.driven,
-        "handle_rates": rates.handle[None],
+        "strokes_rates": made.strokes,
+        "joints_rates": made.joints,
+        "driven_rates": made.driven,
+        "handle_rates": made.handle[None],
     }
 
 
@@ -306,15 +308,20 @@ def _face(name: str) -> Layer:
 
 
 def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-    """The blocks of `touch_step` for the page, held by the state's hand."""
+    return touch_blocks(point)
+
+
+def touch_blocks(point: OperatingPoint, start_position: float = 0.0, start_velocity: float = 0.0) -> Contents:
+    """The blocks of `touch_step` for the page, held by the point's hand. Raises ValueError: not covered."""
     from zwidth.contact.touch_numbers import arm_spring, touch_numbers
 
-    made = touch_numbers(point.loop)
+    made = touch_numbers(point.loop, start_position=start_position, start_velocity=start_velocity)
     arm = arm_spring(point.operator) if point.operator is not None else (0.0, 0.0)
     head = {
         "ports": made.ports,
         "port_count": made.port_count,
         "period": made.period,
+        "delay_samples": point.controller.delay,
         "states_at": made.states_at,
         "names": list(made.names),
         "arm": list(arm),

@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from zwidth.contact.contact_simulation import ContactSimulation
+from zwidth.contact.engine_arrays import ACTUATOR, CONTROLLER, ESTIMATE, HOLD, QUANTISER, WALL
 from zwidth.progress import Progress
+from zwidth.show.app.layers import scene_rates, touch_blocks
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import (
     ContactRequest,
@@ -17,8 +21,6 @@ from zwidth.show.app.request import (
 )
 from zwidth.show.cli.errors import BadInput
 
-# Series of a simulation that are sent as arrays.
-SERIES: Final = ("time_s", "position_m", "force_N", "energy_J", "velocity_m_per_s", "handle_m")
 WORDS: Final = {"figure": "chart", "data": "chart", "report": "report", "python": "lines"}
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
@@ -66,7 +68,10 @@ def what_to_change(opened: OpenedDevices, request: SensitivityRequest, progress:
 
 
 def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) -> Contents:
-    """One contact with the state's wall, as `zwidth simulate` has it."""
+    """One contact with the state's wall, as `zwidth simulate` has it, and what the page needs to draw its vibration.
+
+    That is of the layers `scene` and `touch`, the device at the contact's start.
+    """
     state = request.state
     point = opened.point(state)
     if state.wall is None:
@@ -82,8 +87,40 @@ def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) 
         progress=progress,
     )
     document = made.document()
-    arrays = {name: document.pop(name) for name in list(document) if name in SERIES}
-    return {**document, "series": list(arrays)}, arrays
+    for name in made.response.series:
+        del document[name]
+    document["delay_samples"] = point.controller.delay
+    arrays = {
+        "time": made.time,
+        "reading": made.position,
+        "place": made.response.truth,
+        "force": made.force,
+        "handle": made.handle,
+        "made": _made_by_wall(made),
+    }
+    try:
+        blocks, more = touch_blocks(point, request.depth, request.velocity)
+        still, rates = scene_rates(point)
+    except (ArithmeticError, ValueError) as error:
+        return {**document, "touch": {"reason": str(error)}}, arrays
+    arrays |= {f"touch.{name}": value for name, value in more.items()}
+    arrays |= {f"scene.{name}": value for name, value in rates.items()}
+    return {**document, "touch": blocks, "scene": still}, arrays
+
+
+def _made_by_wall(contact: ContactSimulation) -> NDArray[np.float64]:
+    """Energy that the wall has made since the start, at each sample [J]; negative: taken out.
+
+    What it gave to the device, less what its spring had stored at the start and has not now: an ideal spring makes
+    none, an ideal damper takes some out. Sampling, estimate, encoder, delay and limit are the wall's.
+    """
+    given = contact.response.energies[:, [WALL, HOLD, ESTIMATE, QUANTISER, CONTROLLER, ACTUATOR]].sum(axis=1)
+    depth = contact.response.truth - contact.wall_position
+    if contact.environment.name == "one-sided":
+        depth = np.maximum(depth, 0.0)
+    stored = 0.5 * contact.parameters["stiffness"] * depth**2
+    made: NDArray[np.float64] = given + stored - stored[0]
+    return made
 
 
 def measured_points(opened: OpenedDevices, request: PointsRequest) -> Contents:

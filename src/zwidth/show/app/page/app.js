@@ -95,6 +95,7 @@ export class App {
           }
         },
         onVibration: (trail, step) => this.deviceView.setVibration(trail, step),
+        onLetGo: (frame, trail, step) => this.deviceView.replay(frame, trail, step),
         say: (sentence, wrong) => this.say(sentence, wrong),
       },
     );

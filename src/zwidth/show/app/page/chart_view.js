@@ -219,8 +219,8 @@ export class ChartView {
     this.drawBounds(context, place, colours);
     this.drawEdge(context, place, colours);
     this.drawPoints(context, place, colours);
-    this.drawWall(context, place, colours);
     context.restore();
+    this.drawWall(context, place, colours);
     this.drawHover(context, place, colours);
     if (!ends.length) drawText(context, "no wall is stable", width / 2, height / 2, { align: "center", colour: colours.grey, size: 14 });
   }
@@ -465,8 +465,11 @@ export class ChartView {
       context.fill();
     }
     if (!this.wall) return;
-    const px = place.x(this.wall.stiffness);
-    const py = place.y(this.wall.damping);
+    // a wall beyond the axes stands at their end
+    const px = Math.min(Math.max(place.x(this.wall.stiffness), MARGIN.left), place.width - MARGIN.right);
+    const py = Math.min(Math.max(place.y(this.wall.damping), MARGIN.top), place.height - MARGIN.bottom);
+    const beyond = Math.hypot(px - place.x(this.wall.stiffness), py - place.y(this.wall.damping)) > 1;
+    if (beyond) drawText(context, "beyond the axes", px - 14, py - 10, { align: "right", colour: colours.ink, halo: colours.surface });
     const verdict = chart?.wall?.verdict;
     context.strokeStyle = verdict === "stable" ? colours.green : colours.vermilion;
     context.lineWidth = 2.5;

@@ -5,19 +5,23 @@
 import { ContactView } from "./contact_view.js";
 import { number, quantity } from "./canvas.js";
 import { blocksOf, pitchFor, Touch } from "./touch.js";
+import { TouchMachine } from "./touch_machine.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").Hand} Hand */
 
 // The hand that a mouse is: a light arm on a spring to where the pointer is.
 export const MOUSE = { arm_mass: 0.05, arm_stiffness: 300, arm_damping: 4, grasp_stiffness: null, grasp_damping: 0 };
+const LONGEST_VIBRATION = 1.6; // s after letting go that a slow motion can be cut from
+const TOGETHER = 64; // periods that the machine goes through in one call
 const NO_FORCE = "A mouse gives no force: you see and hear what a hand on this spring would feel.";
 
 export class ContactPanel {
   /**
    * @param {{tools: HTMLElement, canvas: HTMLCanvasElement, text: HTMLElement}} elements
    * @param {{onHand: (hand: Hand | null) => void, onSimulate: (options: object) => Promise<Frame | null>,
-   *   onVibration: (trail: Float64Array, step: number) => void, say: (sentence: string, wrong?: boolean) => void}} listeners
+   *   onVibration: (trail: Float64Array, step: number) => void,
+   *   onLetGo: (frame: Frame, trail: Float64Array, step: number) => void, say: (sentence: string, wrong?: boolean) => void}} listeners
    */
   constructor(elements, listeners) {
     this.elements = elements;
@@ -93,6 +97,9 @@ export class ContactPanel {
     this.touch.load(blocksOf(frame));
     const frequency = frame.head.chart.wall?.frequency ?? null;
     this.touch.setPitch(pitchFor(frequency));
+    this.view.delay = found.delay_samples;
+    this.view.spring = { stiffness: wall?.stiffness ?? 0, oneSided: this.oneSided.checked };
+    this.view.frequency = frame.head.chart.wall?.verdict === "unstable" ? frequency : null;
     const shift = this.touch.factor === 1 ? "" : ` Sound is played ${number(this.touch.factor, 2)} times ${this.touch.factor > 1 ? "higher" : "lower"}.`;
     this.write(`${NO_FORCE} The chart is the one held by this hand (${quantity(found.arm[0], "N/m")}, ${quantity(found.arm[1], "Ns/m")}).${shift}`);
     if (first) {
@@ -147,9 +154,29 @@ export class ContactPanel {
     if (!frame) return;
     const { head, arrays } = frame;
     const values = (/** @type {string} */ name) => /** @type {Float64Array} */ (arrays[name].values);
-    this.view.setMotion({ time: values("time_s"), position: values("position_m"), force: values("force_N"), handle: values("handle_m") });
+    this.view.frequency = head.dominant_frequency_Hz;
+    this.view.spring = { stiffness: this.wall.stiffness, oneSided: this.oneSided.checked };
+    const motion = { time: values("time"), reading: values("reading"), place: values("place"), force: values("force"), made: values("made"), delay: head.delay_samples };
+    this.view.setMotion(motion, head.stable === true);
     const verdict = head.stable === null ? "undecided" : head.stable ? "stable" : "not stable";
-    this.write(`${verdict}: ${head.behaviour}; ${quantity(head.dominant_frequency_Hz, "Hz")}, amplitude ${quantity(head.amplitude_m, this.view.units.x)}`);
+    const unseen = head.touch.reason ? "its vibration is not drawn" : head.scene.still;
+    this.write(`${verdict}: ${head.behaviour}; ${quantity(head.dominant_frequency_Hz, "Hz")}, amplitude ${quantity(head.amplitude_m, this.view.units.x)}${unseen ? `; ${unseen}` : ""}`);
     this.view.draw();
+    if (!unseen) await this.vibrate(frame);
+  }
+  /** Go through the start of a contact once more, for its vibration. @param {Frame} frame */
+  async vibrate(frame) {
+    const blocks = blocksOf(frame);
+    const machine = new TouchMachine(await this.touch.module);
+    machine.load(blocks);
+    /** @type {number[]} */
+    const trail = [];
+    const periods = Math.min(Math.ceil(LONGEST_VIBRATION / blocks.period), /** @type {Float64Array} */ (frame.arrays.time.values).length);
+    for (let done = 0; done < periods; done += TOGETHER) {
+      machine.run(Math.min(TOGETHER, periods - done), this.touch.wall, 0);
+      if (Number.isNaN(machine.trail[0])) break; // it grew until it was put back
+      trail.push(...machine.trail);
+    }
+    this.listeners.onLetGo(frame, Float64Array.from(trail), blocks.period);
   }
 }

@@ -7,14 +7,26 @@
  */
 
 import { axisUnit, drawText, fitCanvas, niceTicks, palette, quantity, tickLabels } from "./canvas.js";
-import { COMMAND, HANDLE, OUTPUTS, READING } from "./touch_machine.js";
+import { COMMAND, HANDLE, OUTPUTS, READING, TRUTH } from "./touch_machine.js";
 
-/** @typedef {{time: Float64Array, position: Float64Array, force: Float64Array, handle: Float64Array}} Motion */
+/**
+ * Samples of a contact.
+ *
+ * @typedef {object} Motion
+ * @property {Float64Array} time     [s]
+ * @property {Float64Array} reading  what the computer counts, from the wall on [m]
+ * @property {Float64Array} place    the same without steps and noise [m]
+ * @property {Float64Array} force    commanded [N]
+ * @property {Float64Array} [made]   energy that the wall has made [J]; left out: as much as the loop shows
+ * @property {number} delay          from reading to force [samples]
+ */
+/** @typedef {{stiffness: number, oneSided: boolean}} Spring  the wall's */
 /** @typedef {{x: number, y: number, width: number, height: number}} Area */
 
 const STRIP = 92; // css px of the upper strip
 const SPAN = 1.5; // s of a touch that are shown
-const LOOP = 0.4; // s of it in the loop
+const LOOP = 0.4; // s of it in the loop, where no frequency is known
+const CYCLES = 3; // in the loop
 const SPANS = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1]; // m to either side of the wall
 const STEP = 0.05; // of the span, by which an arrow key moves the hand
 
@@ -28,10 +40,16 @@ export class ContactView {
     this.listeners = listeners;
     /** @type {Motion | null} */
     this.motion = null;
+    this.decays = false; // the simulated motion, so that its first cycles are in the loop, not the last
     this.touching = false;
     this.live = ring(0);
     this.filled = 0;
     this.period = 0.001;
+    this.delay = 0;
+    /** @type {Spring} */
+    this.spring = { stiffness: 0, oneSided: false };
+    /** @type {number | null} */
+    this.frequency = null; // Hz, of the vibration whose cycles are in the loop
     this.span = SPANS[2];
     this.target = 0;
     this.now = 0; // m, where the handle is
@@ -89,27 +107,28 @@ export class ContactView {
     for (let k = 0; k < count; k++) {
       const at = this.filled % size;
       this.live.reading[at] = outputs[OUTPUTS * k + READING];
+      this.live.place[at] = outputs[OUTPUTS * k + TRUTH];
       this.live.force[at] = outputs[OUTPUTS * k + COMMAND];
-      this.live.handle[at] = outputs[OUTPUTS * k + HANDLE];
       this.filled++;
     }
     if (count) this.now = outputs[OUTPUTS * (count - 1) + HANDLE];
   }
 
-  /** @param {Motion} motion  simulated by the server */
-  setMotion(motion) {
+  /** @param {Motion} motion  simulated by the server @param {boolean} decays */
+  setMotion(motion, decays) {
     this.motion = motion;
+    this.decays = decays;
     this.touching = false;
   }
 
   /** What is shown, oldest first. @returns {Motion | null} */
   shown() {
     if (!this.touching) return this.motion;
-    const { size, reading, force, handle } = this.live;
+    const { size, reading, place, force } = this.live;
     const count = Math.min(this.filled, size);
     const order = (/** @type {Float64Array} */ values) => Float64Array.from({ length: count }, (_, i) => values[(this.filled - count + i) % size]);
     const time = Float64Array.from({ length: count }, (_, i) => (i - count) * this.period);
-    return { time, position: order(reading), force: order(force), handle: order(handle) };
+    return { time, reading: order(reading), place: order(place), force: order(force), delay: this.delay };
   }
 
   draw() {
@@ -127,7 +146,7 @@ export class ContactView {
     const high = wide ? height - top : 0.6 * (height - top);
     this.drawTime(context, { x: 0, y: top, width: left, height: high }, motion, colours);
     const area = wide ? { x: left, y: top, width: width - left, height: height - top } : { x: 0, y: top + high, width, height: height - top - high };
-    this.drawLoop(context, area, this.touching ? latest(motion, LOOP) : motion, colours);
+    this.drawLoop(context, area, motion, colours);
   }
 
   /** Wall, handle, spring and hand. @param {CanvasRenderingContext2D} context @param {Area} area @param {any} colours */
@@ -182,48 +201,107 @@ export class ContactView {
 
   /** @param {CanvasRenderingContext2D} context @param {Area} area @param {Motion} motion @param {any} colours */
   drawTime(context, area, motion, colours) {
-    const half = area.height / 2;
     const rows = [
-      { name: "Position", values: motion.position, unit: this.units.x, colour: colours.blue },
+      { name: "Position", values: motion.reading, unit: this.units.x, colour: colours.blue },
       { name: "Force", values: motion.force, unit: this.units.f, colour: colours.vermilion },
+      { name: "Energy that the wall made", values: motion.made ?? madeOf(motion, this.spring), unit: "J", colour: colours.purple },
     ];
+    const high = (area.height - 24) / rows.length; // below the last are the numbers of the time axis
     rows.forEach((row, n) => {
       const last = n === rows.length - 1;
-      const box = { x: area.x + 52, y: area.y + n * half + 16, width: area.width - 62, height: half - (last ? 50 : 26) };
+      const box = { x: area.x + 52, y: area.y + n * high + 18, width: area.width - 62, height: high - 24 };
       plot(context, box, motion.time, row.values, { along: last ? "Time" : "", unit: row.unit, name: row.name, colour: row.colour, colours, timeUnit: "s" });
     });
   }
 
   /** @param {CanvasRenderingContext2D} context @param {Area} area @param {Motion} motion @param {any} colours */
   drawLoop(context, area, motion, colours) {
+    const cycles = this.frequency ? CYCLES / this.frequency : LOOP;
+    const part = cut(motion, cycles, this.touching || !this.decays);
+    const { place, force } = loopOf(part);
     const box = { x: area.x + 52, y: area.y + 32, width: area.width - 64, height: area.height - 66 };
-    plot(context, box, motion.position, motion.force, { along: "Position", unit: this.units.f, name: "Force", colour: colours.vermilion, colours, timeUnit: this.units.x });
-    drawText(context, `wall gave ${quantity(workOf(motion), "J", 3)}`, box.x, area.y + 12, { colour: colours.ink });
+    plot(context, box, place, force, { along: "Position", unit: this.units.f, name: "Force", colour: colours.vermilion, colours, timeUnit: this.units.x });
+    const energies = part.made ?? madeOf(part, this.spring);
+    const made = energies[energies.length - 1] - energies[0];
+    const during = this.frequency ? `${CYCLES} cycles` : quantity(LOOP, "s", 2);
+    drawText(context, `${made < 0 ? "took" : "made"} ${quantity(Math.abs(made), "J", 3)} in ${during}`, area.x + 8, area.y + 12, { colour: colours.purple });
   }
 }
 
 /** @param {number} size */
 function ring(size) {
-  return { size: Math.max(size, 1), reading: new Float64Array(Math.max(size, 1)), force: new Float64Array(Math.max(size, 1)), handle: new Float64Array(Math.max(size, 1)) };
+  const values = () => new Float64Array(Math.max(size, 1));
+  return { size: Math.max(size, 1), reading: values(), place: values(), force: values() };
 }
 
 /**
- * The work of the commanded force on the handle, held from sample to sample [J]: the area of its loops.
+ * The force that is held, over where the device is meanwhile: steps, whose area is energy. Where a delay has a fraction,
+ * the force changes within a period; the place there is that of the cubic through four samples.
  *
  * @param {Motion} motion
+ * @returns {{place: Float64Array, force: Float64Array, first: number, points: number}}  from the sample `first` on, at
+ *   which a force has arrived, so many points in each period
  */
-export function workOf(motion) {
-  let work = 0;
-  for (let k = 0; k + 1 < motion.time.length; k++) work += motion.force[k] * (motion.position[k + 1] - motion.position[k]);
-  return work;
+export function loopOf(motion) {
+  const { time, place, force, delay } = motion;
+  const whole = Math.floor(delay);
+  const share = delay - whole;
+  const first = Math.ceil(delay);
+  const points = share > 0 ? 4 : 2;
+  const count = points * Math.max(time.length - 1 - first, 0);
+  const path = { place: new Float64Array(count), force: new Float64Array(count), first, points };
+  for (let k = first, at = 0; at < count; k++) {
+    const change = between(place, k, share);
+    const ends = share > 0 ? [[place[k], change], [change, place[k + 1]]] : [[place[k], place[k + 1]]];
+    ends.forEach(([from, to], n) => {
+      path.place.set([from, to], at);
+      path.force.fill(force[k - first + n], at, at + 2);
+      at += 2;
+    });
+  }
+  return path;
 }
 
-/** @param {Motion} motion @param {number} seconds @returns {Motion} */
-function latest(motion, seconds) {
-  const end = motion.time[motion.time.length - 1];
-  const first = motion.time.findIndex((time) => time >= end - seconds);
-  const cut = (/** @type {Float64Array} */ values) => values.subarray(Math.max(first, 0));
-  return { time: cut(motion.time), position: cut(motion.position), force: cut(motion.force), handle: cut(motion.handle) };
+/** A value after the sample k and a share of the period. @param {Float64Array} values @param {number} k @param {number} share */
+function between(values, k, share) {
+  const at = Math.min(Math.max(k - 1, 0), values.length - 4);
+  if (at < 0) return values[k] + share * (values[k + 1] - values[k]); // too few for a cubic
+  const s = k - at + share;
+  return (
+    (values[at] * (s - 1) * (s - 2) * (s - 3)) / -6 + (values[at + 1] * s * (s - 2) * (s - 3)) / 2 +
+    (values[at + 2] * s * (s - 1) * (s - 3)) / -2 + (values[at + 3] * s * (s - 1) * (s - 2)) / 6
+  );
+}
+
+/**
+ * Energy that the wall has made from the first sample to each [J]: what the held force gave, less what the spring had
+ * stored at first and has not now. An ideal spring makes none.
+ *
+ * @param {Motion} motion
+ * @param {Spring} spring
+ */
+export function madeOf(motion, spring) {
+  const { place, force, first, points } = loopOf(motion);
+  const stored = (/** @type {number} */ at) => 0.5 * spring.stiffness * (spring.oneSided ? Math.max(at, 0) : at) ** 2;
+  const made = new Float64Array(motion.time.length);
+  const start = stored(motion.place[first] ?? 0);
+  let given = 0;
+  for (let n = 0; n < place.length; n += 2) {
+    given += force[n] * (place[n + 1] - place[n]);
+    const sample = first + 1 + Math.floor(n / points);
+    made[sample] = given + stored(motion.place[sample]) - start;
+  }
+  return made;
+}
+
+/** The last, or the first, seconds of a motion. @param {Motion} motion @param {number} seconds @param {boolean} last @returns {Motion} */
+function cut(motion, seconds, last) {
+  const { time } = motion;
+  const count = time.length;
+  const step = time[1] - time[0];
+  const rows = Math.min(count, Math.max(2, Math.round(seconds / step) + Math.ceil(motion.delay) + 1));
+  const part = (/** @type {Float64Array} */ values) => (last ? values.subarray(count - rows) : values.subarray(0, rows));
+  return { time: part(time), reading: part(motion.reading), place: part(motion.place), force: part(motion.force), made: motion.made && part(motion.made), delay: motion.delay };
 }
 
 /**
@@ -243,7 +321,7 @@ export function plot(context, box, across, up, style) {
   const y = (/** @type {number} */ value) => box.y + box.height - ((value - y0) / (y1 - y0)) * box.height;
   context.lineWidth = 1;
   const upward = axisUnit(y0, y1, style.unit);
-  const ticks = niceTicks(y0, y1, Math.max(2, Math.floor(box.height / 28)));
+  const ticks = niceTicks(y0, y1, Math.max(3, Math.floor(box.height / 28)));
   const labels = tickLabels(ticks, upward.scale);
   ticks.forEach((tick, n) => {
     context.strokeStyle = tick === 0 ? colours.grey : colours.grid;
@@ -255,7 +333,7 @@ export function plot(context, box, across, up, style) {
   });
   drawText(context, `${style.name} [${upward.unit}]`, box.x, box.y - 5, { colour: style.colour, size: 12 });
   const along = axisUnit(x0, x1, style.timeUnit);
-  const marks = niceTicks(x0, x1, Math.max(2, Math.floor(box.width / 80)));
+  const marks = niceTicks(x0, x1, Math.max(3, Math.floor(box.width / 80)));
   const names = tickLabels(marks, along.scale);
   marks.forEach((tick, n) => {
     context.strokeStyle = colours.grid;

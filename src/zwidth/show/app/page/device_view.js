@@ -18,6 +18,7 @@ const REACH = 22; // css px round the handle, or the arrow's tip, that a pointer
 const ARROW = 74; // css px
 const STEP = 0.001; // m, by which an arrow key moves the handle
 const TURN = Math.PI / 36; // by which [ and ] turn the direction
+const CHAIN_SCALE = 1e5; // css px per metre of displacement, before it is enlarged or reduced
 const OUTSIDE = 0.05; // share of the cells at each end of a map that have the colour of the end
 const COLOURS = ["ink", "blue", "vermilion", "green", "purple", "orange"];
 // Of a map, dark to light: cividis, told apart with any colour vision.
@@ -48,6 +49,8 @@ export class DeviceView {
     this.vibration = new Vibration();
     /** @type {import("./vibration.js").Moment | null} */
     this.moment = null; // of the vibration that is drawn
+    /** @type {Float64Array | null} */
+    this.replayed = null; // the contact that is drawn again and again
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.listen();
   }
@@ -87,8 +90,9 @@ export class DeviceView {
   /** @param {Frame} frame @param {string} device */
   setFrame(frame, device) {
     this.frame = frame;
-    this.vibration.setFrame(frame);
-    if (device !== this.kept) this.vibration.clear();
+    this.vibration.setFrame(frame, frame.head.chart.wall?.frequency ?? null);
+    if (device !== this.kept || this.replayed) this.vibration.clear();
+    this.replayed = null;
     if (!this.vibration.clip) this.moment = null;
     if (this.scene?.kind === "mechanism" && (device !== this.kept || !this.fits())) this.fit(device);
   }
@@ -103,8 +107,33 @@ export class DeviceView {
     if (!this.vibration.known) return;
     this.vibration.add(trail, step);
     const before = this.vibration.clip;
-    this.moment = this.vibration.at(performance.now(), this.scale, this.calm.matches);
+    this.moment = this.vibration.at(performance.now(), this.pace, this.calm.matches);
     if (!this.calm.matches || this.vibration.clip !== before) this.draw();
+  }
+
+  /**
+   * Draw the start of a contact in slow motion, again and again, until another view comes.
+   *
+   * @param {Frame} frame         the contact, with the modes and the rates of the drawn points
+   * @param {Float64Array} trail  (k, n) amplitudes from the start on
+   * @param {number} step         s between two rows, a sampling period
+   */
+  replay(frame, trail, step) {
+    this.vibration.setFrame(frame, frame.head.dominant_frequency_Hz);
+    this.vibration.show(trail, step);
+    this.replayed = trail;
+    const next = () => {
+      if (this.replayed !== trail) return;
+      this.moment = this.vibration.at(performance.now(), this.pace, this.calm.matches);
+      this.draw();
+      if (!this.calm.matches) requestAnimationFrame(next);
+    };
+    next();
+  }
+
+  /** Pixels per metre of displacement that count as true to size; a row of masses has no scale. */
+  get pace() {
+    return this.scene?.kind === "chain" ? CHAIN_SCALE : this.scale;
   }
 
   /** Points as they are drawn: those of the posture, displaced by the vibration. @param {string} name */
@@ -307,7 +336,10 @@ export class DeviceView {
   /** The line below the device. */
   caption() {
     if (this.scene?.still) return this.scene.still;
-    return this.moment ? captionOf(this.moment.gain, this.calm.matches ? 0 : this.moment.slower) : "";
+    if (!this.moment) return "";
+    const size = this.vibration.clip?.size ?? 0;
+    const most = this.scene.kind === "chain" ? quantity(size, this.scene.turns ? "rad" : "m", 2) : "";
+    return captionOf(this.moment.gain, this.calm.matches ? 0 : this.moment.slower, most);
   }
 
   /** @param {CanvasRenderingContext2D} context @param {string} name @param {number} radius @param {string} fill @param {string} line */
@@ -485,10 +517,15 @@ export class DeviceView {
     const n = mass.length;
     const gap = (width - 60) / (2 * n + 1);
     const y = height / 2;
+    const moved = this.moment && this.vibration.known ? this.vibration.displacements("masses", this.moment.amplitudes) : null;
+    const shift = (/** @type {number} */ k) => CHAIN_SCALE * (moved?.[3 * k] ?? 0);
     for (let k = 0; k <= n; k++) {
       if (!(stiffness[k] > 0 || damping[k] > 0)) continue;
       const from = 30 + gap * 2 * k;
-      spring(context, from, from + gap, y, colours.ink);
+      const ends = [from + (k > 0 ? shift(k - 1) : 0), from + gap + (k < n ? shift(k) : 0)];
+      const both = stiffness[k] > 0 && damping[k] > 0;
+      if (stiffness[k] > 0) spring(context, ends[0], ends[1], both ? y - 12 : y, colours.ink);
+      if (damping[k] > 0) damper(context, ends[0], ends[1], both ? y + 12 : y, colours.ink);
       const lines = [stiffness[k] > 0 ? quantity(stiffness[k], "N/m") : "", damping[k] > 0 ? quantity(damping[k], "Ns/m") : ""].filter(Boolean);
       lines.forEach((line, row) => drawText(context, line, from + gap / 2, y + 34 + 16 * row, { align: "center", colour: colours.ink }));
       if (k === 0 || k === n) {
@@ -502,7 +539,7 @@ export class DeviceView {
       }
     }
     for (let k = 0; k < n; k++) {
-      const left = 30 + gap * (2 * k + 1);
+      const left = 30 + gap * (2 * k + 1) + shift(k);
       context.fillStyle = colours.blue;
       context.globalAlpha = 0.25;
       context.fillRect(left, y - 26, gap, 52);
@@ -512,6 +549,7 @@ export class DeviceView {
       context.strokeRect(left, y - 26, gap, 52);
       drawText(context, quantity(mass[k], "kg"), left + gap / 2, y, { align: "center", baseline: "middle", colour: colours.ink });
     }
+    this.drawCaption(context, width, height, colours);
   }
 }
 
@@ -548,6 +586,26 @@ function spring(context, from, to, y, colour) {
   context.beginPath();
   context.moveTo(from, y);
   for (let n = 1; n < 12; n++) context.lineTo(from + ((to - from) * n) / 12, y + (n % 2 ? 8 : -8));
+  context.lineTo(to, y);
+  context.stroke();
+}
+
+/** @param {CanvasRenderingContext2D} context @param {number} from @param {number} to @param {number} y @param {string} colour */
+function damper(context, from, to, y, colour) {
+  const middle = (from + to) / 2;
+  const half = Math.min(9, (to - from) / 4);
+  context.strokeStyle = colour;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.moveTo(from, y); // rod and piston
+  context.lineTo(middle, y);
+  context.moveTo(middle, y - 5);
+  context.lineTo(middle, y + 5);
+  context.moveTo(middle - half, y - 8); // cylinder and its rod
+  context.lineTo(middle + half, y - 8);
+  context.lineTo(middle + half, y + 8);
+  context.lineTo(middle - half, y + 8);
+  context.moveTo(middle + half, y);
   context.lineTo(to, y);
   context.stroke();
 }

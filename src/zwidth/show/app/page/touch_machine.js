@@ -24,6 +24,7 @@ export const TWO_SIDED = 1;
 export const ONE_SIDED = 2;
 export const OUTPUTS = 7;
 export const READING = 0;
+export const TRUTH = 1;
 export const COMMAND = 3;
 export const HANDLE = 4;
 export const HANDLE_VELOCITY = 5;

@@ -4,7 +4,7 @@
  *     displacement = gain · rates · coordinates · (amplitudes − their slow mean)
  *
  * with the rates of the drawn points and the coordinates of the modes from the server, and the amplitudes of the modes
- * from the touch. The mean goes over whole cycles of the predicted vibration, which it leaves as it is; what the hand
+ * from the touch, or from a device that is let go. The mean goes over whole cycles of the predicted vibration, which it leaves as it is; what the hand
  * moves slowly is taken away. A clip of the last moments is played slowly, then one of the latest moments.
  */
 
@@ -33,6 +33,7 @@ const FASTEST = 200; // Hz, above which the mean gets no shorter
 const UNPREDICTED = 50; // Hz, where the chart has no frequency
 const DRAWN_SIZE = 30; // css px that the largest displacement comes to at most
 const MOST = 10000; // times enlarged: what is smaller stays unseen
+const [SCENE, RATES] = ["scene.", "_rates"]; // what the rates of points are named, before and after the points
 const LOOKED_AT = 200; // rows of a clip in which the largest displacement is looked for
 
 export class Vibration {
@@ -53,21 +54,26 @@ export class Vibration {
     return this.modes > 0;
   }
 
-  /** The modes of another view. @param {Frame} frame */
-  setFrame(frame) {
-    const shape = frame.arrays["touch.coordinates"]?.shape;
-    const modes = frame.arrays["scene.strokes_rates"] && shape ? shape[1] : 0;
+  /**
+   * The modes of another frame, with how the drawn points move; none where it does not say.
+   *
+   * @param {Frame} frame
+   * @param {number | null} predicted  [Hz], null where nothing is
+   */
+  setFrame(frame, predicted) {
+    const { arrays } = frame;
+    const moved = Object.keys(arrays).filter((name) => name.startsWith(SCENE) && name.endsWith(RATES));
+    const modes = (moved.length && arrays["touch.coordinates"]?.shape[1]) || 0;
     this.shapes = {};
     if (modes !== this.modes) this.clear();
     this.modes = modes;
     if (!modes) return;
-    const coordinates = /** @type {Float64Array} */ (frame.arrays["touch.coordinates"].values);
-    for (const name of ["strokes", "joints", "driven", "handle"]) {
-      const rates = /** @type {Float64Array} */ (frame.arrays[`scene.${name}_rates`].values);
-      this.shapes[name] = product(rates, coordinates, modes);
+    const coordinates = /** @type {Float64Array} */ (arrays["touch.coordinates"].values);
+    for (const name of moved) {
+      const rates = /** @type {Float64Array} */ (arrays[name].values);
+      this.shapes[name.slice(SCENE.length, -RATES.length)] = product(rates, coordinates, modes);
     }
-    const predicted = frame.head.chart.wall?.frequency || UNPREDICTED;
-    this.frequency = Math.max(predicted, SLOWEST);
+    this.frequency = Math.max(predicted || UNPREDICTED, SLOWEST);
   }
 
   /** How many times more slowly a clip is played. */
@@ -121,12 +127,29 @@ export class Vibration {
     return { amplitudes, gain, slower: clip.slower };
   }
 
+  /** Rows of a clip, and of half of the slow mean. */
+  get lengths() {
+    const half = Math.max(1, Math.round(AVERAGED / Math.min(this.frequency, FASTEST) / 2 / this.step));
+    const played = Math.min(Math.max(CYCLES / this.frequency, PLAYED / this.slower), LONGEST);
+    return { half, count: Math.max(2, Math.round(played / this.step)) };
+  }
+
+  /** How many rows from its start on a contact needs for one clip. @param {number} step  s between them */
+  needed(step) {
+    this.step = step;
+    return this.lengths.count + 2 * this.lengths.half;
+  }
+
+  /** Play the start of a contact again and again. @param {Float64Array} trail  (k, n) amplitudes @param {number} step */
+  show(trail, step) {
+    this.clear();
+    this.add(trail.subarray(0, this.modes * this.needed(step)), step);
+  }
+
   /** The latest moments around which the mean is known; null: there are not enough. @param {number} now @returns {Clip | null} */
   newClip(now) {
-    const [n, { history, step }] = [this.modes, this];
-    const half = Math.max(1, Math.round(AVERAGED / Math.min(this.frequency, FASTEST) / 2 / step));
-    const { slower } = this;
-    const count = Math.max(2, Math.round(Math.min(Math.max(CYCLES / this.frequency, PLAYED / slower), LONGEST) / step));
+    const [n, { history, slower }] = [this.modes, this];
+    const { half, count } = this.lengths;
     const first = history.length / n - half - count;
     if (!n || !(first >= half)) return null;
     const rows = new Float64Array(n * count);
@@ -164,9 +187,15 @@ export class Vibration {
   }
 }
 
-/** What is said of a picture. @param {number} gain @param {number} slower  0: it does not move */
-export function captionOf(gain, slower) {
-  const size = gain === 1 ? "true to size" : gain > 1 ? `enlarged ${gain} times` : `reduced ${Math.round(1 / gain)} times`;
+/**
+ * What is said of a picture.
+ *
+ * @param {number} gain
+ * @param {number} slower    0: it does not move
+ * @param {string} [most]    the largest displacement, of a picture without a scale
+ */
+export function captionOf(gain, slower, most) {
+  const size = most ? `at most ${most}` : gain === 1 ? "true to size" : gain > 1 ? `enlarged ${gain} times` : `reduced ${Math.round(1 / gain)} times`;
   return `${slower ? `slow motion 1:${slower}` : "largest displacement"}, ${size}`;
 }
 
