@@ -68,7 +68,7 @@ def what_to_change(opened: OpenedDevices, request: SensitivityRequest, progress:
 
 
 def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) -> Contents:
-    """One contact with the state's wall, as `zwidth simulate` has it, and what the page needs to draw its vibration.
+    """One contact with the state's wall, as `zwidth simulate` has it, and what draws its vibration in the page.
 
     That is of the layers `scene` and `touch`, the device at the contact's start.
     """
