@@ -238,6 +238,21 @@ def test_files_are_kept(page, choice, part) -> None:
     assert waiting.value.suggested_filename.startswith("five-bar")
 
 
+def test_the_report_opens_in_a_tab(page) -> None:
+    page.change(device="hapkit-course", settings={"loop.delay_samples": 0.5})
+    page.settle()
+    with page.context.expect_page() as waiting:
+        page.page.select_option("#export", "report.tab")
+    tab = waiting.value
+    page.wait("document.getElementById('status').textContent.includes('open in another tab')", seconds=60)
+    tab.wait_for_url("**/reports/*")
+    assert "a delay of 0.5" in tab.locator("header").inner_text().replace("\xa0", " ")
+    assert tab.locator("svg, img").count() > 0
+    # its own style is applied, and it is not of the workbench's origin
+    assert tab.evaluate("() => getComputedStyle(document.body).fontFamily") != "serif"
+    assert tab.evaluate("() => self.origin") == "null"
+
+
 def test_a_lost_connection_comes_back_with_the_state_kept(page) -> None:
     page.page.evaluate("() => zwidth.store.setNumbers({ 'loop.delay_samples': 0.5 })")
     page.settle()

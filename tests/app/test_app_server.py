@@ -13,7 +13,7 @@ from app.socket_client import SocketClient
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from zwidth.show.app.server import TYPES, Settings, page_files
+from zwidth.show.app.server import LARGEST_REPORT, MOST_REPORTS, TYPES, Settings, page_files
 
 
 def get(port: int, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
@@ -128,6 +128,33 @@ def test_another_address_needs_a_token_and_says_so() -> None:
             pass
         process.terminate()
         assert process.wait(20) in (0, -15)
+
+
+def post(port: int, content: bytes, **headers: str) -> tuple[int, str]:
+    """Status and answer of a report that is sent."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+    connection.request("POST", "/reports", content, {"Host": f"127.0.0.1:{port}", **headers})
+    answer = connection.getresponse()
+    found = answer.status, answer.read().decode()
+    connection.close()
+    return found
+
+
+def test_a_report_is_handed_out_so_that_nothing_in_it_runs(workbench) -> None:
+    own = {"Origin": f"http://127.0.0.1:{workbench}"}
+    for foreign in ({}, {"Origin": "http://attacker.example"}, {"Origin": "null"}):
+        assert post(workbench, b"<p>", **foreign)[0] == 403
+    assert post(workbench, b"<p>", **own, **{"Sec-Fetch-Site": "cross-site"})[0] == 403
+    assert post(workbench, b"x" * (LARGEST_REPORT + 1), **own)[0] == 413
+    names = [post(workbench, b"<p>%d" % n, **own) for n in range(MOST_REPORTS + 1)]
+    assert {status for status, _ in names} == {200}
+    assert get(workbench, f"/reports/{names[0][1]}")[0] == 404, "the oldest is no longer kept"
+    status, headers, body = get(workbench, f"/reports/{names[-1][1]}")
+    assert (status, body) == (200, b"<p>%d" % MOST_REPORTS)
+    policy = headers["content-security-policy"]
+    assert policy.endswith("; sandbox")
+    assert "default-src 'none'" in policy
+    assert "script" not in policy
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="ctrl-C is no signal there that a test can send")

@@ -41,6 +41,10 @@ POLICY: Final = (
     "connect-src 'self' {socket}; worker-src 'self'; media-src 'self' blob:; base-uri 'none'; form-action 'none'; "
     "frame-ancestors {ancestors}"
 )
+# A report is a page that was made from a device's file: nothing in it may run, or reach the workbench.
+REPORT_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
+LARGEST_REPORT: Final = 20_000_000  # bytes
+MOST_REPORTS: Final = 4  # kept to be opened; the oldest goes
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ def make_app(settings: Settings) -> FastAPI:
     contents = page_files()
     open_pages: set[Connection] = set()
     received: dict[str, Any] = {}
+    reports: dict[str, bytes] = {}
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -117,9 +122,9 @@ def make_app(settings: Settings) -> FastAPI:
         answer: Response = await following(request)
         socket = f"ws://{host} wss://{host}"
         ancestors = "'self' http://127.0.0.1:* http://localhost:*" if settings.framed else "'none'"
+        answer.headers.setdefault("Content-Security-Policy", POLICY.format(socket=socket, ancestors=ancestors))
         answer.headers.update(
             {
-                "Content-Security-Policy": POLICY.format(socket=socket, ancestors=ancestors),
                 "X-Content-Type-Options": "nosniff",
                 "Referrer-Policy": "no-referrer",
                 "Cross-Origin-Resource-Policy": "same-origin",
@@ -139,6 +144,29 @@ def make_app(settings: Settings) -> FastAPI:
         if not settings.admits(token):
             return PlainTextResponse("the token is missing or wrong\n", 403)
         return JSONResponse({**settings.start, "local": settings.local})
+
+    @app.post("/reports")
+    async def keep_report(request: Request, token: str | None = None) -> Response:
+        origin = urlsplit(request.headers.get("origin", ""))
+        if not settings.admits(token) or origin.netloc != request.headers.get("host", ""):
+            return PlainTextResponse("only the workbench's own page may send a report\n", 403)
+        content = bytearray()
+        async for part in request.stream():
+            content += part
+            if len(content) > LARGEST_REPORT:
+                return PlainTextResponse(f"a report has {LARGEST_REPORT} bytes at most\n", 413)
+        name = secrets.token_urlsafe(16)
+        reports[name] = bytes(content)
+        while len(reports) > MOST_REPORTS:
+            del reports[next(iter(reports))]
+        return PlainTextResponse(name)
+
+    @app.get("/reports/{name}")
+    async def report(name: str) -> Response:
+        if name not in reports:
+            return PlainTextResponse("this report is no longer kept; open it once more from the workbench\n", 404)
+        headers = {"Content-Security-Policy": REPORT_POLICY}
+        return Response(reports[name], media_type=TYPES[".html"], headers=headers)
 
     @app.get("/{name}")
     async def file(name: str) -> Response:

@@ -16,7 +16,7 @@ import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
 import { PaddlePanel } from "./paddle_panel.js";
 import { Tour } from "./tour.js";
-import { saveBytes } from "./files.js";
+import { newTab, saveBytes, showReport } from "./files.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").State} State */
@@ -555,13 +555,18 @@ export class App {
   async export(choice) {
     byId("export").value = "";
     if (!choice) return;
-    const [what, format] = choice.split(".");
+    const [what, ending] = choice.split(".");
     this.say(`writing the ${what}…`);
+    let tab = null;
     try {
-      const { head, arrays } = await this.connection.ask("export", { state: this.sent(), what, format }, this.progress);
-      saveBytes(head.name, /** @type {Uint8Array<ArrayBuffer>} */ (arrays.content.values));
-      this.say(`${head.name} is written`);
+      tab = ending === "tab" ? newTab(`writing the ${what}…`) : null; // now: later a browser would not let a page open one
+      const { head, arrays } = await this.connection.ask("export", { state: this.sent(), what, format: tab ? "html" : ending }, this.progress);
+      const bytes = /** @type {Uint8Array<ArrayBuffer>} */ (arrays.content.values);
+      if (tab) await showReport(tab, bytes, this.connection.token);
+      else saveBytes(head.name, bytes);
+      this.say(tab ? "the report is open in another tab" : `${head.name} is written`);
     } catch (error) {
+      tab?.close();
       this.fail(error);
     }
   }

@@ -12,3 +12,25 @@ export function saveBytes(name, bytes) {
   link.click();
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 }
+
+/** An empty tab that says what it waits for. @param {string} sentence  Throws Error where the browser allows none */
+export function newTab(sentence) {
+  const tab = window.open("", "_blank");
+  if (!tab) throw new Error("this browser lets no page open a tab; save the report as a file instead");
+  tab.document.title = sentence;
+  tab.document.body.textContent = sentence;
+  return tab;
+}
+
+/**
+ * Show a report in a tab. It goes through the server, which hands it out so that nothing in it can run.
+ *
+ * @param {Window} tab
+ * @param {Uint8Array<ArrayBuffer>} bytes
+ * @param {string} token
+ */
+export async function showReport(tab, bytes, token) {
+  const answer = await fetch(`reports?token=${encodeURIComponent(token)}`, { method: "POST", body: bytes });
+  if (!answer.ok) throw new Error(await answer.text());
+  tab.location.href = new URL(`reports/${await answer.text()}`, location.href).href;
+}
