@@ -61,7 +61,7 @@ export class App {
       onRelease: () => this.store.release(),
     });
     this.faceView = new FaceView(byId("face"));
-    this.deviceView = new DeviceView(byId("scene"), {
+    this.deviceView = new DeviceView(byId("scene"), byId("links"), {
       onPosition: (position, drag) => this.store.set({ position }, drag),
       onDirection: (direction, drag) => this.store.set({ direction, axis: null }, drag),
       onRelease: () => {
