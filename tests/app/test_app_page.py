@@ -195,10 +195,30 @@ def test_files_are_dropped_and_opened(page) -> None:
     page.drop(broken_toml="name = 3\n[plant]\nmass_kg = 'heavy'\n")
     page.wait("document.getElementById('status').classList.contains('wrong')")
     assert "mass_kg" in page.status
+    assert page.value("zwidth.view === null && zwidth.deviceView.scene === null"), "nothing of the device before"
     page.page.select_option("#device-choice", "hapkit-course")
     page.wait("zwidth.device?.label === 'hapkit-course'")
     page.settle()
     assert page.status == ""
+
+
+def test_of_a_device_without_masses_the_geometry_is_shown(page) -> None:
+    page.page.select_option("#device-choice", "novint-falcon")
+    page.wait("zwidth.shown === 'bundled novint-falcon'")
+    page.settle()
+    assert page.page.locator("#headline").text_content() == "No chart of this device"
+    assert "It needs mechanism.links.platform.mass_kg" in page.value("zwidth.view.head.chart.reason")
+    assert page.value("zwidth.deviceView.scene.drives.length") == 3
+    for face in ("Frequency", "|Z|", "Chart"):
+        page.page.click(f"button:has-text('{face}')")
+        page.settle()
+    page.page.click("#pin")
+    page.page.click("button:has-text('Let go')")
+    page.page.click("button:has-text('Touch')")
+    page.page.select_option("#device-choice", "hapkit-course")
+    page.wait("zwidth.shown === 'bundled hapkit-course'")
+    page.settle()
+    assert page.stiffness_max == pytest.approx(zwidth.load("hapkit-course").at().chart().stiffness_max, rel=1e-12)
 
 
 def test_a_link_holds_the_numbers_and_files(page) -> None:

@@ -12,6 +12,7 @@ from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.device.device import Device
 from zwidth.device.read import DEVICES, OPERATORS, bundled, bundled_names
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import MissingNumbersError
 from zwidth.measures.catalogue import MEASURES
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
@@ -62,7 +63,11 @@ def opened_device(opened: OpenedDevices, state: State) -> Contents:
 
 
 def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents:
-    """The layers that the page shows of one state. A layer that has no answer says why; the others stand."""
+    """The layers that the page shows of one state. A layer that has no answer says why; the others stand.
+
+    Without a chart there is no view, but of a device whose file leaves out numbers that a chart needs: that one's
+    geometry is shown.
+    """
     device = opened.device(state)
     point = opened.point(state, device)
     head: dict[str, Any] = {"moments": point.turns}
@@ -77,9 +82,10 @@ def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents
                 still, rates = scene_rates(point)
                 found, more = found | still, more | rates
         except (ArithmeticError, ValueError, NotImplementedError) as error:
-            if name == "chart":
+            missing = isinstance(error, MissingNumbersError)
+            if name == "chart" and not missing:
                 raise
-            head[name] = {"reason": str(error)}
+            head[name] = {"reason": f"{'It ' if missing else ''}{error}"}
             continue
         head[name] = found
         arrays |= {f"{name}.{key}": value for key, value in more.items()}

@@ -48,6 +48,7 @@ export class App {
     /** @type {Frame | null} */
     this.view = null;
     this.opened = "";
+    this.shown = ""; // device whose view is drawn
     this.keys = "";
     this.waits = false; // something is to be drawn on the next frame
     this.undrawn = 0; // views that have come and are not confirmed yet
@@ -177,6 +178,7 @@ export class App {
     try {
       const frame = await this.connection.ask("view", { state: this.sent(), layers });
       this.view = frame;
+      this.shown = this.opened;
       this.undrawn++;
       this.chart.setFrame(frame);
       this.deviceView.setFrame(frame, this.opened);
@@ -189,8 +191,16 @@ export class App {
     } catch (error) {
       // a handle that is dragged beyond its reach goes back to where it was last
       this.unreached = error instanceof Refusal && this.deviceView.held === "handle";
+      if (error instanceof Refusal && error.status !== "stopped" && this.shown !== this.opened) this.showNothing();
       this.fail(error);
     }
+  }
+
+  /** Nothing is known of the device that is open: what was shown is another's. */
+  showNothing() {
+    this.view = null;
+    for (const each of [this.chart, this.deviceView]) each.frame = null;
+    this.drawSoon();
   }
 
   async askMore() {
@@ -271,7 +281,10 @@ export class App {
   writeHeadline() {
     const chart = this.view?.head.chart;
     const line = byId("headline");
-    if (!chart) return;
+    if (!chart || chart.reason) {
+      line.textContent = chart ? "No chart of this device" : "";
+      return;
+    }
     const { K, B } = this.chart.units;
     if (!(chart.stiffness_max > 0)) {
       line.textContent = "No stable wall has K > 0 and B ≥ 0.";
@@ -484,7 +497,7 @@ export class App {
   }
 
   pin() {
-    if (!this.view) return;
+    if (!this.view || this.view.head.chart.reason) return;
     const names = this.chart.pinned.map((each) => each.name);
     let n = 1;
     while (names.includes(`pinned ${n}`)) n++;

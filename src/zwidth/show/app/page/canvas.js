@@ -39,6 +39,8 @@
  */
 
 export const FONT_SIZE = 12; // css px
+const LINE_HEIGHT = 18; // css px
+const SENTENCE_MARGIN = 24; // css px, to either side of a sentence
 export const FAMILY = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
 const HALO = 4; // css px, width of the line round letters
 const MINUS = "\u2212";
@@ -274,6 +276,27 @@ export function drawText(context, line, x, y, style = {}) {
   if (style.colour !== undefined) context.fillStyle = style.colour;
   context.fillText(line, x, y);
   context.restore();
+}
+
+/**
+ * Write a sentence in the middle of a canvas, in as many lines as it takes.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} sentence
+ * @param {number} width   of the canvas [css px]
+ * @param {number} height
+ * @param {string} colour
+ */
+export function drawSentence(context, sentence, width, height, colour) {
+  /** @type {string[]} */
+  const lines = [];
+  for (const word of sentence.split(" ")) {
+    const longer = lines.length ? `${lines[lines.length - 1]} ${word}` : word;
+    if (lines.length && textWidth(context, longer) < width - 2 * SENTENCE_MARGIN) lines[lines.length - 1] = longer;
+    else lines.push(word);
+  }
+  const top = height / 2 - (LINE_HEIGHT * (lines.length - 1)) / 2;
+  lines.forEach((line, n) => drawText(context, line, width / 2, top + LINE_HEIGHT * n, { align: "center", baseline: "middle", colour }));
 }
 
 /**

@@ -5,7 +5,7 @@
  * them or fills less than half of them. A wall is chosen by pointer or arrow keys.
  */
 
-import { axisUnit, drawText, fitCanvas, niceTicks, palette, quantity, textWidth, tickLabels } from "./canvas.js";
+import { axisUnit, drawSentence, drawText, fitCanvas, niceTicks, palette, quantity, textWidth, tickLabels } from "./canvas.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").Wall} Wall */
@@ -164,6 +164,10 @@ export class ChartView {
   follow() {
     const chart = this.frame?.head.chart;
     if (!chart) return;
+    if (chart.reason) {
+      this.box = null;
+      return;
+    }
     const [K0, K1, B0, B1] = chart.box;
     const others = this.pinned.map((each) => each.frame.head.chart.box);
     const top = Math.max(K1, ...others.map((box) => box[1]), ...this.points.map((point) => point.stiffness));
@@ -193,6 +197,8 @@ export class ChartView {
     const { context, width, height } = surface;
     const frame = this.frame;
     const box = this.box;
+    const reason = frame?.head.chart.reason;
+    if (reason) drawSentence(context, reason, width, height, palette(this.canvas).grey);
     if (!frame || !box) return;
     const colours = { ...palette(this.canvas), stable: getComputedStyle(this.canvas).getPropertyValue("--stable") };
     const x = (/** @type {number} */ K) => MARGIN.left + ((K - box.K[0]) / (box.K[1] - box.K[0])) * (width - MARGIN.left - MARGIN.right);

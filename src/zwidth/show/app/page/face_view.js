@@ -2,7 +2,7 @@
  * Other faces of the same wall: frequency along the edge, impedance, Nyquist plot, eigenvalues in the unit circle.
  */
 
-import { axisUnit, drawText, fitCanvas, niceTicks, palette, quantity, tickLabels } from "./canvas.js";
+import { axisUnit, drawSentence, drawText, fitCanvas, niceTicks, palette, quantity, tickLabels } from "./canvas.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
@@ -25,9 +25,9 @@ export class FaceView {
     const colours = palette(this.canvas);
     const frame = this.frame;
     if (!frame) return;
-    const reason = frame.head[this.face]?.reason;
+    const reason = frame.head[this.face === "edge" ? "chart" : this.face]?.reason;
     if (reason || (this.face !== "edge" && !frame.head[this.face])) {
-      drawText(context, reason ?? "", width / 2, height / 2, { align: "center", colour: colours.grey });
+      drawSentence(context, reason ?? "", width, height, colours.grey);
       return;
     }
     const box = { left: MARGIN.left, top: MARGIN.top, right: width - MARGIN.right, bottom: height - MARGIN.bottom };
