@@ -156,6 +156,32 @@ def test_a_spatial_device_is_turned(page) -> None:
     assert inked(page, "scene") > 500
 
 
+def test_a_map_lies_in_a_plane_through_a_spatial_device(page) -> None:
+    page.page.select_option("#device-choice", "phantom-premium-1.5")
+    page.wait("zwidth.shown === 'bundled phantom-premium-1.5'")
+    page.settle()
+    assert not page.value("zwidth.deviceView.scene.planar"), "its turntable moves the handle out of it"
+    page.change(position=[0.2, 0.02, -0.15])
+    page.settle()
+    page.page.select_option("#measure", "isotropy")
+    page.wait("zwidth.deviceView.map", seconds=60)
+    found = page.value(
+        "Object.fromEntries(Object.entries(zwidth.deviceView.map).map(([name, x]) => [name, x.at ? [...x] : x]))"
+    )
+    first, second, through = (np.array(found[name]) for name in ("first", "second", "through"))
+    assert np.cross(first, second) @ (np.array([0.2, 0.02, -0.15]) - through) == pytest.approx(0.0, abs=1e-12)
+    values = np.array(found["values"], dtype=float).reshape(len(found["y"]), len(found["x"]))
+    row, column = np.argwhere(np.isfinite(values))[3]
+    position = through + found["x"][column] * first + found["y"][row] * second
+    own = zwidth.load("phantom-premium-1.5").at(position).measure("isotropy")
+    assert values[row, column] == pytest.approx(float(own), rel=1e-9)
+    # what is drawn there is a cell of the colour of that value, a parallelogram around the projected place
+    drawn = page.value(f"zwidth.deviceView.place({position.tolist()})")
+    size = page.value("[zwidth.deviceView.canvas.clientWidth, zwidth.deviceView.canvas.clientHeight]")
+    assert 0 < drawn["x"] < size[0]
+    assert 0 < drawn["y"] < size[1]
+
+
 def test_numbers_are_sorted_and_a_goal_is_reached(page) -> None:
     page.page.click("#sort")
     page.wait("zwidth.numbers.order")

@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 Place = tuple[int, Floats]  # a link, -1 for the base, and a point (3,) of its frame [m]
 
 SAME_POINT: Final = 1e-6  # share of the mechanism's size below which points are one
+OUT_OF_PLANE: Final = 1e-9  # of the handle's largest rate: across a plane, one below counts as none
 AXIS_LENGTH: Final = 0.05  # m, to either side, of joint axes that are drawn alone
 
 
@@ -71,6 +72,13 @@ def mechanism_scene(mechanism: Mechanism, posture: Posture) -> MechanismScene:
         flat=(flat[0], flat[1]),
         planar=bool(planar),
     )
+
+
+def stays_in_plane(scene: MechanismScene, posture: Posture) -> bool:
+    """Whether all is in one plane, which the drives cannot move the handle out of."""
+    rates = np.abs(posture.jacobian)
+    across = np.delete(rates, scene.flat, axis=0)
+    return scene.planar and bool(np.all(across <= OUT_OF_PLANE * rates.max()))
 
 
 def drawn_links(mechanism: Mechanism) -> list[int]:

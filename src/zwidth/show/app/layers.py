@@ -18,7 +18,7 @@ from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State
 from zwidth.show.mass_chain import as_chain
-from zwidth.show.mechanism_scene import mechanism_scene
+from zwidth.show.mechanism_scene import mechanism_scene, stays_in_plane
 from zwidth.show.scene_rates import mode_strokes
 
 Floats = NDArray[np.float64]
@@ -257,7 +257,7 @@ def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
         "styles": list(made.styles),
         "drives": list(made.drives),
         "flat": list(made.flat),
-        "planar": made.planar,
+        "planar": stays_in_plane(made, posture),
         "projected": float(posture.projected),
         "turns": point.turns,
     }

@@ -20,18 +20,32 @@ from zwidth.show.app.request import (
     SensitivityRequest,
 )
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.mechanism_scene import mechanism_scene, stays_in_plane
 
 WORDS: Final = {"figure": "chart", "data": "chart", "report": "report", "python": "lines"}
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
 
 def workspace(opened: OpenedDevices, request: MapRequest, progress: Progress) -> Contents:
-    """A measure over the plane of the device's workspace, in this process."""
+    """A measure over a plane of the device's workspace, in this process.
+
+    That is the plane that the handle cannot leave; of a spatial device the one through the handle in which its
+    links spread most.
+    """
     from zwidth.study.workspace.map import workspace_map
     from zwidth.study.workspace.plane_grid import plane_of
 
     state, device = request.state, opened.device(request.state)
-    plane = plane_of(device, cells=(request.count, request.count))
+    cells = (request.count, request.count)
+    point = opened.point(state, device)
+    if point.mechanism is None or point.posture is None:
+        raise BadInput("a map is drawn of a device with a mechanism")
+    scene = mechanism_scene(point.mechanism, point.posture)
+    if stays_in_plane(scene, point.posture):
+        plane = plane_of(device, cells=cells)
+    else:
+        flat = "".join("xyz"[k] for k in sorted(scene.flat))
+        plane = plane_of(device, flat, point.posture.position.tolist(), cells=cells)
     data = workspace_map(
         device,
         request.measure,
@@ -50,7 +64,8 @@ def workspace(opened: OpenedDevices, request: MapRequest, progress: Progress) ->
         "values": np.asarray(values, dtype=float),
         "status": np.asarray(data[f"{request.measure}_status"]).astype(np.uint8),
     }
-    return {"measure": request.measure, "unit": str(values.attrs.get("units", "")), "axes": axes}, arrays
+    arrays |= {"first": plane.first, "second": plane.second, "through": plane.through}
+    return {"measure": request.measure, "unit": str(values.attrs.get("units", ""))}, arrays
 
 
 def what_to_change(opened: OpenedDevices, request: SensitivityRequest, progress: Progress) -> Contents:

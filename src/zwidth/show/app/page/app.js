@@ -228,7 +228,7 @@ export class App {
     try {
       const { head, arrays } = await this.connection.ask("map", { state: this.sent(), measure }, this.progress);
       const values = (/** @type {string} */ name) => /** @type {Float64Array} */ (arrays[name].values);
-      this.deviceView.map = { x: values("x"), y: values("y"), values: values("values"), unit: head.unit, name: measure.replaceAll("_", " ") };
+      this.deviceView.map = { x: values("x"), y: values("y"), values: values("values"), first: values("first"), second: values("second"), through: values("through"), unit: head.unit, name: measure.replaceAll("_", " ") };
       this.say("");
       this.drawSoon();
     } catch (error) {

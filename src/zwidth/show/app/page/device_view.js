@@ -8,7 +8,7 @@
 
 import { drawText, fitCanvas, palette, quantity } from "./canvas.js";
 import { inLines, Labels } from "./labels.js";
-import { drawPlane, drawScale } from "./map_drawing.js";
+import { drawKey, drawMap, drawPlane, drawScale, placeOf } from "./map_drawing.js";
 import { ARROW, aroundHandle, cross, drawForces, drawMechanism, linkStyle, nameParts, segmentsOf } from "./mechanism_drawing.js";
 import { captionOf, Vibration } from "./vibration.js";
 
@@ -172,10 +172,10 @@ export class DeviceView {
   fit(device) {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!width || !height) return;
-    const { scene, map } = this;
+    const { map } = this;
     const points = [...this.points("strokes"), ...this.points("base"), 0, 0, 0];
-    if (scene.planar && map) {
-      for (const corner of [0, -1]) points.push(...[0, 1, 2].map((k) => [map.x.at(corner) ?? 0, map.y.at(corner) ?? 0][scene.flat.indexOf(k)] ?? 0));
+    for (const x of map ? [map.x[0], map.x.at(-1) ?? 0] : []) {
+      for (const y of map ? [map.y[0], map.y.at(-1) ?? 0] : []) points.push(...placeOf(/** @type {import("./map_drawing.js").Grid} */ (map), x, y));
     }
     const handle = this.points("handle");
     const round = aroundHandle(this); // in pixels, so that their share of the picture follows from the scale that is sought
@@ -187,7 +187,7 @@ export class DeviceView {
       return { size: Math.max(high - low, 1e-3), middle: (low + high) / 2 };
     };
     const [right, up] = this.view();
-    const top = scene.planar && map ? MARGIN.key : MARGIN.top;
+    const top = map ? MARGIN.key : MARGIN.top;
     const room = { width: Math.max(width - 2 * MARGIN.side, 1.5 * ARROW), height: Math.max(height - top - MARGIN.bottom, 1.5 * ARROW) };
     this.scale = Math.min(room.width, room.height) / Math.max(...points.map(Math.abs), 1e-3);
     for (let n = 0; n < 20; n++) this.scale = Math.min(room.width / spread(right).size, room.height / spread(up).size);
@@ -195,7 +195,7 @@ export class DeviceView {
     b.middle += (top - MARGIN.bottom) / 2 / this.scale;
     this.middle = /** @type {Vector} */ ([0, 1, 2].map((k) => a.middle * right[k] + b.middle * up[k]));
     this.kept = device;
-    this.fitted = { size: `${width} ${height}`, map: scene.planar ? map : null };
+    this.fitted = { size: `${width} ${height}`, map };
   }
 
   /** Which link has which colour, where there is more than one that is seen. */
@@ -333,9 +333,11 @@ export class DeviceView {
   /** @param {CanvasRenderingContext2D} context @param {number} width @param {number} height @param {any} colours */
   drawPosture(context, width, height, colours) {
     const { planar } = this.scene;
-    const another = planar && this.map && this.map !== this.fitted.map; // a map that goes leaves the device where it is
+    const another = this.map && this.map !== this.fitted.map; // a map that goes leaves the device where it is
     if (another || this.fitted.size !== `${width} ${height}`) this.fit(this.kept);
-    const top = planar ? drawPlane(context, this, width, height, colours) : 0;
+    if (this.map) drawMap(context, this, this.map);
+    if (planar) drawPlane(context, this, width, height, colours);
+    const top = this.map ? drawKey(context, this, this.map, width, colours) : 0;
     drawMechanism(context, this, colours);
     drawForces(context, this, width, top, colours);
     if (!planar) drawScale(context, this, width, height, colours);

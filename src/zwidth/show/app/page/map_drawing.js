@@ -4,11 +4,24 @@ import { axisUnit, niceStep, niceTicks, quantity, textWidth, tickLabels } from "
 import { arrow, line } from "./mechanism_drawing.js";
 
 /** @typedef {import("./device_view.js").DeviceView} DeviceView */
-/** @typedef {{x: Float64Array, y: Float64Array, values: Float64Array, unit: string, name: string}} Grid */
+/**
+ * A measure over a plane.
+ *
+ * @typedef {object} Grid
+ * @property {Float64Array} x        coordinates of the columns along `first` [m]
+ * @property {Float64Array} y        of the rows along `second` [m]
+ * @property {Float64Array} values   row by row; NaN: not known there
+ * @property {Float64Array} first    unit vector in the plane;   second, another;   through  where both coordinates are 0
+ * @property {Float64Array} second
+ * @property {Float64Array} through
+ * @property {string} unit
+ * @property {string} name
+ */
 
 const OUTSIDE = 0.05; // share of the cells at each end of a map that have the colour of the end
 // Of a map, dark to light: cividis, told apart with any colour vision.
 const SHADES = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
+const AROUND = [[0, 0], [1, 0], [1, 1], [0, 1]]; // the corners of a cell
 const AXIS = 26; // css px, of the axes beside a spatial device
 const SEEN = 0.15; // share of its length that is seen of an axis with an arrow; another one points at the eye, or away
 const KEY = { width: 150, height: 48 }; // css px, of a map's key in the upper right corner
@@ -22,35 +35,52 @@ function rangeOf({ values }) {
   return { low, high, below: low > known[0], above: high < known[known.length - 1] };
 }
 
+/** A place of a map's plane in the base frame [m]. @param {Grid} map @param {number} x @param {number} y */
+export function placeOf({ first, second, through }, x, y) {
+  return [0, 1, 2].map((k) => through[k] + x * first[k] + y * second[k]);
+}
+
 /** @param {CanvasRenderingContext2D} context @param {DeviceView} view @param {Grid} map */
-function drawMap(context, view, map) {
+export function drawMap(context, view, map) {
   const range = rangeOf(map);
   if (!range) return;
   const { low, high } = range;
   const { x, y, values } = map;
-  context.globalAlpha = 0.75;
-  const [i, j] = view.scene.flat;
   const [dx, dy] = [x[1] - x[0], y[1] - y[0]];
+  // cells share their corners, whole pixels, and are drawn without gaps on a canvas of their own, which is then laid
+  // under the device as a whole: where two transparent cells touched or overlapped a line would be seen
+  const own = new OffscreenCanvas(context.canvas.width, context.canvas.height);
+  const cells = /** @type {OffscreenCanvasRenderingContext2D} */ (own.getContext("2d"));
+  cells.setTransform(context.getTransform());
+  const corner = (/** @type {number} */ across, /** @type {number} */ up) => {
+    const at = view.place(placeOf(map, x[0] + (across - 0.5) * dx, y[0] + (up - 0.5) * dy));
+    return [Math.round(at.x), Math.round(at.y)];
+  };
   for (let row = 0; row < y.length; row++) {
     for (let column = 0; column < x.length; column++) {
       const value = values[row * x.length + column];
       if (!Number.isFinite(value)) continue;
-      const p = [...view.middle];
-      p[i] = x[column] - dx / 2;
-      p[j] = y[row] + dy / 2;
-      const at = view.place(p);
-      // from one pixel's edge to another: a gap or an overlap would be seen as a line
-      const [left, top] = [Math.round(at.x), Math.round(at.y)];
-      const [right, bottom] = [Math.round(at.x + dx * view.scale), Math.round(at.y + dy * view.scale)];
-      context.fillStyle = shade(high > low ? (value - low) / (high - low) : 0.5);
-      context.fillRect(left, top, right - left, bottom - top);
+      cells.fillStyle = shade(high > low ? (value - low) / (high - low) : 0.5);
+      cells.strokeStyle = cells.fillStyle;
+      cells.beginPath();
+      for (const [across, up] of AROUND) {
+        const [px, py] = corner(column + across, row + up);
+        cells.lineTo(px, py);
+      }
+      cells.closePath();
+      cells.fill();
+      cells.stroke();
     }
   }
-  context.globalAlpha = 1;
+  context.save();
+  context.globalAlpha = 0.75;
+  context.resetTransform();
+  context.drawImage(own, 0, 0);
+  context.restore();
 }
 
 /** What a map's colours mean; how far down it goes [css px]. @param {CanvasRenderingContext2D} context @param {DeviceView} view @param {Grid} map @param {number} width @param {any} colours */
-function drawKey(context, view, map, width, colours) {
+export function drawKey(context, view, map, width, colours) {
   const range = rangeOf(map);
   if (!range) return 0;
   const low = `${range.below ? "≤ " : ""}${quantity(range.low, map.unit, 3)}`;
@@ -97,16 +127,13 @@ function drawGrid(context, view, width, height, colours) {
   return { across: `${"xyz"[across.k]} → [${axis.unit}]`, up: `↑ ${"xyz"[up.k]} [${axis.unit}]`, numbers };
 }
 
-/** What lies behind a planar device; how far down the map's key goes [css px]. @param {CanvasRenderingContext2D} context @param {DeviceView} view @param {number} width @param {number} height @param {any} colours */
+/** The grid behind a planar device. @param {CanvasRenderingContext2D} context @param {DeviceView} view @param {number} width @param {number} height @param {any} colours */
 export function drawPlane(context, view, width, height, colours) {
-  if (view.map) drawMap(context, view, view.map);
   const { across, up, numbers } = drawGrid(context, view, width, height, colours);
-  const bottom = view.map ? drawKey(context, view, view.map, width, colours) : 0;
   const style = { colour: colours.grey, halo: colours.surface };
   view.labels.write(across, width - 6, height - 5, { align: "right", ...style });
   view.labels.write(up, 4, 13, style);
   for (const { text, x, y } of numbers) view.labels.write(text, x, y, { ...style, free: true });
-  return bottom;
 }
 
 /** Axes and a length to measure by, of a spatial device. @param {CanvasRenderingContext2D} context @param {DeviceView} view @param {number} width @param {number} height @param {any} colours */

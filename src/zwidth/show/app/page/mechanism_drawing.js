@@ -197,7 +197,7 @@ function drawWall(context, view, colours) {
   const corners = [at(-half, -half), at(half, -half), at(half, half), at(-half, half)];
   polygon(corners);
   context.fillStyle = colours.surface;
-  context.globalAlpha = 0.6; // links beyond it are seen through it
+  context.globalAlpha = view.map ? 0.15 : 0.6; // links beyond it are seen through it, and a map all the more
   context.fill();
   context.globalAlpha = 1;
   context.strokeStyle = colours.grey;
