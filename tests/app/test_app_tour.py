@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 from app.page_driver import Page
+from app.tour_steps import STEPS, answer
 
 import zwidth
 from zwidth.device.read import OPERATORS, bundled_names
-from zwidth.show.app.server import page_files
-
-STEPS = json.loads(page_files()["tour.json"])["steps"]
 
 
 def test_the_tour_has_the_six_causes() -> None:
     titles = ["Sampling", "Delay", "Flexibility", "Filter", "Friction and encoder", "The hand"]
     assert [step["title"] for step in STEPS] == titles
-
-
-@cache
-def answer(number: int, solved: bool) -> Any:
-    """The verdict on the wall of a step, as it begins or solved; of a step about rest whether it rests."""
-    step = STEPS[number]
-    state, solution = step["state"], step["solution"] if solved else {}
-    settings = {**state["settings"], **solution.get("settings", {})}
-    device = zwidth.load(state["device"], settings, operator=solution.get("operator"))
-    point, wall = device.at(), state["wall"]
-    if step["until"] == "rests":
-        return point.simulate(stiffness=wall["stiffness"], damping=wall["damping"]).stable
-    return point.check(wall["stiffness"], wall["damping"])
 
 
 @pytest.mark.parametrize("number", range(6))
@@ -43,31 +25,6 @@ def test_a_step_is_open_at_first_and_solved_by_its_hint(number) -> None:
     else:
         assert answer(number, False).names == ["unstable"]
         assert answer(number, True).names == ["stable"]
-
-
-def test_numbers_in_the_texts_are_true() -> None:
-    paddle, pair = zwidth.load("hapkit-course"), zwidth.load("published-two-mass")
-    plant = paddle.at().plant
-    assert plant.mass[0, 0] == 0.03
-    assert plant.damping[0, 0] == 1.0
-    passive = [
-        paddle.with_({"loop.sampling_period_s": T}).at().guarantees()["passive"].region.stiffness_max
-        for T in (0.001, 0.002)
-    ]
-    assert passive == pytest.approx([2.0 / 0.001, 2.0 / 0.002], rel=1e-6), "2b/T"
-    assert pair.at().plant.mass.diagonal() == pytest.approx([0.2616, 0.0254])
-    assert "buzzes at 175 Hz" in STEPS[2]["text"]
-    assert float(answer(2, False).frequency) == pytest.approx(175.0, abs=0.5)
-    stiffer = pair.with_({"plant.stiffness_N_per_m": [[3e4, -3e4], [-3e4, 3e4]]}).at().chart()
-    assert stiffer.stiffness_max < pair.at().chart().stiffness_max, "a stiffer spring does not help"
-    assert "buzzes at 64 Hz" in STEPS[3]["text"]
-    assert float(answer(3, False).frequency) == pytest.approx(64.0, abs=0.5)
-    state = STEPS[4]["state"]
-    humming = zwidth.load(state["device"], state["settings"]).at()
-    made = humming.simulate(stiffness=2600.0, damping=0.0)
-    assert made.judgement.frequency == pytest.approx(40.0, abs=1.0)
-    assert abs(made.force).max() == 5.0, "as loud as the motor's limit allows"
-    assert pytest.approx(0.065) == 2600.0 * 5e-5 / 2.0
 
 
 def test_the_tour_is_gone_through_in_the_page(browser, workbench) -> None:
