@@ -13,10 +13,8 @@ from zwidth.contact.simulate import simulate
 from zwidth.contact.touch_numbers import touch_numbers, touch_obstacle
 from zwidth.contact.touch_step import FREE, ONE_SIDED, OUTPUTS, touch
 from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import Foaw
 from zwidth.loop.loop import Loop
 from zwidth.loop.low_pass import FirstOrder
-from zwidth.model.nonlinear import Brake, Friction, Nonlinear, Spring
 from zwidth.model.operator import Operator
 from zwidth.model.plant import Plant
 
@@ -105,28 +103,7 @@ def test_coordinates_and_arm_of_a_held_handle():
     np.testing.assert_allclose(outputs[-1, 4], 5e-3, rtol=1e-9)
 
 
-ONE = np.ones(1)
-PARTS = {
-    "not linear": (Nonlinear(), {"velocity": Foaw(8, 1e-5)}),
-    "bristles": (Nonlinear((Friction(ONE, 0.1, "dahl", 1e4),)), {}),
-    "springs": (Nonlinear(springs=(Spring(ONE, 1e6),)), {}),
-    "brakes": (Nonlinear(brakes=(Brake(ONE, 3.0),)), {}),
-}
-
-
-@pytest.mark.parametrize("word", PARTS)
-def test_what_the_kernel_does_not_cover_is_said(word):
-    nonlinear, computer = PARTS[word]
-    loop = Loop(replace(Plant.one_mass(0.3), nonlinear=nonlinear), Controller(1e-3, **computer))
-    sentence = touch_obstacle(loop)
-    assert word in sentence
-    assert sentence.endswith("so that the server simulates it instead.")
-    with pytest.raises(ValueError, match=word):
-        touch_numbers(loop)
-
-
 def test_loops_that_are_covered_have_no_obstacle():
     filtered = Controller(1e-3, 1.5, force_filter=FirstOrder(1e-3))
     assert touch_obstacle(Loop(Plant.one_mass(0.3), filtered)) is None
     assert touch_obstacle(random_loop(np.random.default_rng(1), 3)) is None
-    assert "measured" in touch_obstacle(None)

@@ -12,8 +12,9 @@ from zwidth.contact.engine_inputs import HeldDevice, pack_plants, start_states
 from zwidth.contact.hand import Hand
 from zwidth.contact.touch_step import DRAWN, FIRST_OUTPUT, SIZES, STATES_AT
 from zwidth.loop.estimators import Foaw, Levant
+from zwidth.loop.fixed_feedback import acts
 from zwidth.loop.loop import Loop
-from zwidth.loop.sections import HysteresisError, UnmovedError
+from zwidth.loop.sections import UnmovedError
 from zwidth.model.mechanism import Floats, Ints
 from zwidth.model.operator import Operator
 
@@ -134,16 +135,14 @@ def arm_spring(operator: Operator | None) -> tuple[float, float]:
     return (0.0, 0.0) if operator is None else (float(operator.arm_stiffness), float(operator.arm_damping))
 
 
-def touch_obstacle(loop: object) -> str | None:
+def touch_obstacle(loop: Loop) -> str | None:
     """What of a loop the kernel does not cover, in one sentence; None: nothing, and `touch_numbers` takes it."""
-    if not isinstance(loop, Loop):
-        return _sentence("the device is measured, or has no plant and computer of one direction")
     controller, nonlinear = loop.controller, loop.plant.nonlinear
     parts = {
         "velocity estimates that are not linear": isinstance(controller.velocity, Foaw | Levant),
-        "a local loop": controller.local_loop is not None,
-        "force feedback": controller.force_sensor is not None,
-        "feedforward": controller.feedforward is not None,
+        "a local loop": acts(controller.local_loop),
+        "force feedback": acts(controller.force_sensor),
+        "feedforward": acts(controller.feedforward) or controller.feeds_friction,
         "forces of the computer under load": loop.plant.is_loaded,
         "damping by a loss factor": loop.plant.hysteresis is not None,
         "friction with bristles": any(friction.bristles is not None for friction in nonlinear.friction),
@@ -155,7 +154,7 @@ def touch_obstacle(loop: object) -> str | None:
         return _sentence(f"the page does not compute {' and '.join(present)}")
     try:
         _ = loop.sections
-    except (UnmovedError, HysteresisError) as error:
+    except UnmovedError as error:
         return _sentence(f"the page does not compute this loop ({error})")
     return None
 
