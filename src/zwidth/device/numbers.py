@@ -8,20 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from math import ceil, floor, inf, isfinite
-from typing import Any, Final, Literal, TypeAlias
+from math import isfinite
+from typing import Any, Final
 
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import check
+from zwidth.device.number_range import Scale, number_limits, slider, typical_size
 from zwidth.device.number_words import number_name, source_of
 from zwidth.device.schema import device_file as schema
-
-SPAN: Final = 4.0  # a slider goes from a quarter of its number to four times that
-NEAR: Final = 0.01  # distance of a slider's end from a limit that is excluded, in shares of the number's own
-
-Scale: TypeAlias = Literal["linear", "logarithmic"]
 
 # Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
 CIRCUMSTANCES: Final = {
@@ -33,9 +29,6 @@ OTHERS: Final = {
     ("file_version",): "the format of the file, not a property of the device",
     ("response",): "part of the measurement, not a property of the device",
 }
-
-# Usual size of a length that is 0 and has no sign: the step or the noise of an encoder [m].
-STEP: Final = 1e-4
 
 
 @dataclass(frozen=True)
@@ -125,22 +118,6 @@ def unchangeable(steps: KeyPath) -> str:
     if schema.below_diagonal(steps):
         return "it moves with its mirror image in a symmetric matrix"
     return circumstance(steps) or next((why for head, why in OTHERS.items() if steps[: len(head)] == head), "")
-
-
-def typical_size(document: dict[str, Any], steps: KeyPath) -> float:
-    """Size that a number which is 0 may have: the largest number under its key in the same part of the file, else
-    of its unit in the file, else 1. That of a delay in samples is 1."""
-    if steps[-1] == "delay_samples":
-        return 1.0
-    own, unit = _key(steps), schema.key_unit(steps)
-    finite = [(path, abs(v)) for path, v in address.numbers(document) if isfinite(v)]
-    beside = [v for path, v in finite if _key(path) == own and path[0] == steps[0]]
-    alike = [v for path, v in finite if schema.key_unit(path) == unit]
-    return max(beside, default=0.0) or max(alike, default=0.0) or 1.0
-
-
-def _key(steps: KeyPath) -> str:
-    return next(str(step) for step in reversed(steps) if isinstance(step, str))
 
 
 def _values(document: dict[str, Any], place: Any, path: KeyPath) -> Iterator[tuple[KeyPath, float | str]]:
@@ -237,7 +214,7 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
     table = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))
     limits, whole = number_limits(document, steps)
     number = value if isinstance(value, int | float) else None
-    low, high, scale = (None, None, "linear") if number is None else _slider(document, steps, number)
+    low, high, scale = (None, None, "linear") if number is None else slider(document, steps, number)
     return DeviceNumber(
         path=path,
         group=tuple(dotted(steps[:table], document).split(".")) if table else ("device",),
@@ -257,57 +234,3 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
         also=() if image is None else (dotted(image, document),),
         given=given,
     )
-
-
-def number_limits(document: dict[str, Any], steps: KeyPath) -> tuple[tuple[float, float, tuple[str, ...]], bool]:
-    """Lowest and highest value that the schema allows, which of them is excluded; whether the number is whole."""
-    kinds = [one for one in schema.subschemas(steps, document) if one.get("type") in ("number", "integer")]
-    for kind in kinds:
-        above, below = (_limit(kind, "ge", "minimum"), _limit(kind, "le", "maximum"))
-        over, under = (_limit(kind, "gt", "exclusiveMinimum"), _limit(kind, "lt", "exclusiveMaximum"))
-        excluded = [*(["lowest"] if over is not None else []), *(["highest"] if under is not None else [])]
-        lowest = next((x for x in (over, above) if x is not None), -inf)
-        highest = next((x for x in (under, below) if x is not None), inf)
-        return (lowest, highest, tuple(excluded)), kind["type"] == "integer"
-    return (-inf, inf, ()), False
-
-
-def _limit(kind: dict[str, Any], ours: str, standard: str) -> float | None:
-    """A limit under its name in JSON Schema, or under pydantic's where another check stands before it."""
-    value = kind.get(standard, kind.get(ours))
-    return None if value is None else float(value)
-
-
-def _slider(document: dict[str, Any], steps: KeyPath, value: float) -> tuple[float | None, float | None, Scale]:
-    """Ends of a slider and its scale: a quarter of a magnitude to four times it, by its logarithm; of a number of
-    either sign twice as much to both sides as it is large."""
-    (lowest, highest, excluded), whole = number_limits(document, steps)
-    scale: Scale = "linear"
-    if not isfinite(value):
-        return None, None, "logarithmic"
-    if value > 0.0 and (lowest >= 0.0 or _on_diagonal(steps)):
-        low, high = value / SPAN, value * SPAN
-        scale = "linear" if whole else "logarithmic"
-    elif value == 0.0 and (lowest >= 0.0 or _on_diagonal(steps)):
-        usual = STEP if schema.key_unit(steps) == "m" else 1.0 if whole else typical_size(document, steps)
-        low, high = 0.0, SPAN * usual
-    else:
-        away = 2.0 * abs(value) or typical_size(document, steps)  # not to 0: a vector may not be all zeros
-        low, high = value - away, value + away
-    low = max(low, lowest + NEAR * (value - lowest) if "lowest" in excluded else lowest)
-    high = min(high, highest - NEAR * (highest - value) if "highest" in excluded else highest)
-    return (ceil(low), floor(high), scale) if whole else (low, high, scale)
-
-
-def _on_diagonal(steps: KeyPath) -> bool:
-    """Whether a number stands on the diagonal of a symmetric matrix, which may be written as its diagonal or, of
-    one row, as a number."""
-    for depth in range(3):
-        whole, indices = steps[: len(steps) - depth], steps[len(steps) - depth :]
-        kinds = schema.subschemas(whole)
-        rows = any(one.get("items", {}).get("type") == "array" for one in kinds)
-        if rows and any(one.get("type") == "number" for one in kinds):
-            return len(set(indices)) <= 1
-        if not isinstance(whole[-1], int):
-            break
-    return False

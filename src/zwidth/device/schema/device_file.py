@@ -137,6 +137,17 @@ def key_unit(path: tuple[str | int, ...]) -> str:
     return ""
 
 
+@cache
+def usual_size(path: tuple[str | int, ...]) -> float:
+    """The size that the schema calls usual for the number at a path; 0 where it calls none so.
+
+    >>> usual_size(("loop", "delay_samples")), usual_size(("loop", "sampling_period_s"))
+    (1.0, 0.0)
+    """
+    outer = [step for subschema in subschemas(path[:-1]) for step in _step(subschema, path[-1])]
+    return next((float(one["usual"]) for one in outer if "usual" in one), 0.0)
+
+
 def may_be_zero(path: tuple[str | int, ...]) -> bool:
     """Whether the key at a path is a number from 0 on, as delays, friction and damping are.
 

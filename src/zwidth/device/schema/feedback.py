@@ -84,6 +84,7 @@ class LocalSection(Section):
     delay_samples: Number = documented_key(
         "time from its reading to its force, in its own samples, whole or not",
         "1",
+        usual=1.0,
         ge=0,
         le=MOST_SAMPLES,
         default=0.0,

@@ -56,10 +56,14 @@ class EncoderSection(Section):
     resolution_m: Step | None = documented_key(
         "step of the reading, for a [plant]; 0: as fine as you like; a mechanism gives encoder_counts_per_rev",
         "m",
+        usual=1e-4,
         default=None,
     )
     noise_m: Step | None = documented_key(
-        "standard deviation of the reading before it is rounded, for a [plant]; omitted: 0", "m", default=None
+        "standard deviation of the reading before it is rounded, for a [plant]; omitted: 0",
+        "m",
+        usual=1e-4,
+        default=None,
     )
 
 
@@ -83,6 +87,7 @@ class LoopSection(Section):
     delay_samples: Number | None = documented_key(
         "time from reading the encoder to setting the force, in samples, whole or not; or delay_s",
         "1",
+        usual=1.0,
         ge=0,
         default=None,
     )

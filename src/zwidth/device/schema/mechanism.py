@@ -335,7 +335,7 @@ class DriveSection(Section):
         "encoder counts per motor revolution, after quadrature; omitted: not known", "1", default=None
     )
     encoder_noise_rad: Step | None = documented_key(
-        "standard deviation of the motor's angle before it is counted; omitted: 0", "rad", default=None
+        "standard deviation of the motor's angle before it is counted; omitted: 0", "rad", usual=1e-3, default=None
     )
     coulomb_Nm: DryFriction | None = documented_key(
         "dry friction at the motor; omitted: none", "N m", default=None

@@ -39,9 +39,13 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-def documented_key(description: str, unit: str | None = None, **limits: Any) -> Any:
-    """A documented key with its unit; `limits` are pydantic's gt, ge, lt, le, default and the like."""
-    return Field(description=description, json_schema_extra={"unit": unit} if unit else None, **limits)
+def documented_key(description: str, unit: str | None = None, *, usual: float | None = None, **limits: Any) -> Any:
+    """A documented key with its unit; `limits` are pydantic's gt, ge, lt, le, default and the like.
+
+    usual  size on a device that has it, of a number from 0 on which other numbers of its unit tell nothing about
+    """
+    extra: dict[str, Any] = {name: value for name, value in (("unit", unit), ("usual", usual)) if value}
+    return Field(description=description, json_schema_extra=extra or None, **limits)
 
 
 VERSION: Final[Any] = documented_key(

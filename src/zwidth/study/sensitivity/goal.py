@@ -22,7 +22,7 @@ from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
 from zwidth.device.faults import KeyPath, fail
 from zwidth.device.load import device_of_point
-from zwidth.device.numbers import number_limits, typical_size
+from zwidth.device.number_range import number_limits, typical_size
 from zwidth.device.schema.device_file import key_unit
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require

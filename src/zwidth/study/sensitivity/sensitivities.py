@@ -22,7 +22,8 @@ from zwidth.device.build_nonlinear import nonlinear_kind
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted
 from zwidth.device.load import device_of_point
-from zwidth.device.numbers import circumstance, typical_size
+from zwidth.device.number_range import typical_size
+from zwidth.device.numbers import circumstance
 from zwidth.device.schema.device_file import below_diagonal, key_unit, mirror_image
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
