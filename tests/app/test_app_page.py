@@ -10,6 +10,7 @@ from app.page_driver import Page
 from app.test_app_socket import PLANT
 
 import zwidth
+from tests.paddle import LENGTH, PADDLE
 
 
 @pytest.fixture
@@ -364,20 +365,65 @@ def test_a_recorded_paddle_appears_as_points(page) -> None:
     assert Path(waiting.value.path()).read_text().startswith("stiffness_N_per_m,damping_Ns_per_m")
 
 
-def test_a_handle_dragged_too_far_goes_back_to_where_it_was_last(page) -> None:
+def grab_handle(page) -> tuple[float, float]:
+    """Press the mouse on the handle; where that is on the page."""
     handle = page.value("Object.values(zwidth.deviceView.place(zwidth.deviceView.points('handle')))")
     box = page.page.locator("#scene").bounding_box()
     start = (box["x"] + handle[0], box["y"] + handle[1])
     page.page.mouse.move(*start)
     page.page.mouse.down()
-    page.page.mouse.move(start[0] + 20.0, start[1], steps=5)
+    return start
+
+
+def test_a_handle_dragged_too_far_slides_along_the_edge_of_its_reach(page) -> None:
+    x, y = grab_handle(page)
+    steps = page.value("zwidth.store.past.length")
+    page.page.mouse.move(x + 900.0, y, steps=5)
+    page.wait("zwidth.unreached === false && zwidth.state.position?.[0] > 0.05")
     page.settle()
-    page.page.mouse.move(box["x"] + box["width"] + 600.0, start[1], steps=5)
+    below = page.value("zwidth.state.position")
+    assert zwidth.load("five-bar").at(below).posture.projected == 0.0
+    assert page.value("[...zwidth.deviceView.points('handle')]") == pytest.approx(below, abs=1e-9)
+    page.page.mouse.move(x + 900.0, y - 300.0, steps=5)
+    page.settle()
+    above = page.value("zwidth.state.position")
+    page.page.mouse.up()
+    page.settle()
+    assert above[1] > below[1] + 0.01, "the mouse is followed"
+    assert page.value("zwidth.state.position") == above
+    assert page.status == ""
+    assert page.value("zwidth.store.past.length") == steps + 1, "one step"
+
+
+def test_a_paddle_is_dragged_around_its_circle(page) -> None:
+    page.drop(paddle_toml=PADDLE)
+    page.wait("zwidth.device?.name === 'Teaching paddle' && zwidth.deviceView.scene?.kind === 'mechanism'")
+    page.settle()
+    x, y = grab_handle(page)
+    page.page.mouse.move(x + 250.0, y, steps=10)
+    page.wait("zwidth.state.position")
+    page.settle()
+    page.page.mouse.up()
+    page.settle()
+    handle = page.value("[...zwidth.deviceView.points('handle')]")
+    assert np.hypot(*handle[:2]) == pytest.approx(LENGTH, abs=1e-9)
+    assert handle[0] > 0.02
+    assert page.status == ""
+
+
+def test_a_handle_without_a_nearest_position_goes_back_to_where_it_was_last(page) -> None:
+    page.page.select_option("#device-choice", "phantom-premium-1.5-cad")
+    page.wait("zwidth.device?.label === 'phantom-premium-1.5-cad'")
+    page.settle()
+    before = page.value("[...zwidth.deviceView.points('handle')]")
+    grab_handle(page)
+    page.page.evaluate("() => zwidth.deviceView.listeners.onPosition([0.0635, -0.0546, -0.195], 'handle')")
     page.wait("zwidth.unreached")
+    assert "beyond its limits" in page.status
     page.page.mouse.up()
     page.settle()
     page.wait("!document.getElementById('status').classList.contains('wrong')")
-    assert 0.0 < page.value("zwidth.state.position")[0] < 0.35
+    assert page.value("[...zwidth.deviceView.points('handle')]") == pytest.approx(before, abs=1e-9)
 
 
 def test_a_response_is_dropped_and_charted_beside_the_model(page) -> None:

@@ -52,6 +52,22 @@ def test_a_view_is_the_chart_of_python(client) -> None:
     assert head["touch"]["period"] == 0.00125
 
 
+def test_a_view_beyond_the_reach_is_refused_or_that_of_the_nearest_position(client) -> None:
+    state = {**FIVE_BAR, "position": [0.4, 0.4, 0.0]}
+    head, _ = client.ask("view", state=state, layers=["chart", "scene"])
+    assert not head["ok"]
+    head, arrays = client.ask("view", state=state, layers=["chart", "scene"], nearest=True)
+    assert np.array(head["position"]) == pytest.approx(arrays["scene.handle"], abs=1e-9)
+    point = zwidth.load("five-bar").at(head["position"])
+    assert head["chart"]["stiffness_max"] == pytest.approx(point.chart().stiffness_max, rel=1e-12)
+    head, _ = client.ask("view", state={**FIVE_BAR, "position": head["position"]}, nearest=True)
+    assert head["ok"]
+    assert "position" not in head, "it is reached"
+    gone = {"device": "phantom-premium-1.5-cad", "position": [0.0635, -0.0546, -0.195]}
+    head, _ = client.ask("view", state=gone, nearest=True)
+    assert "beyond its limits" in head["sentences"][0]
+
+
 HAND = {
     "arm_mass": 0.05,
     "arm_stiffness": 300.0,

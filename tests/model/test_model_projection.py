@@ -30,8 +30,11 @@ def test_a_position_that_is_had_is_not_moved(device):
 
 
 def test_far_off_the_nearest_position_is_named(device):
-    with pytest.raises(OutOfReach, match=r"the nearest position it reaches is \(0.054, 0.072, 0\) m, 10 mm away"):
+    with pytest.raises(
+        OutOfReach, match=r"the nearest position it reaches is \(0.054, 0.072, 0\) m, 10 mm away"
+    ) as caught:
         device.at((0.06, 0.08))
+    assert caught.value.nearest == pytest.approx([0.054, 0.072, 0.0], abs=1e-9)
     with pytest.raises(OutOfReach, match="the nearest position it reaches"):
         solve_posture(device.mechanism, (0.0, LENGTH + 1e-6))  # without a tolerance
 
@@ -51,7 +54,8 @@ def test_beyond_the_edge_of_a_plane_nothing_is_projected_and_what_is_named_can_b
     with pytest.raises(OutOfReach, match="the nearest position it reaches is") as caught:
         arms.at((0.02, 0.35))
     named = str(caught.value).split("is (")[1].split(")")[0]
-    nearest = np.array([float(number) for number in named.split(",")])
+    nearest = caught.value.nearest
+    assert [float(number) for number in named.split(",")] == pytest.approx(nearest, abs=1e-6)
     assert arms.at(nearest).posture.status == OK
     assert np.linalg.norm(nearest - [0.02, 0.35, 0.0]) < 0.02
 

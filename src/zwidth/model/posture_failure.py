@@ -29,7 +29,15 @@ class PostureError(ValueError):
 
 
 class OutOfReach(PostureError):
-    """The handle cannot get there in this assembly without passing a singularity."""
+    """The handle cannot get there in this assembly without passing a singularity.
+
+    nearest  (3,)  the position nearest to the requested one that it can have [m]; None where that is not known, or
+             the drives control its orientation
+    """
+
+    def __init__(self, message: str, nearest: Floats | None = None) -> None:
+        super().__init__(message)
+        self.nearest = nearest
 
 
 class Singular(PostureError):
@@ -75,14 +83,17 @@ def posture_failure(
         return BeyondLimit(
             f"with its handle at {where} in assembly {assembly!r} {_limit(mechanism, mech, reference, goal)}"
         )
+    nearest = near if mech.controls == POSITION else None
     if status == OUT_OF_REACH and mech.controls == POSITION and np.array_equal(goal, mechanism.reference_position):
         return OutOfReach(
             f"the handle cannot reach its own reference position {where} in assembly {assembly!r}; "
-            f"check the lengths of the links, or ask for another position; {instead}"
+            f"check the lengths of the links, or ask for another position; {instead}",
+            nearest,
         )
     if status == OUT_OF_REACH:
         return OutOfReach(
-            f"the handle cannot reach {where} in assembly {assembly!r} without passing a singularity; {instead}"
+            f"the handle cannot reach {where} in assembly {assembly!r} without passing a singularity; {instead}",
+            nearest,
         )
     return Singular(
         f"the mechanism is singular with its handle at {where} in assembly {assembly!r}: "

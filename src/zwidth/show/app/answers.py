@@ -85,7 +85,9 @@ class Answers:
                 return {"name": request.name}, {}
             case OpenRequest():
                 return layers.opened_device(opened, request.state)
-            case ViewRequest() | MoreRequest():
+            case ViewRequest():
+                return layers.view(opened, request.state, request.layers, request.nearest)
+            case MoreRequest():
                 return layers.view(opened, request.state, request.layers)
             case MapRequest():
                 return studies.workspace(opened, request, self.progress)

@@ -14,6 +14,7 @@ from zwidth.device.read import DEVICES, OPERATORS, bundled, bundled_names
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import MissingNumbersError
 from zwidth.measures.catalogue import MEASURES
+from zwidth.model.posture_failure import OutOfReach
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State
@@ -62,15 +63,19 @@ def opened_device(opened: OpenedDevices, state: State) -> Contents:
     }, {}
 
 
-def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents:
+def view(opened: OpenedDevices, state: State, layers: Sequence[str], nearest: bool = False) -> Contents:
     """The layers that the page shows of one state. A layer that has no answer says why; the others stand.
 
     Without a chart there is no view, but of a device whose file leaves out numbers that a chart needs: that one's
     geometry is shown.
+
+    nearest  take the nearest position where the handle cannot be at that of the state: `position` of the head
     """
     device = opened.device(state)
-    point = opened.point(state, device)
+    point, position = _point(opened, state, device, nearest)
     head: dict[str, Any] = {"moments": point.turns}
+    if position is not None:
+        head["position"] = position
     arrays: dict[str, Any] = {}
     chart: Chart | None = None
     for name in sorted(set(layers), key=ORDER.index):
@@ -90,6 +95,19 @@ def view(opened: OpenedDevices, state: State, layers: Sequence[str]) -> Contents
         head[name] = found
         arrays |= {f"{name}.{key}": value for key, value in more.items()}
     return head, arrays
+
+
+def _point(
+    opened: OpenedDevices, state: State, device: Device, nearest: bool
+) -> tuple[OperatingPoint, tuple[float, ...] | None]:
+    """The operating point of a state, and where it is if the handle cannot be where the state has it."""
+    try:
+        return opened.point(state, device), None
+    except OutOfReach as error:
+        if not nearest or error.nearest is None:
+            raise
+        position = tuple(map(float, error.nearest))
+    return opened.point(state.model_copy(update={"position": position}), device), position
 
 
 def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:

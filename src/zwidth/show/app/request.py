@@ -100,11 +100,15 @@ class OpenRequest(Request):
 
 
 class ViewRequest(Request):
-    """What is drawn while a number is dragged."""
+    """What is drawn while a number is dragged.
+
+    nearest  take the nearest position where the handle cannot be at that of the state
+    """
 
     kind: Literal["view"]
     state: State
     layers: tuple[Layer, ...] = ("chart",)
+    nearest: bool = False
 
 
 class MoreRequest(Request):

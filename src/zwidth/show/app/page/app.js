@@ -176,7 +176,7 @@ export class App {
     const state = this.state;
     const layers = ["chart", "scene", ...FAST.filter((name) => name !== "frequency" && this.chart.layers.has(name)), ...this.faceLayers(), ...(this.contact.touching ? ["touch"] : [])];
     try {
-      const frame = await this.connection.ask("view", { state: this.sent(), layers });
+      const frame = await this.connection.ask("view", { state: this.sent(), layers, nearest: this.store.dragged === "handle" });
       this.view = frame;
       this.shown = this.opened;
       this.undrawn++;
@@ -187,9 +187,11 @@ export class App {
       this.say("");
       this.drawSoon();
       this.unreached = false;
-      this.reached = state.position ?? null;
+      this.reached = frame.head.position ?? state.position ?? null;
+      // a handle that is dragged beyond its reach slides along its edge
+      if (frame.head.position && this.state === state) this.store.correct({ position: frame.head.position });
     } catch (error) {
-      // a handle that is dragged beyond its reach goes back to where it was last
+      // one that has no nearest position goes back to where it was last
       this.unreached = error instanceof Refusal && this.deviceView.held === "handle";
       if (error instanceof Refusal && error.status !== "stopped" && this.shown !== this.opened) this.showNothing();
       this.fail(error);

@@ -61,6 +61,16 @@ export class Store {
   }
 
   /**
+   * Put what can be had in the place of what was chosen, in the same step of the history.
+   *
+   * @param {Partial<State>} change
+   */
+  correct(change) {
+    this.state = { ...this.state, ...change };
+    this.onChange(this.state);
+  }
+
+  /**
    * Change one number, or remove its key with null.
    *
    * @param {{[path: string]: any}} settings
