@@ -222,7 +222,7 @@ def test_files_are_dropped_and_opened(page) -> None:
     page.drop(broken_toml="name = 3\n[plant]\nmass_kg = 'heavy'\n")
     page.wait("document.getElementById('status').classList.contains('wrong')")
     assert "mass_kg" in page.status
-    assert page.value("zwidth.view === null && zwidth.deviceView.scene === null"), "nothing of the device before"
+    page.wait("zwidth.view === null && zwidth.deviceView.scene === null")  # nothing of the device before
     page.page.select_option("#device-choice", "hapkit-course")
     page.wait("zwidth.device?.label === 'hapkit-course'")
     page.settle()
