@@ -6,7 +6,7 @@
  * Whatever is asked for is asked for in `ask`; whatever is drawn is drawn in `draw`.
  */
 
-import { number, palette, quantity } from "./canvas.js";
+import { number, quantity } from "./canvas.js";
 import { ChartView } from "./chart_view.js";
 import { Connection, Dropped, Refusal } from "./connection.js";
 import { linkOf, readLink, Store } from "./state.js";
@@ -15,6 +15,7 @@ import { DeviceView } from "./device_view.js";
 import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
 import { PaddlePanel } from "./paddle_panel.js";
+import { writeLegend } from "./legend.js";
 import { Tour } from "./tour.js";
 import { newTab, saveBytes, showReport } from "./files.js";
 
@@ -276,7 +277,10 @@ export class App {
     }
     this.deviceView.draw();
     this.writeHeadline();
-    this.writeLegend();
+    writeLegend(byId("legend"), this.chart, () => {
+      this.chart.follow();
+      this.drawSoon();
+    });
     this.writeWall();
   }
 
@@ -296,40 +300,6 @@ export class App {
     strong.textContent = quantity(chart.stiffness_max, K);
     const hertz = chart.frequencies.map((/** @type {number} */ f) => quantity(f, "Hz")).join(" and ");
     line.replaceChildren("up to ", strong, ` at ${quantity(chart.damping_at_stiffness_max, B)} of damping; there it oscillates at ${hertz}`);
-  }
-
-  writeLegend() {
-    const colours = palette(byId("chart"));
-    const items = [
-      ...this.chart.outlines(/** @type {any} */ (colours)).map((one, n) => ({ ...one, pinned: n < this.chart.pinned.length ? n : -1, title: "" })),
-      ...this.chart.bounds(/** @type {any} */ (colours)).map((one) => ({ ...one, pinned: -1, title: `${one.source}${one.holds ? "" : "; its assumptions are not met"}` })),
-    ];
-    const list = byId("legend");
-    list.replaceChildren(...items.map((one) => this.legendItem(one)));
-  }
-
-  /** @param {{name: string, colour: string, dash: number[], pinned: number, title: string}} one */
-  legendItem(one) {
-    const item = document.createElement("li");
-    const picture = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
-    for (const [key, value] of Object.entries({ x1: 0, y1: 4, x2: 26, y2: 4, stroke: one.colour, "stroke-width": 2, "stroke-dasharray": one.dash.join(" ") })) line.setAttribute(key, String(value));
-    picture.append(line);
-    item.append(picture, one.name);
-    item.title = one.title;
-    if (one.pinned >= 0) {
-      const remove = document.createElement("button");
-      remove.type = "button";
-      remove.textContent = "×";
-      remove.setAttribute("aria-label", `Remove ${one.name}`);
-      remove.addEventListener("click", () => {
-        this.chart.pinned.splice(one.pinned, 1);
-        this.chart.follow();
-        this.drawSoon();
-      });
-      item.append(remove);
-    }
-    return item;
   }
 
   writeWall() {
