@@ -325,11 +325,11 @@ export class App {
     choice.value = this.state.device;
     choice.title = head.description;
     document.title = `${head.name} – zwidth`;
-    this.numbers.setNumbers(head.numbers, this.state.settings);
+    this.numbers.setNumbers(head.numbers, this.state.settings, another);
     options(byId("model"), [["", head.given_by === "mechanism" ? "full" : "as given"], ...head.models.map((/** @type {string} */ name) => [name, name])], this.state.model ?? "");
     options(byId("operator"), [["", head.operator ? `${head.operator} (file)` : "nobody"], ["none", "nobody"], ...head.operators.map((/** @type {string} */ name) => [name, name])], this.state.operator ?? "");
     options(byId("assembly"), [["", head.reference?.assembly ?? "–"], ...head.assemblies.map((/** @type {string} */ name) => [name, name])], this.state.assembly ?? "");
-    options(byId("measure"), [["", "none"], ...head.measures.map((/** @type {any} */ each) => [each.name, `${each.name.replaceAll("_", " ")}`])], "");
+    options(byId("measure"), [["", "none"], ...head.measures.map((/** @type {any} */ each) => [each.name, `${each.name.replaceAll("_", " ")}`])], another ? "" : byId("measure").value);
     for (const id of ["model", "assembly", "measure"]) byId(id).disabled = byId(id).options.length < 2;
     if (another) {
       this.chart.box = null;

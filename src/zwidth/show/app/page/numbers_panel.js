@@ -1,7 +1,9 @@
 /**
  * The numbers of the device as sliders and fields, grouped as in its file, or the most influential first.
  *
- * Rows are made once for a device and then only changed, so that a drag never loses its slider.
+ * Rows are made once for a device and then only changed, so that a drag never loses its slider. A number that is changed
+ * for the first time may bring others with it, as the time constant of a filter brings its type: their rows come when the
+ * drag has ended.
  */
 
 import { number, quantity } from "./canvas.js";
@@ -50,13 +52,22 @@ export class NumbersPanel {
     /** @type {Map<string, GoalNumber>} */
     this.goal = new Map();
     this.filter = "";
+    this.dragging = false;
+    this.outdated = false; // rows that are to be made anew after the drag
   }
 
-  /** @param {DeviceNumber[]} numbers @param {{[path: string]: any}} settings */
-  setNumbers(numbers, settings) {
-    this.numbers = numbers;
+  /**
+   * @param {DeviceNumber[]} numbers
+   * @param {{[path: string]: any}} settings
+   * @param {boolean} another  whether the device is another one; otherwise sliders keep their ends
+   */
+  setNumbers(numbers, settings, another) {
+    const before = new Map(another ? [] : this.numbers.map((of) => [of.path, of]));
+    this.numbers = numbers.map((of) => before.get(of.path) ?? of);
     this.settings = settings;
-    this.build();
+    if (before.size === numbers.length && numbers.every((of) => before.has(of.path))) this.update(settings);
+    else if (this.dragging) this.outdated = true;
+    else this.build();
   }
 
   /** @param {Sensitivity[] | null} order  null: as in the file */
@@ -82,8 +93,11 @@ export class NumbersPanel {
     this.settings = settings;
     for (const { number: of, slider, field, row } of this.rows.values()) {
       const value = this.valueOf(of);
-      if (slider && document.activeElement !== field) slider.value = String(toSlider(of, value));
-      if (document.activeElement !== field) field.value = of.choices ? value : plain(value);
+      if (slider) slider.value = String(toSlider(of, value));
+      if (document.activeElement !== field) {
+        field.value = of.choices ? value : plain(value);
+        field.setCustomValidity("");
+      }
       if (slider) slider.setAttribute("aria-valuetext", quantity(value, of.unit));
       row.classList.toggle("changed", of.path in settings);
     }
@@ -96,7 +110,9 @@ export class NumbersPanel {
   }
 
   build() {
+    this.outdated = false;
     this.rows.clear();
+    const focused = this.element.contains(document.activeElement) ? /** @type {HTMLInputElement} */ (document.activeElement) : null;
     const shown = this.numbers.filter((of) => `${of.path} ${of.name} ${of.group.join(" ")}`.toLowerCase().includes(this.filter));
     const parts = [];
     if (this.order) {
@@ -116,6 +132,9 @@ export class NumbersPanel {
     this.element.replaceChildren(...parts);
     for (const each of this.element.querySelectorAll("details")) if (open.has(each.getAttribute("data-title"))) each.open = true;
     this.update(this.settings);
+    const again = focused?.id ? /** @type {HTMLInputElement | null} */ (document.getElementById(focused.id)) : null;
+    again?.focus({ preventScroll: true });
+    if (again?.type === "text") again.value = focused?.value ?? ""; // that is being typed
   }
 
   /** @param {string} title @param {DeviceNumber[]} members @param {boolean} open */
@@ -227,9 +246,17 @@ export class NumbersPanel {
     slider.type = "range";
     slider.min = "0";
     slider.max = String(STEPS);
+    slider.id = `s-${of.path}`;
     slider.setAttribute("aria-label", label);
-    slider.addEventListener("input", () => this.listeners.onNumber(this.changeOf(of, fromSlider(of, Number(slider.value))), of.path));
-    slider.addEventListener("change", () => this.listeners.onRelease());
+    slider.addEventListener("input", () => {
+      this.dragging = true;
+      this.listeners.onNumber(this.changeOf(of, fromSlider(of, Number(slider.value))), of.path);
+    });
+    slider.addEventListener("change", () => {
+      this.dragging = false;
+      this.listeners.onRelease();
+      if (this.outdated) this.build();
+    });
     return slider;
   }
 }
