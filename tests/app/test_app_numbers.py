@@ -40,3 +40,48 @@ def test_keys_on_a_slider_keep_the_focus(page) -> None:
         page.settle()
     assert page.value("document.activeElement.id") == "s-loop.force.filter.time_constant_s"
     assert page.value("zwidth.store.past.length") == 3
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "part"),
+    [
+        ("wall-stiffness", "1e300", 'K of the wall is a number in N/m, such as 4000, up to 1e15; got "1e300"'),
+        ("wall-damping", "3 mm", 'B of the wall is a number in Ns/m, such as 10, up to 1e15; got "3 mm"'),
+        ("wall-damping", "", 'got ""'),
+        ("goal", "8 N/mm", 'a goal is a stiffness in kN/m, a number above 0 such as 8; got "8 N/mm"'),
+    ],
+)
+def test_what_is_typed_wrong_is_said_and_changes_nothing(page, field, text, part) -> None:
+    page.change(wall={"stiffness": 4000, "damping": 10})
+    page.settle()
+    page.page.fill(f"#{field}", text)
+    page.page.press(f"#{field}", "Enter")
+    if field == "goal":
+        page.page.click("#seek")
+    assert part in page.status
+    assert page.value("zwidth.state.wall") == {"stiffness": 4000, "damping": 10}
+
+
+def test_a_wrong_number_is_forgotten_with_the_next_change(page) -> None:
+    field = page.page.locator(f"[id='n-{PERIOD}']")
+    field.fill("")
+    field.press("Enter")
+    assert field.evaluate("(field) => field.validationMessage") == (
+        'sampling period is a number in s, such as 0.00125; got ""'
+    )
+    page.page.focus("#chart")
+    page.page.keyboard.press("ArrowRight")
+    assert field.evaluate("(field) => [field.value, field.validity.valid]") == ["0.00125", True]
+
+
+def test_both_fields_of_a_wall_emptied_choose_none(page) -> None:
+    page.page.fill("#wall-stiffness", "0")
+    page.page.press("#wall-stiffness", "Enter")
+    page.settle()
+    assert page.value("zwidth.state.wall") == {"stiffness": 0, "damping": 0}
+    assert page.page.locator("#verdict").text_content().startswith("undecided, on the edge")
+    page.page.fill("#wall-damping", "")
+    page.page.fill("#wall-stiffness", "")
+    page.page.press("#wall-stiffness", "Enter")
+    page.settle()
+    assert page.value("zwidth.state.wall") is None

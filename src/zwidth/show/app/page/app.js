@@ -6,7 +6,7 @@
  * Whatever is asked for is asked for in `ask`; whatever is drawn is drawn in `draw`.
  */
 
-import { number, quantity } from "./canvas.js";
+import { quantity } from "./canvas.js";
 import { ChartView } from "./chart_view.js";
 import { Connection, Dropped, Refusal } from "./connection.js";
 import { linkOf, readLink, Store } from "./state.js";
@@ -16,6 +16,8 @@ import { FaceView } from "./face_view.js";
 import { ContactPanel } from "./contact_panel.js";
 import { PaddlePanel } from "./paddle_panel.js";
 import { writeLegend } from "./legend.js";
+import { WallFields } from "./wall_fields.js";
+import { typedNumber } from "./typed_number.js";
 import { Tour } from "./tour.js";
 import { newTab, saveBytes, showReport } from "./files.js";
 
@@ -76,6 +78,10 @@ export class App {
       onNumber: (settings, drag) => this.store.setNumbers(settings, drag),
       onRelease: () => this.store.release(),
     });
+    this.wallFields = new WallFields(
+      { stiffness: byId("wall-stiffness"), damping: byId("wall-damping"), stiffnessUnit: byId("wall-stiffness-unit"), dampingUnit: byId("wall-damping-unit"), verdict: byId("verdict") },
+      { onWall: (wall) => this.store.set({ wall }), say: (sentence, wrong) => this.say(sentence, wrong) },
+    );
     /** @type {import("./state.js").Hand | null} */
     this.hand = null; // that touches now; not part of the history
     this.contact = new ContactPanel(
@@ -292,6 +298,7 @@ export class App {
       return;
     }
     const { K, B } = this.chart.units;
+    byId("goal-unit").textContent = `k${K}`;
     if (!(chart.stiffness_max > 0)) {
       line.textContent = "No stable wall has K > 0 and B ≥ 0.";
       return;
@@ -303,17 +310,7 @@ export class App {
   }
 
   writeWall() {
-    const wall = this.state.wall;
-    const { K, B } = this.chart.units;
-    for (const [id, value, unit] of /** @type {[string, number | undefined, string][]} */ ([["wall-stiffness", wall?.stiffness, K], ["wall-damping", wall?.damping, B]])) {
-      const field = byId(id);
-      if (document.activeElement !== field) field.value = value === undefined ? "" : String(Number(value.toPrecision(4)));
-      byId(`${id}-unit`).textContent = unit;
-    }
-    const found = this.view?.head.chart.wall;
-    const output = byId("verdict");
-    output.className = found?.verdict ?? "";
-    output.textContent = !wall ? "choose a wall on the chart" : !found ? "" : `${found.verdict}, ${found.verdict === "stable" ? "slowest motion" : "oscillates"} at ${quantity(found.frequency, "Hz")}${found.spectral_radius === null ? "" : `, |z| ${number(found.spectral_radius, 5)}`}`;
+    this.wallFields.write(this.state.wall ?? null, this.view?.head.chart.wall, this.chart.units);
   }
 
   /** @param {any} head @param {boolean} another */
@@ -378,9 +375,6 @@ export class App {
     }
     byId("measure").addEventListener("change", () => void this.showMap(byId("measure").value));
     new ResizeObserver(() => this.drawSoon()).observe(byId("scene"));
-    for (const id of ["wall-stiffness", "wall-damping"]) {
-      byId(id).addEventListener("change", () => this.typeWall());
-    }
     for (const tab of document.querySelectorAll("[role=tab]")) {
       tab.addEventListener("click", () => this.showFace(/** @type {HTMLElement} */ (tab).dataset.face ?? "chart"));
     }
@@ -446,16 +440,6 @@ export class App {
     event.preventDefault();
   }
 
-  typeWall() {
-    const numbers = ["wall-stiffness", "wall-damping"].map((id) => Number(byId(id).value.replace(",", ".")));
-    const wrong = numbers.findIndex((value) => !Number.isFinite(value));
-    if (wrong >= 0) {
-      this.say(`${wrong ? "B" : "K"} of the wall is a number, such as ${wrong ? "10" : "4000"}`, true);
-      return;
-    }
-    this.store.set({ wall: { stiffness: numbers[0], damping: numbers[1] } });
-  }
-
   /** @param {string} device */
   choose(device) {
     const from_file = this.connection.files.has(device);
@@ -519,12 +503,12 @@ export class App {
 
   async seek() {
     const field = byId("goal");
-    const goal = 1000 * Number(field.value.replace(",", "."));
+    const goal = 1000 * typedNumber(field.value);
     if (!(goal > 0)) {
-      this.say("a goal is a stiffness above 0, such as 8 kN/m", true);
+      this.say(`a goal is a stiffness in ${byId("goal-unit").textContent}, a number above 0 such as 8; got "${field.value}"`, true);
       return;
     }
-    this.say(`looking for what reaches ${quantity(goal, "N/m")}…`);
+    this.say(`looking for what reaches ${quantity(goal, this.chart.units.K)}…`);
     try {
       const { head } = await this.connection.ask("sensitivity", { state: this.sent(), goal }, this.progress);
       byId("sort").setAttribute("aria-pressed", "true");

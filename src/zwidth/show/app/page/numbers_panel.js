@@ -7,6 +7,7 @@
  */
 
 import { number, quantity } from "./canvas.js";
+import { typedNumber } from "./typed_number.js";
 
 /**
  * @typedef {object} DeviceNumber
@@ -23,6 +24,7 @@ import { number, quantity } from "./canvas.js";
  * @property {boolean} whole
  * @property {number | null} lowest    that is allowed
  * @property {number | null} highest
+ * @property {string[]} excluded       which of these two are not allowed themselves
  * @property {string[] | null} choices
  * @property {string[]} also           paths that change with it
  * @property {boolean} given           whether the file gives it
@@ -209,8 +211,7 @@ export class NumbersPanel {
     field.inputMode = "decimal";
     field.autocomplete = "off";
     field.addEventListener("change", () => {
-      const text = field.value.trim().replace(",", ".");
-      const value = text === "" ? NaN : Number(text);
+      const value = typedNumber(field.value);
       const wrong = this.fault(of, value, field.value);
       field.setCustomValidity(wrong);
       field.reportValidity();
@@ -225,10 +226,14 @@ export class NumbersPanel {
    * @param {DeviceNumber} of @param {number} value @param {string} text
    */
   fault(of, value, text) {
-    if (!Number.isFinite(value)) return `${of.name} is a number${of.unit ? ` in ${of.unit}` : ""}, got "${text}"`;
+    const unit = of.unit === "1" ? "" : of.unit;
+    const limit = (/** @type {number | null} */ end) => `${end} ${unit}`.trim();
+    if (!Number.isFinite(value)) return `${of.name} is a number${unit ? ` in ${unit}` : ""}, such as ${plain(this.valueOf(of))}; got "${text}"`;
     if (of.whole && !Number.isInteger(value)) return `${of.name} is a whole number, got ${text}`;
-    if (of.lowest !== null && value < of.lowest) return `${of.name} is at least ${of.lowest} ${of.unit}, got ${text}`;
-    if (of.highest !== null && value > of.highest) return `${of.name} is at most ${of.highest} ${of.unit}, got ${text}`;
+    const above = of.excluded.includes("lowest");
+    const below = of.excluded.includes("highest");
+    if (of.lowest !== null && (value < of.lowest || (above && value === of.lowest))) return `${of.name} is ${above ? "above" : "at least"} ${limit(of.lowest)}, got ${text}`;
+    if (of.highest !== null && (value > of.highest || (below && value === of.highest))) return `${of.name} is ${below ? "below" : "at most"} ${limit(of.highest)}, got ${text}`;
     return "";
   }
 
