@@ -65,7 +65,7 @@ export class NumbersPanel {
    */
   setNumbers(numbers, settings, another) {
     const before = new Map(another ? [] : this.numbers.map((of) => [of.path, of]));
-    this.numbers = numbers.map((of) => before.get(of.path) ?? of);
+    this.numbers = numbers.map((of) => before.get(of.path) ?? { ...of, unit: of.unit.replaceAll("^2", "²").replaceAll("^3", "³") });
     this.settings = settings;
     if (before.size === numbers.length && numbers.every((of) => before.has(of.path))) this.update(settings);
     else if (this.dragging) this.outdated = true;
@@ -116,6 +116,7 @@ export class NumbersPanel {
     this.rows.clear();
     const focused = this.element.contains(document.activeElement) ? /** @type {HTMLInputElement} */ (document.activeElement) : null;
     const shown = this.numbers.filter((of) => `${of.path} ${of.name} ${of.group.join(" ")}`.toLowerCase().includes(this.filter));
+    /** @type {HTMLElement[]} */
     const parts = [];
     if (this.order) {
       const rank = new Map(this.order.map((each, n) => [each.path, { n, each }]));
@@ -129,6 +130,11 @@ export class NumbersPanel {
         groups.set(title, [...(groups.get(title) ?? []), of]);
       }
       for (const [title, members] of groups) parts.push(this.groupOf(title, members, this.filter !== "" || members[0].group[0] === "loop"));
+    }
+    if (!shown.length && this.filter) {
+      const none = document.createElement("p");
+      none.textContent = `No number has “${this.filter}” in its name or group.`;
+      parts.splice(0, parts.length, none);
     }
     const open = new Set([...this.element.querySelectorAll("details[open]")].map((each) => each.getAttribute("data-title")));
     this.element.replaceChildren(...parts);
@@ -183,7 +189,7 @@ export class NumbersPanel {
       const bar = document.createElement("span");
       bar.className = sensitive < 0 ? "bar negative" : "bar";
       bar.style.setProperty("--share", `${Math.min(100, 30 * Math.abs(sensitive))}%`);
-      note.append(bar, `+1 % gives ${sensitive < 0 ? "−" : "+"}${number(Math.abs(sensitive), 3)} %`);
+      note.append(bar, `+1 % gives ${sensitive < 0 ? "−" : "+"}${number(Math.abs(sensitive), 3)} % of stiffness`);
     }
     const goal = this.goal.get(path);
     if (goal) {
