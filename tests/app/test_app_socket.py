@@ -237,6 +237,10 @@ def test_a_file_that_is_too_large_is_refused(client) -> None:
     assert "at most 5,000,000" in head["sentences"][0]
 
 
+def test_a_file_of_many_short_lines_is_read(client) -> None:
+    assert client.ask("file", name="lines.csv", text="1\n" * 2_400_000)[0]["ok"]
+
+
 def test_a_response_reads_no_file_that_the_page_has_not_sent(client) -> None:
     text = 'name = "m"\n[response]\nfile = "/etc/passwd"\n[loop]\nsampling_period_s = 0.001\n'
     client.ask("file", name="spy.toml", text=text)

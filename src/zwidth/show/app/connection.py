@@ -25,6 +25,7 @@ IN_FLIGHT: Final = 2  # views on their way that the page has not confirmed
 LARGEST_FILE: Final = 5_000_000  # characters
 MOST_FILES: Final = 20
 LARGEST_REQUEST: Final = 1_000_000  # characters of any other message
+MOST_CHARACTERS: Final = 2 * LARGEST_FILE + LARGEST_REQUEST  # characters: JSON writes the end of a line as two
 
 Send = Callable[[bytes], Awaitable[None]]
 
@@ -150,7 +151,7 @@ class Connection:
     async def receive(self, message: str) -> None:
         """Take one message; what is wrong with it is answered in a sentence."""
         try:
-            if len(message) > LARGEST_FILE + LARGEST_REQUEST:
+            if len(message) > MOST_CHARACTERS:
                 raise ValueError(f"a message may have {LARGEST_FILE:,} characters at most")
             content = json.loads(message, parse_constant=_refuse_constant)
             if not isinstance(content, dict):

@@ -19,7 +19,7 @@ import { writeLegend } from "./legend.js";
 import { WallFields } from "./wall_fields.js";
 import { typedNumber } from "./typed_number.js";
 import { Tour } from "./tour.js";
-import { newTab, saveBytes, showReport } from "./files.js";
+import { newTab, readTexts, saveBytes, showReport } from "./files.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").State} State */
@@ -52,6 +52,8 @@ export class App {
     this.view = null;
     this.opened = "";
     this.shown = ""; // device whose view is drawn
+    /** @type {Set<string>} */
+    this.own = new Set(); // device files that have been opened
     this.keys = "";
     this.waits = false; // something is to be drawn on the next frame
     this.undrawn = 0; // views that have come and are not confirmed yet
@@ -317,7 +319,8 @@ export class App {
   writeDevice(head, another) {
     const choice = byId("device-choice");
     const names = head.devices.map((/** @type {any} */ each) => each.name);
-    const own = this.state.from_file ? [this.state.device] : [];
+    if (this.state.from_file) this.own.add(this.state.device);
+    const own = [...this.own].filter((name) => this.connection.files.has(name));
     choice.replaceChildren(...[...own, ...names].map((name) => new Option(name, name)));
     choice.value = this.state.device;
     choice.title = head.description;
@@ -544,11 +547,11 @@ export class App {
   async openFiles(files) {
     if (!files?.length) return;
     try {
-      const texts = await Promise.all([...files].map(async (file) => ({ name: file.name, text: await file.text() })));
+      const texts = await readTexts(files);
       for (const { name, text } of texts) await this.connection.sendFile(name, text);
       const device = texts.find(({ name }) => name.toLowerCase().endsWith(".toml"));
       const response = texts.find(({ text }) => RESPONSE.test(text.slice(0, text.indexOf("\n"))));
-      if (device) this.choose(device.name);
+      if (device) await this.openFile(device.name);
       else if (response) await this.showResponse(response.name);
       else await this.showPoints(texts[0].name);
     } catch (error) {
@@ -557,15 +560,23 @@ export class App {
     byId("file").value = "";
   }
 
+  /** Choose a device file, which may replace one of its name; one that is faulty leaves all as it is. @param {string} name */
+  async openFile(name) {
+    await this.connection.ask("open", { state: { device: name, from_file: true } });
+    this.opened = "";
+    this.choose(name);
+  }
+
   /** A measured response, sampled as the present device; its chart stays for comparison. @param {string} file */
   async showResponse(file) {
-    const name = `${file.replace(/\.\w+$/, "")}.toml`;
+    const plain = `${file.replace(/\.\w+$/, "")}.toml`;
+    const name = this.connection.files.has(plain) ? `${file}.toml` : plain;
     const quoted = (/** @type {string} */ text) => JSON.stringify(text);
     const period = this.view?.head.chart.sampling_period ?? 0.001;
     const text = `name = ${quoted(file)}\n\n[response]\nfile = ${quoted(file)}\n\n[loop]\nsampling_period_s = ${period}\n`;
     await this.connection.sendFile(name, text);
     this.pin();
-    this.choose(name);
+    await this.openFile(name);
   }
 
   /** @param {string} file */
@@ -580,7 +591,9 @@ export class App {
       verdict: head.verdicts[n],
     }));
     this.chart.follow();
-    this.say(`${head.points.length} measured points of ${file}`);
+    const judged = this.chart.points.filter((point) => point.measured);
+    const agreeing = judged.filter((point) => point.measured === point.verdict).length;
+    this.say(`${head.points.length} measured points of ${file}${judged.length ? `; the chart agrees with ${agreeing} of ${judged.length} verdicts` : ""}`);
     this.drawSoon();
   }
 }

@@ -13,6 +13,7 @@
 
 const SHORTEST_WAIT = 250; // ms before a lost socket is opened again, doubled each time
 const LONGEST_WAIT = 5000;
+export const LARGEST_FILE = 5_000_000; // characters, as the server has it
 
 /**
  * Head and arrays of a message; the arrays are views of the message itself.
@@ -46,6 +47,11 @@ export class Refusal extends Error {
     super(head.sentences.join("; "));
     this.status = head.status;
   }
+}
+
+/** @param {string} sentence */
+export function refusal(sentence) {
+  return new Refusal({ sentences: [sentence], status: "bad input" });
 }
 
 /** A request that a newer one of its kind replaced, or whose socket was lost. */
@@ -149,14 +155,23 @@ export class Connection {
   }
 
   /**
-   * Give the server a file that the user has opened.
+   * Give the server a file that the user has opened. One that it refuses is not kept, and one that is too large is not
+   * sent: the server would close the socket, at every attempt to open it again.
    *
    * @param {string} name
    * @param {string} text
    */
-  sendFile(name, text) {
+  async sendFile(name, text) {
+    const most = LARGEST_FILE.toLocaleString("en");
+    if (text.length > LARGEST_FILE) throw refusal(`${name} has ${text.length.toLocaleString("en")} characters; at most ${most} are read`);
+    if (JSON.stringify(text).length > 2 * LARGEST_FILE) throw refusal(`${name} is no text`);
     this.files.set(name, text);
-    return this.ask("file", { name, text });
+    try {
+      return await this.ask("file", { name, text });
+    } catch (error) {
+      if (error instanceof Refusal) this.files.delete(name);
+      throw error;
+    }
   }
 
   /** Tell the server that a view has been drawn: it sends no more than two that have not. */

@@ -1,3 +1,5 @@
+import { LARGEST_FILE, refusal } from "./connection.js";
+
 /**
  * Offer bytes as a file to keep.
  *
@@ -33,4 +35,15 @@ export async function showReport(tab, bytes, token) {
   const answer = await fetch(`reports?token=${encodeURIComponent(token)}`, { method: "POST", body: bytes });
   if (!answer.ok) throw new Error(await answer.text());
   tab.location.href = new URL(`reports/${await answer.text()}`, location.href).href;
+}
+
+/**
+ * Names and texts of files. Throws Refusal for one that is too large to be read at all.
+ *
+ * @param {FileList} files
+ */
+export async function readTexts(files) {
+  const large = [...files].find((file) => file.size > 4 * LARGEST_FILE); // bytes; a character has four at most
+  if (large) throw refusal(`${large.name} has ${Math.round(large.size / 1e6)} MB; at most ${LARGEST_FILE.toLocaleString("en")} characters are read`);
+  return Promise.all([...files].map(async (file) => ({ name: file.name, text: await file.text() })));
 }
