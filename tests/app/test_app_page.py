@@ -452,3 +452,24 @@ def sampled_response(loop, frequency):
 
     A, AP, _ = terms_along(circle_factors(table_of_loops(loop)), 2.0 * np.pi * frequency * loop.period).T
     return AP / A
+
+
+def test_measured_points_are_in_the_legend_and_removed_there(page) -> None:
+    for _ in range(3):
+        page.page.click("#pin")
+    for layer in ("decay", "models"):
+        page.page.check(f"[data-layer={layer}]")
+    page.settle()
+    page.drop(
+        points_csv="stiffness_N_per_m,damping_Ns_per_m,verdict\n2000,10,stable\n9000,10,stable\n9900,10,unstable\n"
+    )
+    page.wait("zwidth.chart.points.length === 3")
+    assert page.status == "3 measured points of points.csv; the chart agrees with 2 of 3 verdicts"
+    page.settle()
+    looks = page.value("[...document.querySelectorAll('#legend line')].map((one) => one.outerHTML)")
+    assert len(looks) == 9
+    assert len(set(looks)) == 9, "each line has a look of its own"
+    assert "○ measured, × measured as unstable" in page.page.locator("#legend").text_content()
+    page.page.click("[aria-label='Remove the measured points']")
+    page.settle()
+    assert "measured" not in page.page.locator("#legend").text_content()

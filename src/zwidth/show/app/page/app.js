@@ -19,7 +19,7 @@ import { writeLegend } from "./legend.js";
 import { WallFields } from "./wall_fields.js";
 import { typedNumber } from "./typed_number.js";
 import { Tour } from "./tour.js";
-import { newTab, readTexts, saveBytes, showReport } from "./files.js";
+import { newTab, readTexts, responseDevice, saveBytes, showReport } from "./files.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").State} State */
@@ -220,7 +220,7 @@ export class App {
       this.chart.more = null;
       return;
     }
-    this.say(`computing ${layers.join(" and ")}…`);
+    this.say(`computing ${layers.join(" and ").replace("bounds", "published conditions")}…`);
     try {
       this.chart.more = await this.connection.ask("more", { state: this.sent(), layers }, this.progress);
       this.say("");
@@ -571,10 +571,7 @@ export class App {
   async showResponse(file) {
     const plain = `${file.replace(/\.\w+$/, "")}.toml`;
     const name = this.connection.files.has(plain) ? `${file}.toml` : plain;
-    const quoted = (/** @type {string} */ text) => JSON.stringify(text);
-    const period = this.view?.head.chart.sampling_period ?? 0.001;
-    const text = `name = ${quoted(file)}\n\n[response]\nfile = ${quoted(file)}\n\n[loop]\nsampling_period_s = ${period}\n`;
-    await this.connection.sendFile(name, text);
+    await this.connection.sendFile(name, responseDevice(file, this.view?.head.chart.sampling_period ?? 0.001));
     this.pin();
     await this.openFile(name);
   }

@@ -250,7 +250,7 @@ export class ChartView {
         colour: colours[COLOURS[n % COLOURS.length]],
         rings: /** @type {Float64Array} */ (rings.values),
         ends: /** @type {Int32Array} */ (frame.arrays[`${key}.rings_ends`].values),
-        dash: DASHES[n % DASHES.length],
+        dash: DASHES[(n + Math.floor(n / COLOURS.length)) % DASHES.length], // another one at each round of colours
       });
     };
     for (const each of this.pinned) add(each.frame, each.name, "chart");
@@ -277,14 +277,14 @@ export class ChartView {
     let n = 0;
     return frame.head.bounds.conditions
       .filter((/** @type {any} */ one) => one.stiffness_max > 0)
-      .map((/** @type {any} */ one) => {
+      .map((/** @type {any} */ one, /** @type {number} */ k) => {
         const holds = !one.violated.length;
         return {
           name: one.name,
           source: one.source,
           holds,
-          colour: holds ? colours[COLOURS[n++ % COLOURS.length]] : colours.grey,
-          dash: holds ? [] : [3, 3],
+          colour: holds ? colours[COLOURS[n++ % COLOURS.length]] : colours.grey, // grey: its assumptions are not met
+          dash: holds ? [] : DASHES[k % DASHES.length],
           values: frame.arrays[one.array].values,
         };
       });

@@ -2,7 +2,7 @@
  * Other faces of the same wall: frequency along the edge, impedance, Nyquist plot, eigenvalues in the unit circle.
  */
 
-import { axisUnit, drawSentence, drawText, fitCanvas, niceTicks, palette, quantity, tickLabels } from "./canvas.js";
+import { axisUnit, drawSentence, drawText, fitCanvas, niceTicks, palette, quantity, textWidth, tickLabels } from "./canvas.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
@@ -10,6 +10,7 @@ import { axisUnit, drawSentence, drawText, fitCanvas, niceTicks, palette, quanti
 const MARGIN = { left: 62, right: 18, top: 30, bottom: 46 };
 const SHOWN = 2.2; // distance from the origin that the Nyquist plot shows at least
 const MOST = 12; // and at most
+const GAP = 14; // css px between names
 
 export class FaceView {
   /** @param {HTMLCanvasElement} canvas */
@@ -79,7 +80,10 @@ export class FaceView {
     const all = lines.flatMap((line) => [...frame.arrays[line.key].values]).filter((value) => value > 0 && Number.isFinite(value));
     const scale = logarithmic(box, [frequency[0], frequency[frequency.length - 1]], [Math.min(...all), Math.max(...all)]);
     axes(context, box, scale, { x: "Frequency", xUnit: "Hz", y: "Impedance |Z|", yUnit: "Ns/m" }, colours);
+    const style = { weight: 600 };
     let left = box.left;
+    let up = box.top - 10;
+    if (lines.reduce((sum, line) => sum + textWidth(context, line.name, style) + GAP, 0) > box.right - box.left) up = box.top - 20;
     for (const line of lines) {
       const values = frame.arrays[line.key].values;
       context.strokeStyle = line.colour;
@@ -92,8 +96,10 @@ export class FaceView {
       }
       context.stroke();
       context.setLineDash([]);
-      drawText(context, line.name, left, box.top - 10, { colour: line.colour, weight: 600 });
-      left += 10 + context.measureText(line.name).width * 1.15;
+      const wide = textWidth(context, line.name, style);
+      if (left > box.left && left + wide > box.right) [left, up] = [box.left, box.top - 5];
+      drawText(context, line.name, left, up, { ...style, colour: line.colour });
+      left += wide + GAP;
     }
   }
 
@@ -117,7 +123,7 @@ export class FaceView {
     else this.drawEigenvalues(context, scale, values, colours);
     context.restore();
     const title = nyquist
-      ? "L = P (K + B w) below −1: " + (frame.head.chart.wall?.verdict ?? "") + (frame.arrays["nyquist.disks"] ? "; disks: any passive hand" : "")
+      ? "open loop L = P (K + B w): " + (frame.head.chart.wall?.verdict ?? "") + (frame.arrays["nyquist.disks"] ? "; disks: any passive hand" : "")
       : "eigenvalues in the unit circle: " + (frame.head.chart.wall?.verdict ?? "");
     drawText(context, title, box.left, box.top - 10, { colour: colours.ink });
   }

@@ -47,3 +47,14 @@ export async function readTexts(files) {
   if (large) throw refusal(`${large.name} has ${Math.round(large.size / 1e6)} MB; at most ${LARGEST_FILE.toLocaleString("en")} characters are read`);
   return Promise.all([...files].map(async (file) => ({ name: file.name, text: await file.text() })));
 }
+
+/**
+ * A device file for a measured response.
+ *
+ * @param {string} file
+ * @param {number} period  [s]
+ */
+export function responseDevice(file, period) {
+  const name = JSON.stringify(file);
+  return `name = ${name}\n\n[response]\nfile = ${name}\n\n[loop]\nsampling_period_s = ${period}\n`;
+}

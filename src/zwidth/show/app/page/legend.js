@@ -7,7 +7,7 @@ import { palette } from "./canvas.js";
 /**
  * @param {HTMLElement} list
  * @param {ChartView} chart
- * @param {() => void} onRemove  a pinned chart has been removed
+ * @param {() => void} onRemove  a pinned chart, or the measured walls, have been removed
  */
 export function writeLegend(list, chart, onRemove) {
   const colours = /** @type {any} */ (palette(chart.canvas));
@@ -19,8 +19,8 @@ export function writeLegend(list, chart, onRemove) {
     }));
     return item;
   });
-  const conditions = chart.bounds(colours).map((one) => itemOf(one, `${one.source}${one.holds ? "" : "; its assumptions are not met"}`));
-  list.replaceChildren(...outlines, ...conditions);
+  const conditions = chart.bounds(colours).map((one) => itemOf({ ...one, name: one.holds ? one.name : `${one.name} (assumptions not met)` }, one.source));
+  list.replaceChildren(...outlines, ...conditions, ...pointsOf(chart, onRemove));
 }
 
 /** @param {{name: string, colour: string, dash: number[]}} one @param {string} title */
@@ -33,6 +33,20 @@ function itemOf(one, title) {
   item.append(picture, one.name);
   item.title = title;
   return item;
+}
+
+/** Measured walls, if there are any. @param {ChartView} chart @param {() => void} onRemove */
+function pointsOf(chart, onRemove) {
+  const { points } = chart;
+  if (!points.length) return [];
+  const unstable = points.filter((point) => point.measured === "unstable").length;
+  const item = document.createElement("li");
+  item.append([unstable < points.length && "○ measured", unstable && "× measured as unstable"].filter(Boolean).join(", "));
+  item.append(removal("the measured points", () => {
+    chart.points = [];
+    onRemove();
+  }));
+  return [item];
 }
 
 /** @param {string} name @param {() => void} onClick */

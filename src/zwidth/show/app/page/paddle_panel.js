@@ -42,7 +42,10 @@ export class PaddlePanel {
       },
       onSample: () => {},
       onFault: (sentence) => this.say(sentence),
-      onEnd: () => this.say(`${this.note.textContent ?? ""} The stream has ended.`.trim()),
+      onEnd: () => {
+        const said = this.note.textContent ?? "";
+        this.say(`${said}${said && !said.endsWith(".") ? "." : ""} The stream has ended.`.trim());
+      },
     });
   }
 
