@@ -85,3 +85,17 @@ def test_both_fields_of_a_wall_emptied_choose_none(page) -> None:
     page.page.press("#wall-stiffness", "Enter")
     page.settle()
     assert page.value("zwidth.state.wall") is None
+
+
+def test_a_drag_of_seconds_is_followed_to_its_end(page) -> None:
+    page.page.evaluate(
+        """async () => {
+          for (let n = 0; n < 500; n++) {
+            zwidth.store.setNumbers({ "loop.sampling_period_s": 0.0004 + 0.000004 * ((37 * n) % 500) }, "drag");
+            await new Promise((resolve) => setTimeout(resolve, 4));
+          }
+        }"""
+    )
+    page.settle()
+    last = page.value("zwidth.state.settings['loop.sampling_period_s']")
+    assert page.value("zwidth.view.head.chart.sampling_period") == pytest.approx(last, rel=1e-12)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import zwidth
 from zwidth.model.modes import undamped_modes
 from zwidth.model.operator import Operator
 from zwidth.show.app.frames import pack_frame, unpack_frame
+from zwidth.show.app.worker import ComputeLost, ComputeProcess
 
 PLANT = """name = "paddle"
 [plant]
@@ -261,6 +264,20 @@ def test_a_computation_that_takes_long_is_ended_by_the_next_drag(workbench) -> N
         assert head["ok"]
         assert head["chart"]["stiffness_max"] == pytest.approx(7849.4414930, rel=1e-9)
         assert time.monotonic() - began < 20.0
+
+
+def test_a_process_that_is_ended_while_it_starts_is_lost() -> None:
+    async def lose() -> None:
+        process = ComputeProcess()
+        process._ready = asyncio.ensure_future(asyncio.sleep(60.0))
+        waiting = asyncio.ensure_future(process.ready())
+        await asyncio.sleep(0)
+        process._ready.cancel()
+        with pytest.raises(ComputeLost, match="before it had started"):
+            await waiting
+
+    with ThreadPoolExecutor(1) as thread:  # the browser's tests run an event loop in this one
+        thread.submit(asyncio.run, lose()).result()
 
 
 # Guarantees of a loop of this size take longer than anybody waits.

@@ -77,7 +77,8 @@ class Lane:
 
     async def _lose_patience(self, kind: str) -> None:
         loop = asyncio.get_running_loop()
-        await asyncio.sleep(max(0.0, self._since + PATIENCE - loop.time()))
+        while (left := self._since + PATIENCE - loop.time()) > 0.0:
+            await asyncio.sleep(left)  # meanwhile the next computation may have begun, and has its own time
         self._watch = None
         if self._computing == kind and kind in self._waiting:
             self._ended_for = "replaced"
@@ -111,6 +112,7 @@ class Lane:
         try:
             if self.process is None:
                 self.process, self._sent_files = await self.pool.take(), set()
+            await self.process.ready()  # one that still starts is not ended for a newer request
             await self._send_files()
             self._computing, self._since = request.kind, asyncio.get_running_loop().time()
             async for kind, frame in self.process.ask(request):

@@ -62,6 +62,14 @@ class ComputeProcess:
         if kind != READY:
             raise ComputeLost("a process could not be started")
 
+    async def ready(self) -> None:
+        """Wait until it has started. Raises ComputeLost, also where it was ended meanwhile."""
+        assert self._ready is not None
+        await asyncio.wait([self._ready])  # awaiting it would cancel whoever waits when it is cancelled
+        if self._ready.cancelled():
+            raise ComputeLost("the computing process was ended before it had started")
+        self._ready.result()
+
     async def ask(self, request: Any) -> AsyncIterator[tuple[bytes, bytes]]:
         """Send a request; yields (PROGRESS, frame) any number of times, then (ANSWER, frame) once.
 
@@ -69,8 +77,7 @@ class ComputeProcess:
         """
         assert self.process is not None
         assert self.process.stdin is not None
-        assert self._ready is not None
-        await asyncio.shield(self._ready)
+        await self.ready()
         data = pickle.dumps(request)
         try:
             self.process.stdin.write(len(data).to_bytes(LENGTH, "little") + data)
