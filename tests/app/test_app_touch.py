@@ -196,3 +196,26 @@ def test_what_the_kernel_does_not_cover_is_said(page) -> None:
     page.page.click("button:has-text('Touch')")
     page.wait("document.getElementById('status').classList.contains('wrong')")
     assert not page.value("zwidth.contact.touch.running")
+
+
+def test_the_hand_that_touches_is_not_taken_for_one_of_the_file(page) -> None:
+    page.change(wall={"stiffness": 4000, "damping": 10})
+    page.settle()
+    page.page.click("button:has-text('Touch')")
+    page.wait("zwidth.hand")
+    page.page.select_option("#device-choice", "hapkit-course")
+    page.wait("zwidth.device.label === 'hapkit-course'")
+    assert page.page.locator("#operator option").first.text_content() == "nobody"
+    page.page.select_option("#operator", "course-hand")
+    page.wait("zwidth.device.operator")
+    assert page.page.locator("#operator option").first.text_content() == "as in the file"
+    page.page.select_option("#device-choice", "novint-falcon")
+    page.wait("!zwidth.contact.touching")
+    assert "mass_kg" in page.status
+
+
+def test_who_asks_without_a_connection_is_told(page) -> None:
+    page.page.evaluate("() => { zwidth.connection.open = () => {}; zwidth.connection.socket.close(); }")
+    page.wait("!zwidth.connection.connected")
+    page.page.click("#sort")
+    page.wait("document.getElementById('status').textContent.includes('connection to zwidth is lost')")

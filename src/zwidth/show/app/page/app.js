@@ -17,6 +17,7 @@ import { ContactPanel } from "./contact_panel.js";
 import { PaddlePanel } from "./paddle_panel.js";
 import { writeLegend } from "./legend.js";
 import { WallFields } from "./wall_fields.js";
+import { writeChoices } from "./device_choices.js";
 import { typedNumber } from "./typed_number.js";
 import { Tour } from "./tour.js";
 import { newTab, readTexts, responseDevice, saveBytes, showReport } from "./files.js";
@@ -28,6 +29,7 @@ const FAST = ["frequency", "decay", "models", "hands"]; // layers that come with
 const SLOW = ["guarantees", "bounds"]; // and those that follow when the hand rests
 const RESTS = 250; // ms without a change after which they are asked for
 
+const LOST = "The connection to zwidth is lost; the page keeps its numbers and tries again.";
 // Columns by which a table of measurements is a response and not a list of walls.
 const RESPONSE = /real_m_per_N|force_command_N/;
 // A state that says nothing but which device.
@@ -90,7 +92,7 @@ export class App {
       { tools: byId("contact-tools"), canvas: byId("motion"), text: byId("contact-text") },
       {
         onHand: (hand) => {
-          this.hand = this.device?.operator ? null : hand;
+          this.hand = this.held ? null : hand;
           void this.ask();
         },
         onSimulate: async (options) => {
@@ -124,15 +126,20 @@ export class App {
     });
     this.connection = new Connection(token, {
       onOpen: () => this.refresh(),
-      onLost: () => this.say("The connection to zwidth is lost; the page keeps its numbers and tries again.", true),
+      onLost: () => this.say(LOST, true),
     });
     for (const [name, text] of Object.entries(files)) this.connection.files.set(name, text);
     this.listen();
   }
 
+  /** Whether an operator of the file, or one that was chosen, holds the handle. */
+  get held() {
+    return this.state.operator ? this.state.operator !== "none" : Boolean(this.device?.operator);
+  }
+
   /** The state as the server takes it: without what is not set, held by the hand that touches. */
-  sent() {
-    const state = this.hand ? { ...this.state, operator: null, hand: this.hand } : this.state;
+  sent(hand = this.hand) {
+    const state = hand ? { ...this.state, operator: null, hand } : this.state;
     return Object.fromEntries(Object.entries(state).filter(([, value]) => value !== null && value !== undefined));
   }
 
@@ -170,7 +177,7 @@ export class App {
     const another = opened !== this.opened;
     this.opened = opened;
     try {
-      const { head } = await this.connection.ask("open", { state: this.sent() });
+      const { head } = await this.connection.ask("open", { state: this.sent(null) });
       this.device = head;
       this.writeDevice(head, another);
     } catch (error) {
@@ -211,6 +218,7 @@ export class App {
   showNothing() {
     this.view = null;
     for (const each of [this.chart, this.deviceView]) each.frame = null;
+    this.contact.stop();
     this.drawSoon();
   }
 
@@ -257,7 +265,10 @@ export class App {
 
   /** @param {unknown} error */
   fail(error) {
-    if (error instanceof Dropped) return;
+    if (error instanceof Dropped) {
+      if (!this.connection.connected) this.say(LOST, true);
+      return;
+    }
     if (error instanceof Refusal) {
       if (error.status !== "stopped") this.say(error.message, true);
       return;
@@ -326,11 +337,7 @@ export class App {
     choice.title = head.description;
     document.title = `${head.name} – zwidth`;
     this.numbers.setNumbers(head.numbers, this.state.settings, another);
-    options(byId("model"), [["", head.given_by === "mechanism" ? "full" : "as given"], ...head.models.map((/** @type {string} */ name) => [name, name])], this.state.model ?? "");
-    options(byId("operator"), [["", head.operator ? `${head.operator} (file)` : "nobody"], ["none", "nobody"], ...head.operators.map((/** @type {string} */ name) => [name, name])], this.state.operator ?? "");
-    options(byId("assembly"), [["", head.reference?.assembly ?? "–"], ...head.assemblies.map((/** @type {string} */ name) => [name, name])], this.state.assembly ?? "");
-    options(byId("measure"), [["", "none"], ...head.measures.map((/** @type {any} */ each) => [each.name, `${each.name.replaceAll("_", " ")}`])], another ? "" : byId("measure").value);
-    for (const id of ["model", "assembly", "measure"]) byId(id).disabled = byId(id).options.length < 2;
+    writeChoices({ model: byId("model"), operator: byId("operator"), assembly: byId("assembly"), measure: byId("measure") }, head, this.state, another);
     if (another) {
       this.chart.box = null;
       this.chart.more = null;
@@ -593,10 +600,4 @@ export class App {
     this.say(`${head.points.length} measured points of ${file}${judged.length ? `; the chart agrees with ${agreeing} of ${judged.length} verdicts` : ""}`);
     this.drawSoon();
   }
-}
-
-/** @param {HTMLSelectElement} select @param {string[][]} pairs @param {string} value */
-function options(select, pairs, value) {
-  select.replaceChildren(...pairs.map(([key, text]) => new Option(text, key)));
-  select.value = value;
 }
