@@ -145,6 +145,10 @@ def test_a_map_lies_behind_the_device(page) -> None:
     values = page.value("[...zwidth.deviceView.map.values].filter(Number.isFinite)")
     assert len(values) > 100
     assert page.value("zwidth.deviceView.map.name") == "isotropy"
+    page.page.evaluate("() => zwidth.store.setNumbers({ 'mechanism.links.0.length_m': 0.16 })")
+    assert page.value("zwidth.deviceView.map") is None, "it is of other numbers"
+    page.wait("zwidth.deviceView.map")
+    assert page.value("[...zwidth.deviceView.map.values].filter(Number.isFinite)") != values
 
 
 def test_a_spatial_device_is_turned(page) -> None:
@@ -222,6 +226,8 @@ def test_files_are_dropped_and_opened(page) -> None:
     page.drop(broken_toml="name = 3\n[plant]\nmass_kg = 'heavy'\n")
     page.wait("document.getElementById('status').classList.contains('wrong')")
     assert "mass_kg" in page.status
+    assert page.value("zwidth.state.device") == "paddle.toml", "a faulty file changes nothing"
+    page.change(device="missing.toml")
     page.wait("zwidth.view === null && zwidth.deviceView.scene === null")  # nothing of the device before
     page.page.select_option("#device-choice", "hapkit-course")
     page.wait("zwidth.device?.label === 'hapkit-course'")

@@ -20,7 +20,7 @@ import { WallFields } from "./wall_fields.js";
 import { writeChoices } from "./device_choices.js";
 import { typedNumber } from "./typed_number.js";
 import { Tour } from "./tour.js";
-import { newTab, readTexts, responseDevice, saveBytes, showReport } from "./files.js";
+import { listenToDrops, newTab, readTexts, responseDevice, saveBytes, showReport } from "./files.js";
 
 /** @typedef {import("./connection.js").Frame} Frame */
 /** @typedef {import("./state.js").State} State */
@@ -57,6 +57,7 @@ export class App {
     /** @type {Set<string>} */
     this.own = new Set(); // device files that have been opened
     this.keys = "";
+    this.mapped = ""; // of what the map is
     this.waits = false; // something is to be drawn on the next frame
     this.undrawn = 0; // views that have come and are not confirmed yet
     this.rests = 0;
@@ -164,6 +165,10 @@ export class App {
       this.keys = keys;
       void this.openDevice(opened);
     }
+    // a map of other numbers goes, and comes anew when the hand rests
+    const mapped = JSON.stringify([state.device, state.settings, state.direction, state.axis, state.assembly, state.model]);
+    if (mapped !== this.mapped) this.deviceView.map = null;
+    this.mapped = mapped;
     this.numbers.update(state.settings);
     this.chart.wall = state.wall ?? null;
     byId("undo").disabled = !this.store.past.length;
@@ -223,6 +228,7 @@ export class App {
   }
 
   async askMore() {
+    if (!this.deviceView.map) void this.showMap(byId("measure").value);
     const layers = SLOW.filter((name) => this.chart.layers.has(name));
     if (!layers.length) {
       this.chart.more = null;
@@ -394,7 +400,7 @@ export class App {
     addEventListener("hashchange", () => void this.followLink());
     new ResizeObserver(() => this.drawSoon()).observe(byId("chart"));
     this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-    this.listenToDrops();
+    listenToDrops(byId("drop"), (files) => void this.openFiles(files));
   }
 
   /** @param {string} face */
@@ -421,21 +427,6 @@ export class App {
     const next = tabs[(at + way + tabs.length) % tabs.length];
     this.showFace(next.dataset.face ?? "chart");
     next.focus();
-  }
-
-  listenToDrops() {
-    addEventListener("dragover", (event) => {
-      event.preventDefault();
-      byId("drop").hidden = false;
-    });
-    addEventListener("dragleave", (event) => {
-      if (!event.relatedTarget) byId("drop").hidden = true;
-    });
-    addEventListener("drop", (event) => {
-      event.preventDefault();
-      byId("drop").hidden = true;
-      void this.openFiles(event.dataTransfer?.files ?? null);
-    });
   }
 
   /** @param {KeyboardEvent} event */

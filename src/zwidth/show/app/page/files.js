@@ -58,3 +58,24 @@ export function responseDevice(file, period) {
   const name = JSON.stringify(file);
   return `name = ${name}\n\n[response]\nfile = ${name}\n\n[loop]\nsampling_period_s = ${period}\n`;
 }
+
+/**
+ * Take files that are dropped anywhere on the page.
+ *
+ * @param {HTMLElement} sign  shown while files are dragged over the page
+ * @param {(files: FileList | null) => void} onFiles
+ */
+export function listenToDrops(sign, onFiles) {
+  addEventListener("dragover", (event) => {
+    event.preventDefault();
+    sign.hidden = false;
+  });
+  addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) sign.hidden = true;
+  });
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    sign.hidden = true;
+    onFiles(event.dataTransfer?.files ?? null);
+  });
+}
