@@ -194,14 +194,42 @@ def test_numbers_are_sorted_and_a_goal_is_reached(page) -> None:
     page.page.fill("#goal", "8,5")
     page.page.click("#seek")
     page.wait("zwidth.numbers.goal.size > 0")
+    assert not page.page.locator(".note", has_text="before the last change").count()
     page.page.locator(".reach", has_text="goal at").first.click()
     page.settle()
+    assert page.page.locator(".note").first.text_content().startswith("before the last change: ")
     assert page.stiffness_max == pytest.approx(8500.0, rel=1e-6)
     page.page.fill("#goal", "stiff")
     page.page.click("#seek")
     assert "a goal is a stiffness" in page.status
     page.page.fill("#filter", "motor inertia")
     assert page.page.locator(".number").count() == 2
+
+
+def test_another_estimate_brings_the_numbers_that_it_needs(page) -> None:
+    page.page.select_option("#device-choice", "hapkit-course")
+    page.wait("zwidth.shown === 'bundled hapkit-course'")
+    choice = "[id='n-loop.velocity.method']"
+    for method, brought in (
+        ("savitzky-golay", {"samples": 8, "order": 2}),
+        ("kalman", {"acceleration_noise_m_per_s2": 10.0, "position_noise_m": 1e-5}),
+        ("central-difference", {}),
+    ):
+        page.page.select_option(choice, method)
+        page.settle()
+        page.wait(f"zwidth.numbers.valueOf(zwidth.numbers.rows.get('loop.velocity.method').number) === '{method}'")
+        assert page.status == ""
+        own = zwidth.load("hapkit-course", {"loop.velocity": {"method": method, **brought}})
+        page.wait(f"Math.abs(zwidth.view.head.chart.stiffness_max / {own.at().chart().stiffness_max} - 1) < 1e-9")
+        for key in brought:
+            page.wait(f"document.getElementById('n-loop.velocity.{key}')")
+
+
+def test_a_number_that_can_be_read_in_two_ways_is_none(page) -> None:
+    texts = {"1.5": 1.5, "8,5": 8.5, "0,125": 0.125, "1500": 1500, "1,500": None, "12,000,000": None, "3 mm": None}
+    script = "async (texts) => texts.map((await import('./typed_number.js')).typedNumber)"
+    found = page.page.evaluate(script, list(texts))
+    assert [None if np.isnan(number) else number for number in found] == list(texts.values())
 
 
 def test_a_chart_is_pinned_for_comparison(page) -> None:

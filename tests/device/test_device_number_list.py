@@ -7,6 +7,7 @@ import re
 import tomllib
 from math import isfinite
 
+import numpy as np
 import pytest
 
 import zwidth
@@ -122,7 +123,7 @@ def test_texts_and_whole_numbers():
     method, samples = at(device, "loop.velocity.method"), at(device, "loop.velocity.samples")
     assert "kalman" in method.choices
     assert method.value == "savitzky-golay"
-    assert (samples.whole, samples.low, samples.high, samples.lowest, samples.highest) == (True, 2, 20, 2, 100)
+    assert (samples.whole, samples.low, samples.high, samples.lowest, samples.highest) == (True, 2, 32, 2, 100)
     lag = at(device, "loop.velocity.filter.time_constant_s")
     assert (lag.value, lag.given) == (0.0, False)
     slower = device.with_({lag.path: 0.01})
@@ -144,3 +145,20 @@ def test_one_of_two_keys_that_exclude_each_other():
     late = plain(loop={"sampling_period_s": 0.001, "delay_s": 0.002})
     assert not any(one.path == "loop.delay_samples" for one in device_numbers(late))
     assert not any(one.path == "loop.delay_s" for one in device_numbers(plain()))
+
+
+def test_each_kind_of_table_brings_what_it_needs() -> None:
+    """Chosen one after another in any order, all kinds of estimates and filters give a device."""
+    rng = np.random.default_rng(11)
+    filtered = {"loop.velocity.filter": {"type": "first-order", "time_constant_s": 1e-3}}
+    for base in (zwidth.load("hapkit-course", filtered), zwidth.load("five-bar", filtered)):
+        for _ in range(30):
+            kinds = [one for one in device_numbers(base) if one.brings]
+            assert {one.path for one in kinds} == {"loop.velocity.method", "loop.velocity.filter.type"}
+            one = kinds[rng.integers(len(kinds))]
+            assert set(one.brings) == set(one.choices), "none is left out"
+            choice = one.choices[rng.integers(len(one.choices))]
+            removed = [f"{path}=unset" for path, value in one.brings[choice].items() if value is None]
+            added = [(path, value) for path, value in one.brings[choice].items() if value is not None]
+            base = base.with_([(one.path, choice), *removed, *added])
+            assert next(each for each in device_numbers(base) if each.path == one.path).value == choice

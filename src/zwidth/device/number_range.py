@@ -44,7 +44,8 @@ def _limit(kind: dict[str, Any], ours: str, standard: str) -> float | None:
 
 def typical_size(document: dict[str, Any], steps: KeyPath) -> float:
     """Size that a number which is 0 may have: the largest number under its key in the same part of the file, else
-    what the schema calls usual for it, else the sampling period for a time, else the largest number of its unit in
+    what the schema calls usual for it, else the sampling period for a time and a tenth of the sampling rate for a
+    frequency, else the largest number of its unit in
     the file, else what is usual for its unit, else 1. Numbers without a unit have nothing in common."""
     return _of_its_kind(document, steps) or _of_its_unit(document, steps) or USUAL.get(schema.key_unit(steps), 1.0)
 
@@ -53,8 +54,8 @@ def _of_its_kind(document: dict[str, Any], steps: KeyPath) -> float:
     """The size that numbers of the same meaning have; 0 where there are none."""
     own, period = _key(steps), document.get("loop", {}).get("sampling_period_s", 0.0)
     beside = [abs(v) for path, v in _finite(document) if _key(path) == own and path[0] == steps[0]]
-    time = schema.key_unit(steps) == "s"
-    return max(beside, default=0.0) or schema.usual_size(steps) or (float(period) if time else 0.0)
+    by_period = {"s": float(period), "Hz": 0.1 / float(period) if period else 0.0}
+    return max(beside, default=0.0) or schema.usual_size(steps) or by_period.get(schema.key_unit(steps), 0.0)
 
 
 def _of_its_unit(document: dict[str, Any], steps: KeyPath) -> float:

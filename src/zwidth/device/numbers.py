@@ -31,6 +31,9 @@ OTHERS: Final = {
 }
 
 
+MOST_BROUGHT: Final = 4  # rounds in which keys that a kind of table needs are added
+
+
 @dataclass(frozen=True)
 class DeviceNumber:
     """A number of a device file, or a text that is one of a list.
@@ -48,6 +51,7 @@ class DeviceNumber:
     scale        of that slider
     whole        whether only whole numbers are allowed
     choices      the texts that are allowed; () for a number
+    brings       what each of them but the present one changes beside itself: path -> value; None: removed
     also         paths that must be given the same value: the mirror image in a symmetric matrix
     given        whether the file has it; otherwise `value` is what leaving it out amounts to
     """
@@ -67,6 +71,7 @@ class DeviceNumber:
     scale: Scale
     whole: bool
     choices: tuple[str, ...]
+    brings: dict[str, dict[str, float | None]]
     also: tuple[str, ...]
     given: bool
 
@@ -208,12 +213,53 @@ def _choices(document: dict[str, Any], steps: KeyPath) -> tuple[str, ...]:
     return tuple(found) if len(found) > 1 else ()
 
 
+def _brings(
+    document: dict[str, Any], steps: KeyPath, choices: tuple[str, ...]
+) -> dict[str, dict[str, float | None]]:
+    """What another kind of table needs that is not there, of usual size, and what it does not read; no entry for a
+    kind that is refused for another reason."""
+    if steps[-1] not in schema.TAGS:
+        return {}
+    table = dotted(steps[:-1], document)
+    found: dict[str, dict[str, float | None]] = {}
+    for choice in choices:
+        changed = address.assign(document, dotted(steps, document), choice)
+        before, after = (_table(one, steps[:-1]) for one in (document, changed))
+        brought: dict[str, float | None] = {f"{table}.{key}": None for key in before if key not in after}
+        for _ in range(MOST_BROUGHT):
+            try:
+                check(changed, "")
+            except DeviceError as error:
+                missing = [one.key for one in error.faults if one.key.startswith(f"{table}.")]
+                for path in missing:
+                    last = path.removeprefix(f"{table}.")
+                    size = typical_size(changed, (*steps[:-1], last))
+                    _, whole = number_limits(changed, (*steps[:-1], last))
+                    brought[path] = round(size) if whole else size
+                    changed = address.assign(changed, path, brought[path])
+                if not missing:
+                    break
+            else:
+                found[choice] = brought
+                break
+    return found
+
+
+def _table(document: dict[str, Any], steps: KeyPath) -> dict[str, Any]:
+    """The table at a path; an empty one where there is none."""
+    place: Any = document
+    for step in steps:
+        place = place[step] if isinstance(step, int) else place.get(step, {})
+    return place if isinstance(place, dict) else {}
+
+
 def _record(device: Device, steps: KeyPath, value: float | str | None, given: bool) -> DeviceNumber:
     document, path = device.document, dotted(steps, device.document)
     image = schema.mirror_image(steps)
     table = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))
     limits, whole = number_limits(document, steps)
     number = value if isinstance(value, int | float) else None
+    choices = _choices(document, steps) if number is None else ()
     low, high, scale = (None, None, "linear") if number is None else slider(document, steps, number)
     return DeviceNumber(
         path=path,
@@ -230,7 +276,8 @@ def _record(device: Device, steps: KeyPath, value: float | str | None, given: bo
         high=high,
         scale=scale,
         whole=whole,
-        choices=_choices(document, steps) if number is None else (),
+        choices=choices,
+        brings=_brings(document, steps, choices),
         also=() if image is None else (dotted(image, document),),
         given=given,
     )

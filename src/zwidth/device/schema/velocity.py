@@ -26,7 +26,7 @@ class ButterworthFilter(Section):
     """Butterworth low pass by the bilinear (Tustin) rule."""
 
     type: Literal["butterworth"] = documented_key('kind of filter: "first-order" or "butterworth"')
-    order: WholeNumber = documented_key("order, a whole number from 1 to 20", ge=1, le=HIGHEST_ORDER)
+    order: WholeNumber = documented_key("order, a whole number from 1 to 20", usual=2, ge=1, le=HIGHEST_ORDER)
     cutoff_Hz: Number = documented_key("cutoff frequency, below half the sampling frequency", "Hz", gt=0)
     discretisation: Literal["tustin", "tustin-prewarped"] = documented_key(
         "bilinear rule, plain or prewarped at the cutoff", default="tustin"
@@ -76,14 +76,14 @@ class WindowedDifferenceSection(_Method):
     """(x_j - x_{j-n}) / (n T)"""
 
     method: Literal["windowed-difference"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=1, le=LONGEST_WINDOW)
 
 
 class LeastSquaresSlopeSection(_Method):
     """Slope of the line through the newest n positions."""
 
     method: Literal["least-squares-slope"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=2, le=LONGEST_WINDOW)
 
 
 class CentralDifferenceSection(_Method):
@@ -96,9 +96,13 @@ class SavitzkyGolaySection(_Method):
     """Slope of the polynomial through the newest n positions."""
 
     method: Literal["savitzky-golay"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=2, le=LONGEST_WINDOW)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=2, le=LONGEST_WINDOW)
     order: WholeNumber = documented_key(
-        '"savitzky-golay": degree of the polynomial, a whole number from 1 to 10', "1", ge=1, le=HIGHEST_DEGREE
+        '"savitzky-golay": degree of the polynomial, a whole number from 1 to 10',
+        "1",
+        usual=2,
+        ge=1,
+        le=HIGHEST_DEGREE,
     )
     centred: Annotated[bool, Strict()] = documented_key(
         '"savitzky-golay": true for the slope in the middle of the window instead of at its newest position',
@@ -121,10 +125,14 @@ class AlphaBetaSection(_Method):
 
     method: Literal["alpha-beta"] = documented_key(_METHOD)
     alpha: Number = documented_key(
-        '"alpha-beta": share of the error given to the position, below 2', "1", gt=0, lt=2
+        '"alpha-beta": share of the error given to the position, below 2', "1", usual=0.6, gt=0, lt=2
     )
     beta: Number = documented_key(
-        '"alpha-beta": share of the error given, over T, to the velocity, below 4 - 2 alpha', "1", gt=0, lt=4
+        '"alpha-beta": share of the error given, over T, to the velocity, below 4 - 2 alpha',
+        "1",
+        usual=0.2,
+        gt=0,
+        lt=4,
     )
 
 
@@ -133,17 +141,17 @@ class KalmanSection(_Method):
 
     method: Literal["kalman"] = documented_key(_METHOD)
     acceleration_noise_m_per_s2: Number = documented_key(
-        '"kalman": standard deviation of the accelerations to expect', "m/s^2", gt=0
+        '"kalman": standard deviation of the accelerations to expect', "m/s^2", usual=10.0, gt=0
     )
-    position_noise_m: Number | None = documented_key(_NOISE, "m", gt=0, default=None)
+    position_noise_m: Number | None = documented_key(_NOISE, "m", usual=1e-5, gt=0, default=None)
 
 
 class FoawSection(_Method):
     """Slope of the longest window that a line fits within the noise; it has no chart."""
 
     method: Literal["foaw"] = documented_key(_METHOD)
-    samples: WholeNumber = documented_key(_SAMPLES, "1", ge=1, le=LONGEST_WINDOW)
-    position_noise_m: Number | None = documented_key(_NOISE, "m", gt=0, default=None)
+    samples: WholeNumber = documented_key(_SAMPLES, "1", usual=8, ge=1, le=LONGEST_WINDOW)
+    position_noise_m: Number | None = documented_key(_NOISE, "m", usual=1e-5, gt=0, default=None)
     fit: Literal["end-fit", "best-fit"] = documented_key(
         '"foaw": "end-fit", the line through the ends of the window, or "best-fit", the least-squares line',
         default="end-fit",
@@ -154,7 +162,9 @@ class LevantSection(_Method):
     """The tracker that is exact for accelerations up to a bound; it has no chart."""
 
     method: Literal["levant"] = documented_key(_METHOD)
-    acceleration_max_m_per_s2: Number = documented_key('"levant": largest acceleration to expect', "m/s^2", gt=0)
+    acceleration_max_m_per_s2: Number = documented_key(
+        '"levant": largest acceleration to expect', "m/s^2", usual=20.0, gt=0
+    )
 
 
 def _method(table: Any) -> Any:

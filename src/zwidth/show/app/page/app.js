@@ -492,10 +492,11 @@ export class App {
       return;
     }
     this.say("computing what to change first…");
+    const { settings } = this.state;
     try {
       const { head } = await this.connection.ask("sensitivity", { state: this.sent() }, this.progress);
       button.setAttribute("aria-pressed", "true");
-      this.numbers.sortBy(head.sensitivities);
+      this.numbers.sortBy(head.sensitivities, settings);
       this.say("");
     } catch (error) {
       this.fail(error);
@@ -510,11 +511,12 @@ export class App {
       return;
     }
     this.say(`looking for what reaches ${quantity(goal, this.chart.units.K)}…`);
+    const { settings } = this.state;
     try {
       const { head } = await this.connection.ask("sensitivity", { state: this.sent(), goal }, this.progress);
       byId("sort").setAttribute("aria-pressed", "true");
-      this.numbers.sortBy(head.sensitivities);
-      this.numbers.setGoal(head.goal.goal ?? head.goal.numbers ?? []);
+      this.numbers.sortBy(head.sensitivities, settings);
+      this.numbers.setGoal(head.goal.goal ?? head.goal.numbers ?? [], settings);
       this.say("");
     } catch (error) {
       this.fail(error);

@@ -531,7 +531,7 @@ export class ChartView {
 
 /** @type {{[name: string]: string}} */
 const GUARANTEES = {
-  passive: "every passive operator",
+  passive: "every passive hand",
   "passive-at-actuator": "passive, at the actuator",
   "spring-stable": "every spring",
   "nyquist-spring": "Nyquist spring",

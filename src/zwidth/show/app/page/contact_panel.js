@@ -39,7 +39,7 @@ export class ContactPanel {
     });
     this.go = this.button("Let go", "Simulate the device, let go 1 mm inside the wall");
     this.feel = this.button("Touch", "The mouse becomes a hand on a spring");
-    this.hear = this.button("Sound", "Hear the handle's velocity");
+    this.hear = this.button("Sound", "Hear the handle's velocity, while the wall is touched");
     this.oneSided = this.check("one-sided", "The wall pushes out and never pulls");
     this.feel.setAttribute("aria-pressed", "false");
     this.hear.setAttribute("aria-pressed", "false");

@@ -27,6 +27,7 @@ const STRIP = 92; // css px of the upper strip
 const SPAN = 1.5; // s of a touch that are shown
 const LOOP = 0.4; // s of it in the loop, where no frequency is known
 const CYCLES = 3; // in the loop
+const FLATTEST = 0.002; // of its largest value: as little as an axis shows of a signal that hardly changes
 const SPANS = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1]; // m to either side of the wall
 const STEP = 0.05; // of the span, by which an arrow key moves the hand
 
@@ -364,6 +365,8 @@ function rangeOf(values, room = false) {
     if (value > high) high = value;
   }
   if (!(high > low)) return Number.isFinite(low) ? [low - 1e-6, low + 1e-6] : [0, 1];
+  const least = FLATTEST * Math.max(Math.abs(low), Math.abs(high));
+  if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
   const more = room ? 0.06 * (high - low) : 0;
   return [low - more, high + more];
 }

@@ -26,6 +26,7 @@ import { typedNumber } from "./typed_number.js";
  * @property {number | null} highest
  * @property {string[]} excluded       which of these two are not allowed themselves
  * @property {string[] | null} choices
+ * @property {{[choice: string]: {[path: string]: number | null}}} brings  what each choice changes beside itself
  * @property {string[]} also           paths that change with it
  * @property {boolean} given           whether the file gives it
  */
@@ -55,6 +56,8 @@ export class NumbersPanel {
     this.goal = new Map();
     this.filter = "";
     this.dragging = false;
+    this.computedFor = "{}"; // settings of the order and the goal
+    this.late = false; // whether numbers have changed since
     this.outdated = false; // rows that are to be made anew after the drag
   }
 
@@ -65,6 +68,10 @@ export class NumbersPanel {
    */
   setNumbers(numbers, settings, another) {
     const before = new Map(another ? [] : this.numbers.map((of) => [of.path, of]));
+    for (const of of numbers) {
+      const known = before.get(of.path);
+      if (known) known.brings = of.brings;
+    }
     this.numbers = numbers.map((of) => before.get(of.path) ?? { ...of, unit: of.unit.replaceAll("^2", "²").replaceAll("^3", "³") });
     this.settings = settings;
     if (before.size === numbers.length && numbers.every((of) => before.has(of.path))) this.update(settings);
@@ -72,15 +79,23 @@ export class NumbersPanel {
     else this.build();
   }
 
-  /** @param {Sensitivity[] | null} order  null: as in the file */
-  sortBy(order) {
+  /** @param {Sensitivity[] | null} order  null: as in the file @param {object} settings  for which it was computed */
+  sortBy(order, settings = this.settings) {
     this.order = order;
+    this.computedFor = JSON.stringify(settings);
     this.build();
   }
 
-  /** @param {GoalNumber[]} goal */
-  setGoal(goal) {
+  /** @param {GoalNumber[]} goal @param {object} settings  for which it was computed */
+  setGoal(goal, settings) {
     this.goal = new Map(goal.map((each) => [each.path, each]));
+    this.computedFor = JSON.stringify(settings);
+    this.writeNotes();
+  }
+
+  /** Write what was computed of each number, and whether numbers have changed since. */
+  writeNotes() {
+    this.late = this.computedFor !== JSON.stringify(this.settings);
     for (const [path, { note, number: of }] of this.rows) this.writeNote(note, path, of);
   }
 
@@ -103,6 +118,7 @@ export class NumbersPanel {
       if (slider) slider.setAttribute("aria-valuetext", quantity(value, of.unit));
       row.classList.toggle("changed", of.path in settings);
     }
+    if (this.late !== (this.computedFor !== JSON.stringify(settings))) this.writeNotes();
   }
 
   /** @param {DeviceNumber} of */
@@ -173,7 +189,7 @@ export class NumbersPanel {
     const field = of.choices ? this.choiceOf(of) : this.fieldOf(of);
     field.id = id;
     const slider = of.choices || of.low === null || of.high === null ? null : this.sliderOf(of, name.textContent ?? "");
-    row.append(name, field, unit);
+    row.append(name, field, ...(of.choices ? [] : [unit]));
     if (slider) row.append(slider);
     row.append(note);
     this.rows.set(of.path, { row, slider, field, note, number: of });
@@ -192,6 +208,7 @@ export class NumbersPanel {
       note.append(bar, `+1 % gives ${sensitive < 0 ? "−" : "+"}${number(Math.abs(sensitive), 3)} % of stiffness`);
     }
     const goal = this.goal.get(path);
+    if (this.late && (goal || typeof sensitive === "number")) note.prepend("before the last change: ");
     if (goal) {
       const button = document.createElement("button");
       button.type = "button";
@@ -247,7 +264,7 @@ export class NumbersPanel {
   choiceOf(of) {
     const choice = document.createElement("select");
     for (const each of of.choices ?? []) choice.append(new Option(each, each));
-    choice.addEventListener("change", () => this.listeners.onNumber(this.changeOf(of, choice.value)));
+    choice.addEventListener("change", () => this.listeners.onNumber({ ...this.changeOf(of, choice.value), ...of.brings[choice.value] }));
     return choice;
   }
 
