@@ -224,19 +224,24 @@ def _brings(
     found: dict[str, dict[str, float | None]] = {}
     for choice in choices:
         changed = address.assign(document, dotted(steps, document), choice)
-        before, after = (_table(one, steps[:-1]) for one in (document, changed))
-        brought: dict[str, float | None] = {f"{table}.{key}": None for key in before if key not in after}
+        read = {key for kind in schema.subschemas(steps[:-1], changed) for key in kind.get("properties", {})}
+        brought: dict[str, float | None] = {}
+        for key in _table(document, steps[:-1]):
+            if key not in read:
+                brought[f"{table}.{key}"] = None
+                changed = address.assign(changed, f"{table}.{key}", address.UNSET)
         for _ in range(MOST_BROUGHT):
             try:
                 check(changed, "")
             except DeviceError as error:
-                missing = [one.key for one in error.faults if one.key.startswith(f"{table}.")]
-                for path in missing:
-                    last = path.removeprefix(f"{table}.")
-                    size = typical_size(changed, (*steps[:-1], last))
-                    _, whole = number_limits(changed, (*steps[:-1], last))
-                    brought[path] = round(size) if whole else size
-                    changed = address.assign(changed, path, brought[path])
+                there = _table(changed, steps[:-1])
+                inside = [one.key.removeprefix(f"{table}.") for one in error.faults]
+                missing = [key for key in inside if key in read and key not in there]
+                for key in missing:
+                    size = typical_size(changed, (*steps[:-1], key))
+                    _, whole = number_limits(changed, (*steps[:-1], key))
+                    brought[f"{table}.{key}"] = round(size) if whole else size
+                    changed = address.assign(changed, f"{table}.{key}", brought[f"{table}.{key}"])
                 if not missing:
                     break
             else:
