@@ -110,7 +110,6 @@ def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) 
         "reading": made.position,
         "place": made.response.truth,
         "force": made.force,
-        "handle": made.handle,
         "made": _made_by_wall(made),
     }
     try:
