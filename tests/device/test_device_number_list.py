@@ -22,6 +22,7 @@ from zwidth.device.read import bundled
 RANDOM = {one.word: one.files for one in random_devices() if one.kind in ("plant", "mechanism") and one.files}
 OWN_LIMIT = re.compile(r"must be (a (whole )?number|(at least|at most|greater than|less than) -?\d)")
 BUNDLED = [name for name, *_ in bundled()]
+MOST_TRIED = 20  # numbers of a device, from its first to its last, whose ends are set
 NAMES = sorted([*BUNDLED, *RANDOM])
 
 
@@ -57,13 +58,15 @@ def test_every_number_of_a_file_is_listed_or_left_out_for_a_reason(name):
 @pytest.mark.parametrize("name", [*BUNDLED, *sorted(RANDOM)[::3]])
 def test_both_ends_of_a_slider_may_be_set(name):
     device, refused = any_device(name), []
-    for one in device_numbers(device):
+    numbers = device_numbers(device)
+    tried = numbers[:: -(-len(numbers) // MOST_TRIED)]
+    for one in numbers:
         if one.low is None or one.high is None:
             assert one.choices or not isfinite(float(one.value))
             continue
         assert one.lowest <= one.low <= one.value <= one.high <= one.highest
         assert one.low < one.high
-        for end in (one.low, one.high):
+        for end in (one.low, one.high) if one in tried else ():
             try:
                 device.with_(dict.fromkeys((one.path, *one.also), end))
             except DeviceError as error:
@@ -71,9 +74,7 @@ def test_both_ends_of_a_slider_may_be_set(name):
                 # never a limit of its own: what it does not go with stands beside it in the device
                 said = [fault.message for fault in error.faults if fault.key == one.path]
                 assert not any(OWN_LIMIT.match(message) for message in said), refused[-1]
-    assert len(refused) <= 2 * len(device_numbers(device)) / 3, (
-        refused
-    )  # of twice as many; some geometries allow little
+    assert len(refused) <= len(tried), refused  # of twice as many; some geometries allow little
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -152,13 +153,12 @@ def test_each_kind_of_table_brings_what_it_needs() -> None:
     rng = np.random.default_rng(11)
     filtered = {"loop.velocity.filter": {"type": "first-order", "time_constant_s": 1e-3}}
     for base in (zwidth.load("hapkit-course", filtered), zwidth.load("five-bar", filtered)):
-        for _ in range(30):
+        for _ in range(6):
             kinds = [one for one in device_numbers(base) if one.brings]
             assert {one.path for one in kinds} == {"loop.velocity.method", "loop.velocity.filter.type"}
             one = kinds[rng.integers(len(kinds))]
             assert set(one.brings) == set(one.choices), "none is left out"
             choice = one.choices[rng.integers(len(one.choices))]
-            removed = [f"{path}=unset" for path, value in one.brings[choice].items() if value is None]
-            added = [(path, value) for path, value in one.brings[choice].items() if value is not None]
-            base = base.with_([(one.path, choice), *removed, *added])
+            brought = [f"{p}=unset" if value is None else (p, value) for p, value in one.brings[choice].items()]
+            base = base.with_([(one.path, choice), *brought])
             assert next(each for each in device_numbers(base) if each.path == one.path).value == choice

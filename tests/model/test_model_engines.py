@@ -58,7 +58,7 @@ def moved_handle(mechanism, here, rng):
     return (None if mechanism.controls == ORIENTATION else position), turn @ here.rotation
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.slow) for n in range(2, 6))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 6))])
 @pytest.mark.parametrize(("joints", "loops"), [(6, 0), (7, 1), (9, 2)])
 def test_every_joint_and_every_closing(seed, joints, loops):
     """Random trees and loops of revolute, prismatic, universal, ball and fixed joints, closed by points, axes and

@@ -51,7 +51,8 @@ class DeviceNumber:
     scale        of that slider
     whole        whether only whole numbers are allowed
     choices      the texts that are allowed; () for a number
-    brings       what each of them but the present one changes beside itself: path -> value; None: removed
+    brings       of a text that says what kind of table it is in, what each of them sets beside itself: path ->
+                 value; None: removed, if it is there
     also         paths that must be given the same value: the mirror image in a symmetric matrix
     given        whether the file has it; otherwise `value` is what leaving it out amounts to
     """
@@ -71,7 +72,7 @@ class DeviceNumber:
     scale: Scale
     whole: bool
     choices: tuple[str, ...]
-    brings: dict[str, dict[str, float | None]]
+    brings: dict[str, dict[str, float | str | None]]
     also: tuple[str, ...]
     given: bool
 
@@ -215,39 +216,50 @@ def _choices(document: dict[str, Any], steps: KeyPath) -> tuple[str, ...]:
 
 def _brings(
     document: dict[str, Any], steps: KeyPath, choices: tuple[str, ...]
-) -> dict[str, dict[str, float | None]]:
-    """What another kind of table needs that is not there, of usual size, and what it does not read; no entry for a
-    kind that is refused for another reason."""
-    if steps[-1] not in schema.TAGS:
+) -> dict[str, dict[str, float | str | None]]:
+    """Of each kind that a table may be of, the keys that are its own, those that are missing of usual size; and
+    None for each that it does not read. No entry for a kind that is refused for another reason."""
+    tag, keys = schema.kinds(steps[:-1])
+    if steps[-1] != tag:
         return {}
     table = dotted(steps[:-1], document)
-    found: dict[str, dict[str, float | None]] = {}
+    own = {key for kind in keys.values() for key in kind if any(key not in other for other in keys.values())}
+    found: dict[str, dict[str, float | str | None]] = {}
     for choice in choices:
-        changed = address.assign(document, dotted(steps, document), choice)
-        read = {key for kind in schema.subschemas(steps[:-1], changed) for key in kind.get("properties", {})}
-        brought: dict[str, float | None] = {}
-        for key in _table(document, steps[:-1]):
-            if key not in read:
-                brought[f"{table}.{key}"] = None
-                changed = address.assign(changed, f"{table}.{key}", address.UNSET)
-        for _ in range(MOST_BROUGHT):
-            try:
-                check(changed, "")
-            except DeviceError as error:
-                there = _table(changed, steps[:-1])
-                inside = [one.key.removeprefix(f"{table}.") for one in error.faults]
-                missing = [key for key in inside if key in read and key not in there]
-                for key in missing:
-                    size = typical_size(changed, (*steps[:-1], key))
-                    _, whole = number_limits(changed, (*steps[:-1], key))
-                    brought[f"{table}.{key}"] = round(size) if whole else size
-                    changed = address.assign(changed, f"{table}.{key}", brought[f"{table}.{key}"])
-                if not missing:
-                    break
-            else:
-                found[choice] = brought
-                break
+        made = _of_kind(document, steps, choice, keys[choice])
+        if made is not None:
+            removed = {f"{table}.{key}": None for key in sorted(own - keys[choice])}
+            there = _table(made, steps[:-1])
+            found[choice] = removed | {f"{table}.{key}": there[key] for key in there if key in own}
     return found
+
+
+def _of_kind(document: dict[str, Any], steps: KeyPath, choice: str, read: set[str]) -> dict[str, Any] | None:
+    """The document with a table of that kind, complete; None where it is refused for another reason.
+
+    read  the keys of that kind
+    """
+    changed = address.assign(document, dotted(steps, document), choice)
+    table = dotted(steps[:-1], changed)
+    for key in _table(document, steps[:-1]):
+        if key not in read:
+            changed = address.assign(changed, f"{table}.{key}", address.UNSET)
+    for _ in range(MOST_BROUGHT):
+        try:
+            check(changed, "")
+        except DeviceError as error:
+            there = _table(changed, steps[:-1])
+            inside = [one.key.removeprefix(f"{table}.") for one in error.faults]
+            missing = [key for key in inside if key in read and key not in there]
+            if not missing:
+                return None
+            for key in missing:
+                size = typical_size(changed, (*steps[:-1], key))
+                _, whole = number_limits(changed, (*steps[:-1], key))
+                changed = address.assign(changed, f"{table}.{key}", round(size) if whole else size)
+        else:
+            return changed
+    return None
 
 
 def _table(document: dict[str, Any], steps: KeyPath) -> dict[str, Any]:

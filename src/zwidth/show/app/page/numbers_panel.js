@@ -26,7 +26,7 @@ import { typedNumber } from "./typed_number.js";
  * @property {number | null} highest
  * @property {string[]} excluded       which of these two are not allowed themselves
  * @property {string[] | null} choices
- * @property {{[choice: string]: {[path: string]: number | null}}} brings  what each choice changes beside itself
+ * @property {{[choice: string]: {[path: string]: any}}} brings  what each choice sets beside itself; null: removed
  * @property {string[]} also           paths that change with it
  * @property {boolean} given           whether the file gives it
  */
@@ -68,10 +68,6 @@ export class NumbersPanel {
    */
   setNumbers(numbers, settings, another) {
     const before = new Map(another ? [] : this.numbers.map((of) => [of.path, of]));
-    for (const of of numbers) {
-      const known = before.get(of.path);
-      if (known) known.brings = of.brings;
-    }
     this.numbers = numbers.map((of) => before.get(of.path) ?? { ...of, unit: of.unit.replaceAll("^2", "²").replaceAll("^3", "³") });
     this.settings = settings;
     if (before.size === numbers.length && numbers.every((of) => before.has(of.path))) this.update(settings);
@@ -264,7 +260,11 @@ export class NumbersPanel {
   choiceOf(of) {
     const choice = document.createElement("select");
     for (const each of of.choices ?? []) choice.append(new Option(each, each));
-    choice.addEventListener("change", () => this.listeners.onNumber({ ...this.changeOf(of, choice.value), ...of.brings[choice.value] }));
+    choice.addEventListener("change", () => {
+      const there = (/** @type {string} */ path) => path in this.settings || this.numbers.some((each) => each.given && each.path === path);
+      const brought = Object.entries(of.brings[choice.value] ?? {}).filter(([path, value]) => value !== null || there(path));
+      this.listeners.onNumber({ ...this.changeOf(of, choice.value), ...Object.fromEntries(brought) });
+    });
     return choice;
   }
 
