@@ -163,7 +163,10 @@ def test_ctrl_c_ends_it_as_it_said() -> None:
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert "ctrl-C ends it" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30)[1] == "zwidth: the workbench has ended\n"
+        try:
+            assert process.communicate(timeout=30)[1] == "zwidth: the workbench has ended\n"
+        finally:
+            process.kill()  # one that goes on would be waited for
         assert process.returncode == 0
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, Final
@@ -104,9 +104,7 @@ def make_app(settings: Settings) -> FastAPI:
         app.state.received = received
         preparing = asyncio.ensure_future(pool.prepare())
         yield
-        preparing.cancel()
-        with suppress(asyncio.CancelledError):
-            await preparing
+        await preparing  # it takes a moment; a start that is cancelled half-way may never end
         await asyncio.gather(*(page.end() for page in open_pages), pool.end())
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
