@@ -334,6 +334,13 @@ def test_the_report_opens_in_a_tab(page) -> None:
     assert tab.evaluate("() => self.origin") == "null"
 
 
+def test_a_tab_that_the_browser_does_not_open_is_said(page) -> None:
+    page.page.evaluate("() => { window.open = () => null; }")
+    page.page.select_option("#export", "report.tab")
+    page.wait("document.getElementById('status').classList.contains('wrong')")
+    assert page.status.endswith("save the report as a file instead")
+
+
 def test_a_lost_connection_comes_back_with_the_state_kept(page) -> None:
     page.page.evaluate("() => zwidth.store.setNumbers({ 'loop.delay_samples': 0.5 })")
     page.settle()

@@ -15,17 +15,18 @@ export function saveBytes(name, bytes) {
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 }
 
-/** An empty tab that says what it waits for. @param {string} sentence  Throws Error where the browser allows none */
+/** An empty tab that says what it waits for. @param {string} sentence  Throws Refusal where the browser allows none */
 export function newTab(sentence) {
   const tab = window.open("", "_blank");
-  if (!tab) throw new Error("this browser lets no page open a tab; save the report as a file instead");
+  if (!tab) throw refusal("this browser lets no page open a tab; save the report as a file instead");
   tab.document.title = sentence;
   tab.document.body.textContent = sentence;
   return tab;
 }
 
 /**
- * Show a report in a tab. It goes through the server, which hands it out so that nothing in it can run.
+ * Show a report in a tab. It goes through the server, which hands it out so that nothing in it can run. Throws Refusal
+ * where the server takes none.
  *
  * @param {Window} tab
  * @param {Uint8Array<ArrayBuffer>} bytes
@@ -33,7 +34,7 @@ export function newTab(sentence) {
  */
 export async function showReport(tab, bytes, token) {
   const answer = await fetch(`reports?token=${encodeURIComponent(token)}`, { method: "POST", body: bytes });
-  if (!answer.ok) throw new Error(await answer.text());
+  if (!answer.ok) throw refusal((await answer.text()).trim());
   tab.location.href = new URL(`reports/${await answer.text()}`, location.href).href;
 }
 
