@@ -18,7 +18,7 @@ from zwidth.model.posture_failure import OutOfReach
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State
-from zwidth.show.mass_chain import as_chain
+from zwidth.show.mass_chain import MassChain, as_chain
 from zwidth.show.mechanism_scene import mechanism_scene, stays_in_plane
 from zwidth.show.scene_rates import mode_strokes
 
@@ -254,10 +254,14 @@ def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -
     return {"conditions": head}, arrays
 
 
+def _chain(point: OperatingPoint) -> MassChain | None:
+    return None if point.response is not None else as_chain(point.ungripped_plant)
+
+
 def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
     """Where the links are, the handle and the rendered direction; the masses of a plant that is a row of them."""
     if point.mechanism is None:
-        chain = None if point.response is not None else as_chain(point.ungripped_plant)
+        chain = _chain(point)
         if chain is None:
             return {"kind": "none"}, {}
         return {"kind": "chain"}, {
@@ -295,7 +299,7 @@ def _scene(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 def scene_rates(point: OperatingPoint) -> Contents:
     """How the scene's points move per unit of each coordinate of the plant; or `still`, why that is not drawn."""
     if point.mechanism is None:
-        chain = None if point.response is not None else as_chain(point.ungripped_plant)
+        chain = _chain(point)
         if chain is None:
             return {}, {}
         rates = np.zeros((len(chain.mass), 3, point.plant.size))  # an arm's own coordinate is the last

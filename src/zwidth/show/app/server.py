@@ -17,6 +17,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.requests import HTTPConnection
 from fastapi.responses import JSONResponse, PlainTextResponse
 
 from zwidth.show.app.connection import LARGEST_FILE, LARGEST_REQUEST, Connection
@@ -145,8 +146,7 @@ def make_app(settings: Settings) -> FastAPI:
 
     @app.post("/reports")
     async def keep_report(request: Request, token: str | None = None) -> Response:
-        origin = urlsplit(request.headers.get("origin", ""))
-        if not settings.admits(token) or origin.netloc != request.headers.get("host", ""):
+        if not _from_own_page(request, settings, token):
             return PlainTextResponse("only the workbench's own page may send a report\n", 403)
         content = bytearray()
         async for part in request.stream():
@@ -175,7 +175,7 @@ def make_app(settings: Settings) -> FastAPI:
 
     @app.websocket("/socket")
     async def socket(websocket: WebSocket, token: str | None = None) -> None:
-        if not _may_open(websocket, settings, token) or len(open_pages) >= MOST_PAGES:
+        if not _from_own_page(websocket, settings, token) or len(open_pages) >= MOST_PAGES:
             await websocket.close(code=1008)
             return
         await websocket.accept()
@@ -196,8 +196,8 @@ def make_app(settings: Settings) -> FastAPI:
     return app
 
 
-def _may_open(websocket: WebSocket, settings: Settings, token: str | None) -> bool:
-    """Whether a socket is opened by this server's own page."""
-    host = websocket.headers.get("host", "")
-    origin = urlsplit(websocket.headers.get("origin", ""))
+def _from_own_page(asked: HTTPConnection, settings: Settings, token: str | None) -> bool:
+    """Whether a socket is opened, or something sent, by this server's own page."""
+    host = asked.headers.get("host", "")
+    origin = urlsplit(asked.headers.get("origin", ""))
     return settings.knows_host(host) and settings.admits(token) and origin.netloc == host

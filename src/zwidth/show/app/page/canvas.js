@@ -279,6 +279,24 @@ export function drawText(context, line, x, y, style = {}) {
 }
 
 /**
+ * A text in lines, broken between its words.
+ *
+ * @param {string} text
+ * @param {(line: string) => boolean} fits  whether a line is short enough; a word alone may be longer
+ * @returns {string[]}
+ */
+export function inLines(text, fits) {
+  /** @type {string[]} */
+  const lines = [];
+  for (const word of text.split(" ")) {
+    const longer = `${lines.at(-1)} ${word}`;
+    if (lines.length && fits(longer)) lines[lines.length - 1] = longer;
+    else lines.push(word);
+  }
+  return lines;
+}
+
+/**
  * Write a sentence in the middle of a canvas, in as many lines as it takes.
  *
  * @param {CanvasRenderingContext2D} context
@@ -288,13 +306,7 @@ export function drawText(context, line, x, y, style = {}) {
  * @param {string} colour
  */
 export function drawSentence(context, sentence, width, height, colour) {
-  /** @type {string[]} */
-  const lines = [];
-  for (const word of sentence.split(" ")) {
-    const longer = lines.length ? `${lines[lines.length - 1]} ${word}` : word;
-    if (lines.length && textWidth(context, longer) < width - 2 * SENTENCE_MARGIN) lines[lines.length - 1] = longer;
-    else lines.push(word);
-  }
+  const lines = inLines(sentence, (line) => textWidth(context, line) < width - 2 * SENTENCE_MARGIN);
   const top = height / 2 - (LINE_HEIGHT * (lines.length - 1)) / 2;
   lines.forEach((line, n) => drawText(context, line, width / 2, top + LINE_HEIGHT * n, { align: "center", baseline: "middle", colour }));
 }

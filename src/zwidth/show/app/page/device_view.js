@@ -6,8 +6,8 @@
  * touched, links, joints and handle are drawn as they vibrate.
  */
 
-import { drawText, fitCanvas, palette, quantity } from "./canvas.js";
-import { inLines, Labels } from "./labels.js";
+import { drawText, fitCanvas, inLines, palette, quantity } from "./canvas.js";
+import { Labels } from "./labels.js";
 import { drawKey, drawMap, drawPlane, drawScale, placeOf } from "./map_drawing.js";
 import { ARROW, aroundHandle, cross, drawForces, drawMechanism, linkStyle, nameParts, segmentsOf } from "./mechanism_drawing.js";
 import { captionOf, Vibration } from "./vibration.js";
@@ -348,7 +348,7 @@ export class DeviceView {
   /** @param {number} width @param {number} height @param {number} top  where the canvas is free @param {any} colours */
   writeCaption(width, height, top, colours) {
     const caption = this.caption();
-    const layouts = caption ? [[caption], inLines(caption, NARROW)] : [];
+    const layouts = caption ? [[caption], inLines(caption, (line) => line.length <= NARROW)] : [];
     const style = { colour: colours.ink, halo: colours.surface };
     const places = layouts.flatMap((lines, rank) => {
       const size = this.labels.sizeOf(lines, style);

@@ -157,15 +157,3 @@ export class Labels {
 function away({ x, y }, { left, top, width, height }) {
   return Math.hypot(Math.max(left - x, x - left - width, 0), Math.max(top - y, y - top - height, 0));
 }
-
-/** Words in lines of so many letters, or of one word. @param {string} text @param {number} letters @returns {string[]} */
-export function inLines(text, letters) {
-  /** @type {string[]} */
-  const lines = [];
-  for (const word of text.split(" ")) {
-    const last = lines.at(-1);
-    if (last !== undefined && last.length + 1 + word.length <= letters) lines[lines.length - 1] = `${last} ${word}`;
-    else lines.push(word);
-  }
-  return lines;
-}

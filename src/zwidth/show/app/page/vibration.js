@@ -134,16 +134,12 @@ export class Vibration {
     return { half, count: Math.max(2, Math.round(played / this.step)) };
   }
 
-  /** How many rows from its start on a contact needs for one clip. @param {number} step  s between them */
-  needed(step) {
-    this.step = step;
-    return this.lengths.count + 2 * this.lengths.half;
-  }
-
   /** Play the start of a contact again and again. @param {Float64Array} trail  (k, n) amplitudes @param {number} step */
   show(trail, step) {
     this.clear();
-    this.add(trail.subarray(0, this.modes * this.needed(step)), step);
+    this.step = step;
+    const { count, half } = this.lengths;
+    this.add(trail.subarray(0, this.modes * (count + 2 * half)), step);
   }
 
   /** The latest moments around which the mean is known; null: there are not enough. @param {number} now @returns {Clip | null} */
