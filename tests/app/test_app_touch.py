@@ -190,6 +190,15 @@ def test_the_loop_encloses_the_energy_that_the_wall_makes(page, delay) -> None:
         assert area == pytest.approx(own[-1], rel=1e-9)
 
 
+def test_the_energy_of_a_touched_wall_follows_the_choice_of_its_sides(page) -> None:
+    page.change(wall={"stiffness": 900, "damping": 3})
+    page.settle()
+    for sided in (True, False):
+        page.page.set_checked("label:has-text('one-sided') input", sided)
+        assert page.value("zwidth.contact.view.spring") == {"stiffness": 900, "oneSided": sided}
+        assert page.value("zwidth.contact.touch.wall.law") == (2 if sided else 1)
+
+
 def test_what_the_kernel_does_not_cover_is_said(page) -> None:
     foaw = {"method": "foaw", "samples": 8, "noise_m": 1e-6}
     page.change(settings={"loop.velocity": foaw}, wall={"stiffness": 900, "damping": 3})

@@ -47,7 +47,7 @@ export class ContactPanel {
     this.go.addEventListener("click", () => void this.simulate());
     this.feel.addEventListener("click", () => this.toggleTouch());
     this.hear.addEventListener("click", () => void this.toggleSound());
-    this.oneSided.addEventListener("change", () => this.touch.setWall(this.wall, this.oneSided.checked));
+    this.oneSided.addEventListener("change", () => this.takeWall(this.wall));
     /** @type {{stiffness: number, damping: number} | null} */
     this.wall = null;
     this.touching = false;
@@ -80,12 +80,18 @@ export class ContactPanel {
     this.elements.text.textContent = sentence;
   }
 
+  /** What is touched, one-sided or not. @param {{stiffness: number, damping: number} | null} wall */
+  takeWall(wall) {
+    this.wall = wall;
+    this.touch.setWall(wall, this.oneSided.checked);
+    this.view.spring = { stiffness: wall?.stiffness ?? 0, oneSided: this.oneSided.checked };
+  }
+
   /** A new view has come. @param {Frame} frame @param {{stiffness: number, damping: number} | null} wall */
   update(frame, wall) {
-    this.wall = wall;
+    this.takeWall(wall);
     const moments = frame.head.moments;
     this.view.units = moments ? { x: "rad", f: "Nm" } : { x: "m", f: "N" };
-    this.touch.setWall(wall, this.oneSided.checked);
     if (!this.touching) return;
     const found = frame.head.touch;
     if (!found || found.reason) {
@@ -98,7 +104,6 @@ export class ContactPanel {
     const frequency = frame.head.chart.wall?.frequency ?? null;
     this.touch.setPitch(pitchFor(frequency));
     this.view.delay = found.delay_samples;
-    this.view.spring = { stiffness: wall?.stiffness ?? 0, oneSided: this.oneSided.checked };
     this.view.frequency = frame.head.chart.wall?.verdict === "unstable" ? frequency : null;
     const shift = this.touch.factor === 1 ? "" : ` Sound is played ${number(this.touch.factor, 2)} times ${this.touch.factor > 1 ? "higher" : "lower"}.`;
     this.write(`${NO_FORCE} The chart is the one held by this hand (${quantity(found.arm[0], "N/m")}, ${quantity(found.arm[1], "Ns/m")}).${shift}`);
@@ -155,7 +160,6 @@ export class ContactPanel {
     const { head, arrays } = frame;
     const values = (/** @type {string} */ name) => /** @type {Float64Array} */ (arrays[name].values);
     this.view.frequency = head.dominant_frequency_Hz;
-    this.view.spring = { stiffness: this.wall.stiffness, oneSided: this.oneSided.checked };
     const motion = { time: values("time"), reading: values("reading"), place: values("place"), force: values("force"), made: values("made"), delay: head.delay_samples };
     this.view.setMotion(motion, head.stable === true);
     const verdict = head.stable === null ? "undecided" : head.stable ? "stable" : "not stable";
