@@ -151,6 +151,24 @@ def test_a_contact_is_let_go_and_shown(page) -> None:
     assert text.startswith("not stable")
 
 
+def test_a_contact_goes_with_its_device(page) -> None:
+    page.change(wall={"stiffness": 900, "damping": 3})
+    page.settle()
+    page.page.click("button:has-text('Let go')")
+    page.wait("zwidth.contact.view.motion")
+    said = page.page.evaluate(
+        """() => {
+          zwidth.choose("hapkit-course");
+          return document.getElementById("status").textContent;
+        }"""
+    )
+    assert said == "computing the chart of hapkit-course…"
+    assert not page.value("zwidth.contact.view.motion")
+    assert page.page.locator("#contact-text").text_content() == ""
+    page.wait("zwidth.shown === 'bundled hapkit-course'")
+    assert page.status == ""
+
+
 @pytest.mark.parametrize("delay", [0.0, 1.0, 0.35])
 def test_the_loop_encloses_the_energy_that_the_wall_makes(page, delay) -> None:
     """What the ledger of the simulation says; with part of a sample as delay as well as a cubic can."""

@@ -181,6 +181,10 @@ export class App {
   async openDevice(opened) {
     const another = opened !== this.opened;
     this.opened = opened;
+    if (this.shown !== opened) {
+      this.contact.forget(); // it was another device's
+      this.say(`computing the chart of ${this.state.device}…`); // until its view has come
+    }
     try {
       const { head } = await this.connection.ask("open", { state: this.sent(null) });
       this.device = head;

@@ -113,6 +113,14 @@ export class ContactPanel {
     }
   }
 
+  /** Show no contact that has been simulated. */
+  forget() {
+    if (this.touching) return;
+    this.view.motion = null;
+    this.write("");
+    this.view.draw();
+  }
+
   toggleTouch() {
     if (this.touching) {
       this.stop();
