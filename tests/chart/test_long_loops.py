@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
+from tests.study_sizes import study_size
 from tests.systems import published, random_plant
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError, decided_trace
@@ -28,7 +29,7 @@ def long_loop(rng, longest):
 
 def test_charts_of_long_loops_agree_with_eigenvalues():
     rng = np.random.default_rng(30)
-    for _ in range(15):
+    for _ in range(4):
         assert disagreements(rng, long_loop(rng, 40), count=15) == 0
 
 
@@ -36,7 +37,7 @@ def test_charts_of_long_loops_agree_with_eigenvalues():
 def test_charts_of_hundreds_of_long_loops_agree_with_eigenvalues():
     rng = np.random.default_rng(31)
     given_up = 0
-    for _ in range(200):
+    for _ in range(study_size(continuous=40, full=200)):
         loop = long_loop(rng, 60)
         try:
             assert disagreements(rng, loop, count=15) == 0

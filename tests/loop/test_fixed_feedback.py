@@ -295,8 +295,12 @@ def test_a_loop_says_what_is_in_it():
     )
     text = repr(Loop(two_mass(0.26, 0.025, 15620.0), controller))
     assert "with force feedback on the force error (gain 0.5)" in text
-    assert "with feedforward of 0.1 kg, 0.5 N s/m, 0.2 N of dry friction" in text
-    assert "with a local loop at 10 times the rate (2 N s/m)" in text
+    assert "with feedforward, with a local loop at 10 times the rate" in text  # without units
+    texts = controller.feedback_texts()
+    assert "feedforward of 0.1 kg, 0.5 N s/m, 0.2 N of dry friction" in texts
+    assert "a local loop at 10 times the rate (2 N s/m)" in texts
+    about_an_axis = controller.feedback_texts(moments=True)
+    assert "feedforward of 0.1 kg m^2, 0.5 N m s/rad, 0.2 N m of dry friction" in about_an_axis
     assert controller.wall_alone == Controller(T)
 
 
@@ -323,3 +327,14 @@ def test_windows_of_the_feedback_are_windows_at_its_rate():
     case = ControlledLoop(fast.plant, None, fast.controller)
     own, apart = (np.abs(np.linalg.eigvals(each.transition_matrix(900.0, 2.0))).max() for each in (fast, case))
     assert own == pytest.approx(apart, rel=1e-12)
+
+
+def test_whether_states_stand_apart_does_not_hang_on_what_was_asked_before():
+    loop = Loop(two_mass(0.26, 0.025, 15620.0, 1.9), Controller(0.00125, local_loop=LocalLoop(4, damping=0.5)))
+    assert loop.has_states_apart
+    loop.check(1000.0, 1.0)
+    assert loop.has_states_apart
+    plain = Loop(two_mass(0.26, 0.025, 15620.0, 1.9), Controller(0.00125))
+    assert not plain.has_states_apart
+    plain.check(1000.0, 1.0)
+    assert not plain.has_states_apart

@@ -100,7 +100,7 @@ def test_a_position_is_projected_within_a_hundredth_of_the_arm_and_refused_beyon
     near = device.at((0.0, 0.1009))
     assert_allclose(near.posture.position, [0.0, 0.1, 0.0], atol=1e-9)
     assert float(near.posture.projected) == pytest.approx(9e-4, rel=1e-6)
-    with pytest.raises(OutOfReach, match=r"the nearest position it reaches is \(0, 0.1, 0\) m"):
+    with pytest.raises(OutOfReach, match=r"an answered position is \(0, 0.1, 0\) m"):
         device.at((0.0, 0.1011))
     assert device.at([(0.0, 0.1009)]).status.tolist() == [OUT_OF_REACH]  # in a batch nothing is projected
 

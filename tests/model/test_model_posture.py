@@ -380,7 +380,7 @@ def test_a_reference_position_out_of_reach_is_called_that():
     with pytest.raises(OutOfReach, match="its own reference position") as caught:
         solve_posture(far, [0.0, 9.0])
     assert "nearer" not in str(caught.value)
-    with pytest.raises(OutOfReach, match="the nearest position it reaches is"):
+    with pytest.raises(OutOfReach, match="an answered position is"):
         solve_posture(mechanism, [0.0, 9.0])
 
 

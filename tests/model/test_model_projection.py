@@ -1,4 +1,5 @@
-"""Positions beside what a handle reaches: projected within a tolerance, else an error that names the nearest."""
+"""Positions beside what a handle reaches: projected within a tolerance, else an error that names an answered
+one."""
 
 import numpy as np
 import pytest
@@ -29,13 +30,11 @@ def test_a_position_that_is_had_is_not_moved(device):
     assert posture.projected == 0.0
 
 
-def test_far_off_the_nearest_position_is_named(device):
-    with pytest.raises(
-        OutOfReach, match=r"the nearest position it reaches is \(0.054, 0.072, 0\) m, 10 mm away"
-    ) as caught:
+def test_far_off_an_answered_position_is_named(device):
+    with pytest.raises(OutOfReach, match=r"an answered position is \(0.054, 0.072, 0\) m, 10 mm away") as caught:
         device.at((0.06, 0.08))
     assert caught.value.nearest == pytest.approx([0.054, 0.072, 0.0], abs=1e-9)
-    with pytest.raises(OutOfReach, match="the nearest position it reaches"):
+    with pytest.raises(OutOfReach, match="an answered position is"):
         solve_posture(device.mechanism, (0.0, LENGTH + 1e-6))  # without a tolerance
 
 
@@ -49,9 +48,9 @@ def test_of_many_each_is_projected_or_marked(device):
 
 
 def test_beyond_the_edge_of_a_plane_nothing_is_projected_and_what_is_named_can_be_had():
-    """At the edge the drives lose the handle: the nearest is a little within."""
+    """At the edge the drives lose the handle: what is named is a little within."""
     arms = load("five-bar")
-    with pytest.raises(OutOfReach, match="the nearest position it reaches is") as caught:
+    with pytest.raises(OutOfReach, match="an answered position is") as caught:
         arms.at((0.02, 0.35))
     named = str(caught.value).split("is (")[1].split(")")[0]
     nearest = caught.value.nearest

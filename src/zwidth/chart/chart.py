@@ -25,7 +25,8 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class StabilityChart(Chart):
-    """The stable walls of a loop. Its regions and its boundary are drawn when they are first read.
+    """The stable walls of a loop. Its regions and its boundary are drawn, and all walls of the edge are judged,
+    when they are first read: where one is not at the limit of stability that raises ChartError (`drawn`).
 
     loop, radius  of the chart: walls whose roots all have |z| < radius (1: stable)
     edge          of the set

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +76,15 @@ class Chart(Result, ABC):
     @abstractmethod
     def boundary(self) -> tuple[BoundaryArc, ...]:
         """Arcs of the set's edge, with frequency."""
+
+    def drawn(self) -> Self:
+        """The chart itself with its regions drawn and their edge judged, for whoever reads them where no error may
+        be raised.
+
+        Raises  ChartError  where walls on the edge are not at the limit of stability
+        """
+        _ = self.regions
+        return self
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:

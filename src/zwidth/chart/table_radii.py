@@ -12,6 +12,7 @@ from zwidth.chart.verdict import BATCH_SIZE
 from zwidth.loop.loop_table import LoopTable, Whole
 from zwidth.loop.realisation import StateSpace
 from zwidth.loop.table_states import state_spaces
+from zwidth.loop.unheld_positions import AT_ONE, set_aside
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,8 @@ def spectral_radii(loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_
     By eigenvalues of the transition matrix, as `verdict.spectral_radius` of one loop: where roots meet, those of
     the characteristic polynomial have half the digits.
 
-    Returns  nan for a loop without sections, and where the matrix is not finite
+    Returns  nan for a loop without sections, where the matrix is not finite, and of a wall without stiffness where
+             rounding leaves open whether a root z = 1 is the position that nobody holds
     Raises   ValueError  for chained sections, see `state_spaces`
     """
     radii, _ = _radii(loops, which, wall_stiffness, wall_damping, False)
@@ -73,9 +75,23 @@ def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats, leverage: bool)
         finite = np.isfinite(L).all(axis=(-2, -1))
         z = np.linalg.eigvals(L[finite]).astype(np.complex128)
         radii[walls[finite]] = np.abs(z).max(axis=-1)
+        free = finite & (K[walls] == 0.0)
+        if np.any(free):
+            radii[walls[free]] = _without_position(loops, which[walls[free]], z[free[finite]])
         if leverage:
             leverages[walls[finite]] = _leverages(z, states[np.flatnonzero(finite)])
     return radii, leverages
+
+
+def _without_position(loops: LoopTable, which: Whole, z: NDArray[np.complex128]) -> Floats:
+    """Radii (p,) of roots (p, N) of walls without stiffness, the root z = 1 of each motion without a spring set
+    aside (`unheld_positions`); nan where rounding leaves open whether there is one."""
+    rows = np.arange(loops.rows.shape[1]) < loops.section_count[which][:, None]
+    count = np.count_nonzero(rows & (loops.rows[which, :, 1] == 0.0), axis=1)
+    radii = np.abs(z).max(axis=-1)
+    for own in np.unique(count[count > 0]):
+        radii[count == own] = np.abs(set_aside(z[count == own], int(own))).max(axis=-1)
+    return np.where((count == 0) & (np.abs(radii - 1.0) < AT_ONE), np.nan, radii)
 
 
 def _batches(loops: LoopTable, which: Whole) -> Iterator[tuple[Whole, StateSpace]]:

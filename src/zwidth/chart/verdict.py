@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
+from zwidth.loop.unheld_positions import set_aside, unheld_positions
 from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.progress import Progress
 from zwidth.result import Result
@@ -20,6 +21,9 @@ Floats = NDArray[np.float64]
 BAND = 1e-9
 # Rounding of an eigenvalue in units of its own condition number.
 ROUNDING = 1e-15
+# What rounding moves an eigenvalue by at most: a pair that coalesces moves with its square root, which bounds what
+# 1/0 cannot.
+MOST_ROUNDING = 1e-6
 NEAR = 1e-4  # distance from the unit circle within which an eigenvalue's own error may decide
 UNSTABLE, UNDECIDED, STABLE = -1, 0, 1
 BATCH_SIZE = 20_000  # walls judged in one batch of transition matrices
@@ -75,13 +79,19 @@ class Verdicts(WallVerdicts):
 
     spectral_radius  largest |z|
     uncertainty      half-width of the undecided band: 1e-9, more where the root is ill-conditioned
+    unheld           how many roots z = 1 were set aside, each the position that nobody holds on a wall without
+                     stiffness (`loop.unheld_positions`)
     """
 
     spectral_radius: Floats
     uncertainty: Floats
+    unheld: NDArray[np.int64]
 
     def table(self) -> dict[str, list[Any]]:
-        return super().table() | {"spectral_radius": self.spectral_radius.ravel().tolist()}
+        return super().table() | {
+            "spectral_radius": self.spectral_radius.ravel().tolist(),
+            "unheld_positions": self.unheld.ravel().tolist(),
+        }
 
 
 def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
@@ -100,8 +110,10 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
     """Verdicts on walls K [N/m], B [N s/m] of any shape (...) that broadcast.
 
     stable: |z| < 1 - u for all roots; unstable: |z| > 1 + u for one; undecided between, where u is 1e-9 or the
-    rounding error of the dominant eigenvalue (from its condition number), whichever is larger. One of many walls
-    that is not finite is undecided, with nan, and so is one so large that its transition matrix is not finite.
+    rounding error of the dominant eigenvalue (from its condition number), whichever is larger. On a wall with
+    K = 0 the root z = 1 of the position that nobody holds is set aside (`loop.unheld_positions`). One of many
+    walls that is not finite is undecided, with nan, and so is one so large that its transition matrix is not
+    finite.
 
     Raises  ValueError  for a single wall that is not finite
     """
@@ -129,7 +141,13 @@ def verdicts(
     verdict, frequency, radius, width = (
         np.concatenate(parts).reshape(K.shape) for parts in zip(*judged, strict=True)
     )
-    return Verdicts(K, B, verdict, frequency, radius, width)
+    return Verdicts(K, B, verdict, frequency, radius, width, _unheld(loop, K))
+
+
+def _unheld(loop: Loop | MultiLoop, K: Floats) -> NDArray[np.int64]:
+    """Positions that nobody holds on walls K (...)."""
+    free = K == 0.0
+    return np.where(free, unheld_positions(loop) if np.any(free) else 0, 0)
 
 
 def _judged(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.int8], Floats, Floats, Floats]:
@@ -139,7 +157,10 @@ def _judged(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.in
         L = loop.transition_matrix(np.where(finite, K, 0.0), np.where(finite, B, 0.0))
     finite &= np.all(np.isfinite(L), axis=(-2, -1))
     L = np.where(finite[..., None, None], L, 0.0)
-    z = np.linalg.eigvals(L)
+    z = np.linalg.eigvals(L).astype(complex)
+    unheld = _unheld(loop, K)
+    for count in np.unique(unheld[unheld > 0]):
+        z[unheld == count] = set_aside(z[unheld == count], int(count))
     dominant = np.argmax(np.abs(z), axis=-1)
     top = np.take_along_axis(z, dominant[..., None], axis=-1)[..., 0]
     radius = np.where(finite, np.abs(top), np.nan)
@@ -147,24 +168,29 @@ def _judged(loop: Loop | MultiLoop, K: Floats, B: Floats) -> tuple[NDArray[np.in
     width = np.full(radius.shape, BAND)
     for index in np.argwhere(np.abs(radius - 1.0) < NEAR):
         at = tuple(index)
-        width[at] = max(BAND, _rounding(L[at]))
+        width[at] = max(BAND, rounding_of_roots(L[at], float(radius[at])))
     verdict = np.where(radius < 1.0 - width, STABLE, np.where(radius > 1.0 + width, UNSTABLE, UNDECIDED))
     return verdict.astype(np.int8), frequency, radius, width
 
 
-def _rounding(L: Floats) -> float:
-    """Error of the eigenvalues nearest the circle: unit rounding times norm times condition (1 / |y^H x|).
+def rounding_of_roots(L: Floats, radius: float | None = None, rounding: float = ROUNDING) -> float:
+    """Error of the eigenvalues of a radius, by default the largest, of a matrix known to a relative rounding:
+    rounding times norm times condition (1 / |y^H x|).
 
-    The matrix is balanced first as the eigenvalue solver does it, so that units do not enter.
+    The matrix is balanced first as the eigenvalue solver does it, so that units do not enter. Left vectors are the
+    solver's own: where two roots coalesce, as both of a free mass do, the right ones are parallel and have no
+    inverse.
     """
+    from scipy.linalg import eig
+
     balanced = _balance(L)
-    z, right = np.linalg.eig(balanced)
-    left = np.linalg.pinv(right)
-    condition = np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=0)
-    near = np.abs(np.abs(z) - np.max(np.abs(z))) < 1e-6
-    error = ROUNDING * float(np.linalg.norm(balanced)) * float(np.max(condition[near]))
-    # a pair that coalesces moves with the square root of the rounding, which bounds what 1/0 cannot
-    return float(min(error, 1e-6))
+    z, left, right = eig(balanced, left=True, right=True)
+    with np.errstate(divide="ignore"):
+        condition = 1.0 / np.abs(np.sum(left.conj() * right, axis=0))
+    distance = np.abs(np.abs(z) - (np.max(np.abs(z)) if radius is None else radius))
+    near = distance <= max(1e-6, float(np.min(distance)))
+    error = rounding * float(np.linalg.norm(balanced)) * float(np.max(condition[near]))
+    return float(min(error, MOST_ROUNDING))
 
 
 def _balance(L: Floats) -> Floats:

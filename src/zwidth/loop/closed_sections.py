@@ -53,7 +53,7 @@ def closed_sections(plant: Plant, controller: Controller) -> ClosedSections:
         raise UnmovedError("the wall force moves nothing that the sensor reads; check actuator and sensor")
     path = closed_form(states, replace(controller, force_sensor=None, feedforward=None, force_filter=None))
     known = _known_zeros(controller, len(form.output) - len(path.output))
-    roots, error = pole_zero_form(form, _zero_poles(states, controller), path, known)
+    roots, error = pole_zero_form(form, zero_poles(states, controller), path, known)
     if not error <= UNRESOLVED:
         raise UnresolvedError(
             "the wall force moves so little that the sensor reads that rounding hides it: two ways to compute the "
@@ -73,7 +73,7 @@ def closed_table(closed: ClosedSections, controller: Controller) -> LoopTable:
     return table._replace(force=factors[None].copy(), force_count=np.array([len(factors)]))
 
 
-def _zero_poles(states: PlantStates, controller: Controller) -> int:
+def zero_poles(states: PlantStates, controller: Controller) -> int:
     """How many poles stay at z = 1 exactly: as many as the plant has, for the places and speeds of free motions,
     unless a feedback answers to these. That of the force sensor answers to neither."""
     own = sum((mode.squared == 0.0) * (1 + (mode.decay == 0.0)) for mode in states.modes)

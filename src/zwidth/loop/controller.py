@@ -17,6 +17,7 @@ from zwidth.loop.fixed_feedback import (
     LocalLoop,
     acts,
     describe_feedback,
+    feedback_name,
     low_passes,
 )
 from zwidth.loop.low_pass import Butterworth as Butterworth
@@ -137,7 +138,15 @@ class Controller:
     def feedback_names(self) -> tuple[str, ...]:
         """What is added to the wall law, in words: "force feedback (gain 0.5)"; () for nothing."""
         every = (self.force_sensor, self.feedforward, self.local_loop)
-        return tuple(describe_feedback(feedback) for feedback in every if feedback is not None)
+        return tuple(feedback_name(feedback) for feedback in every if feedback is not None)
+
+    def feedback_texts(self, moments: bool = False) -> tuple[str, ...]:
+        """The same with all numbers and their units: "a local loop at 10 times the rate (0.5 N s/m)".
+
+        moments  whether moments about an axis are rendered
+        """
+        every = (self.force_sensor, self.feedforward, self.local_loop)
+        return tuple(describe_feedback(feedback, moments) for feedback in every if feedback is not None)
 
     @property
     def wall_alone(self) -> Controller:

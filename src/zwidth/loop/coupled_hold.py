@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from decimal import Decimal, localcontext
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.loop.exact_polynomials import (
+    ARITHMETIC,
+    MOST_STATES,
+    characteristic_polynomial,
+    decimals,
+    dot,
+    refined_root,
+)
 from zwidth.loop.hold import lag_share
 from zwidth.model.first_order_form import FirstOrderForm, invariant_subspace
 
@@ -90,6 +99,46 @@ def form_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floa
             row += [direct, float(c @ G) + direct * d1, float(c @ (E @ G + d1 * G)) + direct * d0]
         rows.append(row)
         parts = [(0.0, E @ (E @ G + d1 * G) + d0 * G) for _, G in parts]
+    return np.array(rows).reshape(-1, 8)
+
+
+def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Floats:
+    """`form_rows` in decimal arithmetic, with the poles of the sampled matrix to many digits: rows of the states
+    as their doubles are, where springs or masses of very unlike size leave rounding in place of them.
+
+    Returns  no rows, (0, 8), where poles are equal to rounding, and for a large form
+    """
+    none, k = np.zeros((0, 8)), len(sampled.output)
+    if k > MOST_STATES:
+        return none
+    below = characteristic_polynomial(sampled.growth)
+    with localcontext(ARITHMETIC):
+        E, c = [decimals(row) for row in sampled.growth], decimals(sampled.output)
+        parts = [
+            (Decimal(sampled.direct_new), decimals(sampled.new)),
+            (Decimal(sampled.direct_old), decimals(sampled.old)),
+        ]
+        rows = []
+        for pair in _pairs(form.poles, period):
+            roots = [
+                refined_root(below, complex(e)) if e else (Decimal(0),) * 2 for e in sampled_poles(pair, period)
+            ]
+            found = [root for root in roots if root is not None]
+            if len(found) < len(pair):
+                return none
+            if len(found) == 1:  # joined by a pole at z = 0, which no wall moves
+                found.append((Decimal(-1), Decimal(0)))
+            (x, y), (x2, y2) = found
+            d1, d0 = -(x + x2), x * x2 - y * y2
+            row = [d1, d0]
+            through = [[dot(line, G) for line in E] for _, G in parts]
+            for (direct, G), moved in zip(parts, through, strict=True):
+                row += [direct, dot(c, G) + direct * d1, dot(c, moved) + d1 * dot(c, G) + direct * d0]
+            rows.append([float(value) for value in row])
+            parts = [
+                (Decimal(0), [dot(line, moved) + d1 * m + d0 * g for line, m, g in zip(E, moved, G, strict=True)])
+                for (_, G), moved in zip(parts, through, strict=True)
+            ]
     return np.array(rows).reshape(-1, 8)
 
 

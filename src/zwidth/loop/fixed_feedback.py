@@ -18,6 +18,8 @@ from zwidth.model.argument_checks import check_choice, check_number, describe_va
 from zwidth.model.design_axes import Number
 
 ForceLaw = Literal["force-feedforward", "force-error"]
+UNITS_ALONG_A_DIRECTION: Final = ("N/m", "N s/m", "kg", "N")  # of stiffness, damping, mass and force
+UNITS_ABOUT_AN_AXIS: Final = ("N m/rad", "N m s/rad", "kg m^2", "N m")
 MOST_FAST_SAMPLES: Final = 200  # of a local loop in a period of the wall's
 
 
@@ -137,23 +139,38 @@ def acts(feedback: FixedFeedback | None) -> bool:
             return False
 
 
-def describe_feedback(feedback: FixedFeedback) -> str:
-    """A feedback in words, with the numbers that are not 0; several designs' numbers as "several"."""
+def feedback_name(feedback: FixedFeedback) -> str:
+    """A feedback in words, without numbers whose units hang on what is rendered."""
+    match feedback:
+        case ForceSensor():
+            return describe_feedback(feedback)
+        case Feedforward():
+            return "feedforward"
+        case LocalLoop():
+            return f"a local loop at {feedback.rate_multiple} times the rate"
+
+
+def describe_feedback(feedback: FixedFeedback, moments: bool = False) -> str:
+    """A feedback in words, with the numbers that are not 0; several designs' numbers as "several".
+
+    moments  whether moments about an axis are rendered, so that its numbers are in N m/rad, N m s/rad and kg m^2
+    """
+    stiffness, damping, mass, force = UNITS_ABOUT_AN_AXIS if moments else UNITS_ALONG_A_DIRECTION
     match feedback:
         case ForceSensor():
             law = " on the force error" if feedback.law == "force-error" else ""
             return f"force feedback{law} (gain {_text(feedback.gain)})"
         case Feedforward():
             parts = [
-                (feedback.inertia, "{} kg"),
+                (feedback.inertia, f"{{}} {mass}"),
                 (feedback.inertia_share, "{} of the rigid mass"),
-                (feedback.damping, "{} N s/m"),
-                (feedback.coulomb, "{} N of dry friction"),
+                (feedback.damping, f"{{}} {damping}"),
+                (feedback.coulomb, f"{{}} {force} of dry friction"),
             ]
             given = [text.format(_text(number)) for number, text in parts if np.any(number)]
             return f"feedforward of {', '.join(given) or 'nothing'}"
         case LocalLoop():
-            parts = [(feedback.stiffness, "{} N/m"), (feedback.damping, "{} N s/m")]
+            parts = [(feedback.stiffness, f"{{}} {stiffness}"), (feedback.damping, f"{{}} {damping}")]
             given = [text.format(_text(number)) for number, text in parts if np.any(number)]
             return (
                 f"a local loop at {feedback.rate_multiple} times the rate ({', '.join(given) or 'without gains'})"

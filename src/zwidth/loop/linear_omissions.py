@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from zwidth.loop.controller import Controller
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
+from zwidth.model.load import Load
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 from zwidth.model.ratio_table import with_any_ratio
+
+STRAIGHT: Final = (
+    "linearised at the straight shape, first order missing: links that bend are under load, and what their "
+    "bending changes of the load's lever arms is not in the answer"
+)
 
 
 def linear_omissions(mechanism: Mechanism | None, plant: Plant | None, controller: Controller) -> tuple[str, ...]:
@@ -24,6 +31,18 @@ def linear_omissions(mechanism: Mechanism | None, plant: Plant | None, controlle
         each = np.eye(len(mechanism.drives.names))
         parts = nonlinear_of_drives(with_any_ratio(mechanism.drives), np.ones(len(each)), 0.0 * each, each, each)
     return with_computer(parts, controller).kinds
+
+
+def bends_under_load(mechanism: Mechanism | None, load: Load | None, model: str | None = None) -> bool:
+    """Whether links that bend carry a push or gravity; in the rigid model none bends."""
+    if mechanism is None or load is None or model == "rigid":
+        return False
+    return bool(mechanism.flexible) and (load.pushes or bool(np.any(load.weight)))
+
+
+def load_omissions(mechanism: Mechanism | None, load: Load | None, model: str | None = None) -> tuple[str, ...]:
+    """What every answer about a device under its load leaves out, in words; () for nothing."""
+    return (STRAIGHT,) if bends_under_load(mechanism, load, model) else ()
 
 
 def with_computer(parts: Nonlinear, controller: Controller) -> Nonlinear:

@@ -148,10 +148,23 @@ class Loop:
         """The loop in the form in which kernels take it. Raises what `sections.sampled_sections` raises."""
         if self.closed is not None:
             return closed_table(self.closed, self.controller)
-        rows = plant_rows(self.plant, self.controller)
+        rows = self._rows_of_modes
         if rows is None:
             rows = self.sections.rows
         return loop_table(rows[None], np.array([len(rows)]), self.controller)
+
+    @property
+    def has_states_apart(self) -> bool:
+        """Whether the states of `transition_matrix` are computed another way than the factors of `table`: where
+        dampers couple modes, and with fixed feedback closed."""
+        if self.closed is not None:
+            return True
+        return self._rows_of_modes is None and self.sections.sampled_form is not None
+
+    @cached_property
+    def _rows_of_modes(self) -> Floats | None:
+        """The plant's rows where its modes stand alone; None where `sections` has them."""
+        return plant_rows(self.plant, self.controller)
 
     @cached_property
     def force_path(self) -> Filter:

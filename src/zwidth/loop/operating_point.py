@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from zwidth import _verbs
 from zwidth.loop.controller import Controller
 from zwidth.loop.inertia_share import has_inertia_share, with_inertia_of
-from zwidth.loop.linear_omissions import linear_omissions
+from zwidth.loop.linear_omissions import linear_omissions, load_omissions
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.point_errors import OperatingPointError, check_several_directions
@@ -465,6 +465,11 @@ class OperatingPoint(PosedDevice):
     def linear_omissions(self) -> tuple[str, ...]:
         """Parts of the device that a linear answer leaves out, in words; () if there are none."""
         return linear_omissions(self.mechanism, self.given_plant, self.controller)
+
+    @property
+    def load_omissions(self) -> tuple[str, ...]:
+        """What every answer under this load leaves out, in words; () without a load, or links that bend."""
+        return load_omissions(self.mechanism, self.load, self.model)
 
     @property
     def charted_by_response(self) -> bool:

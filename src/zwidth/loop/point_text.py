@@ -33,4 +33,5 @@ def point_text(point: OperatingPoint) -> str:
         law = f", {point.wall_matrices}" if point.wall_matrices is not None else ""
         where = f"handle at ({position}) m, along " + " and ".join(f"({way})" for way in ways) + law
     model = f"assembly {point.posture.assembly}, model {point.model or 'full'}{held}"
-    return f"OperatingPoint of {name}: {where}\n  {model}\n  {computer}"
+    omitted = "".join(f"\n  {text}" for text in point.load_omissions)
+    return f"OperatingPoint of {name}: {where}\n  {model}\n  {computer}{omitted}"

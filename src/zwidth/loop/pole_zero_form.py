@@ -24,6 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.loop.coupled_hold import SampledForm
+from zwidth.loop.exact_polynomials import (
+    MOST_STATES,
+    Polynomial,
+    characteristic_polynomial,
+    numerator,
+    roots_near,
+    without_roots,
+)
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -32,6 +40,9 @@ STEPS, SETTLED = 3, 1e-15  # of Newton's method; the step in shares of a root at
 # The longest steps that are tried, in shares of the distance to the next root, and how many of any length.
 SMALL_STEP, LONG_STEP, ANY_STEP, MANY_STEPS = 1e-3, 0.1, 1e300, 40
 GOOD = 1e-11  # error below which nothing better is looked for
+# Error above which poles and zeros are found again in decimal arithmetic: a root on the circle, which moves by
+# about as much, would else be off it by what eigenvalues see (1e-9).
+KEPT_DIGITS = 1e-10
 FEW_DIGITS = 1e-3  # weight of the largest error beside the median
 PROBES, LOWEST_PROBE = 40, 1e-3  # angles of the circle at which responses are compared, and their least [rad]
 # Where P d^2 is below this share of its largest, walls on the circle are far too stiff to be edges.
@@ -80,6 +91,10 @@ def pole_zero_form(
         steps = [_improved(system, poles, longest, None) for longest in (SMALL_STEP, LONG_STEP)]
         steps.append(_improved(system, _off_axis(poles), ANY_STEP, None, MANY_STEPS))
         found = match.best([poles, *steps], [np.append(known_zeros, each) for each in some])
+    if found[1] > KEPT_DIGITS:
+        exact = _exact_form(system, zero_poles)
+        if exact is not None and (error := match.error(exact)) < found[1]:
+            found = exact, error
     return _without_common_roots(found[0]), found[1]
 
 
@@ -116,12 +131,49 @@ class _Match:
             with np.errstate(all="ignore"):  # a pole on the circle may be a probe
                 ratio = self.wanted / PoleZeroForm(some, others, 1.0).response(self.d)
                 one = PoleZeroForm(some, others, float(np.median(ratio[self.relevant].real)))
-                off = np.abs(one.response(self.d) - self.wanted) / self.allowed
-            # at high frequency the system's own response has few digits left, which the form is not to follow
-            error = float(np.median(off) + FEW_DIGITS * np.max(off))
+            error = self.error(one)
             if error < least:
                 found, least = one, error
         return found, least
+
+    def error(self, form: PoleZeroForm) -> float:
+        """Typical error of a form in shares of the response where it counts; inf where it is no number."""
+        with np.errstate(all="ignore"):  # a pole on the circle may be a probe
+            off = np.abs(form.response(self.d) - self.wanted) / self.allowed
+        # at high frequency the system's own response has few digits left, which the form is not to follow
+        error = float(np.median(off) + FEW_DIGITS * np.max(off))
+        return error if error == error else np.inf
+
+
+def _exact_form(system: _Balanced, zero_poles: int) -> PoleZeroForm | None:
+    """Poles, zeros and gain in decimal arithmetic, as the system's doubles have them; None where roots do not
+    settle."""
+    if len(system.g) > MOST_STATES:
+        return None
+    below = characteristic_polynomial(system.E)
+    above = numerator(system.E, system.g, system.c, below)
+    if not above:
+        return None
+    poles, zeros = _exact_roots(below), _exact_roots(above)
+    if poles is None or zeros is None:
+        return None
+    pairs = _conjugate_pairs(_with_exact_zeros(poles, zero_poles)), _conjugate_pairs(zeros)
+    if pairs[0] is None or pairs[1] is None:
+        return None
+    return PoleZeroForm(pairs[0], pairs[1], float(above[-1]))
+
+
+def _exact_roots(p: Polynomial) -> Complexes | None:
+    """All roots; those at z = 0, of commands that wait, are divided out first, since equal ones do not settle."""
+    rest, waiting = without_roots(p, -1)
+    companion = np.diag(np.ones(len(rest) - 2), -1) if len(rest) > 1 else np.zeros((0, 0))
+    if len(rest) > 1:
+        companion[:, -1] = [-float(each / rest[-1]) for each in rest[:-1]]
+    starts = np.linalg.eigvals(companion) if np.all(np.isfinite(companion)) else None
+    others = None if starts is None else roots_near(rest, _off_axis(starts.astype(np.complex128)))
+    if others is None:
+        return None
+    return np.append(others, np.full(waiting, -1.0 + 0.0j))
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from zwidth.model.loaded_posture import loaded_postures
 from zwidth.model.mechanism import Drives, Floats, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
-from zwidth.model.operator import Operator
+from zwidth.model.operator import ABOUT_AN_AXIS, Operator, OperatorError
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
 from zwidth.model.ratio_table import drives_at
@@ -41,7 +41,7 @@ Position: TypeAlias = Sequence[float] | Mapping[str, float]
 
 _OF_DESIGNS: Final = ("mechanism", "given_plant", "controller", "damping", "operator")
 
-# Share of the arm's length within which a single position is projected onto the nearest that the handle has.
+# Share of the arm's length within which a single position is projected onto one that the handle has.
 PROJECTION_TOLERANCE: Final = 0.01
 
 
@@ -101,7 +101,7 @@ class PosedDevice:
     results: dict[Any, Any] = field(init=False, default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
-        """Raise ValueError for arguments that exclude each other."""
+        """Raise ValueError for arguments that exclude each other, OperatorError for a hand about an axis."""
         check_choice("encoders", self.encoders, get_args(Encoders))
         kinds = (self.mechanism, self.given_plant, self.response)
         if sum(kind is not None for kind in kinds) != 1:
@@ -113,6 +113,8 @@ class PosedDevice:
             self.directions is None
         ):
             raise ValueError("postures and directions come together, with a mechanism and not without one")
+        if self.operator is not None and self.turns:
+            raise OperatorError(f"the operator {ABOUT_AN_AXIS}")
         if self.load is not None and self.mechanism is None:
             raise ValueError("a load needs a mechanism, whose forces turn as it moves; leave load out")
         if self.wall_matrices is not None and self.wall_matrices.count != self.direction_count:

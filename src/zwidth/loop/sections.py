@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.loop.coupled_hold import SampledForm, form_rows, rows_error, sample_form, separate_rows
+from zwidth.loop.coupled_hold import SampledForm, exact_rows, form_rows, rows_error, sample_form, separate_rows
 from zwidth.loop.hold import modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
@@ -26,9 +26,10 @@ Floats = NDArray[np.float64]
 
 # Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
 SAME_POLES = 1e-6
-# A chain that misses the response by more than this has lost digits; by more than that, two ways to write it tell
-# nothing of the plant.
-FEW_DIGITS, LOST_DIGITS = 1e-8, 1e-4
+# A chain that misses the response by more than the first is written again in decimal arithmetic: a root on the
+# unit circle, which moves by about as much, would else be off it by what eigenvalues see (1e-9). By more than the
+# second it is tried pole by pole; by more than the third, two ways to write it tell nothing of the plant.
+KEPT_DIGITS, FEW_DIGITS, LOST_DIGITS = 1e-10, 1e-8, 1e-4
 
 
 class UnmovedError(ValueError):
@@ -141,6 +142,11 @@ def _chained_sections(form: FirstOrderForm, period: float, fraction: float, lag:
     states = sampled if m == len(rows) else None
     chained = np.column_stack([rows[:m], np.arange(m) > 0])
     off = rows_error(chained, sampled)
+    if off > KEPT_DIGITS and states is not None:
+        exact = exact_rows(form, sampled, period)
+        own = np.column_stack([exact, np.arange(len(exact)) > 0])
+        if len(own) and rows_error(own, sampled) < off:
+            off, chained = rows_error(own, sampled), own
     if off > FEW_DIGITS:
         apart = separate_rows(form, period, fraction, lag)
         own = np.column_stack([apart, np.zeros(len(apart))])

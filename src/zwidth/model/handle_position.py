@@ -1,14 +1,16 @@
-"""The place that a handle can have nearest to one that it cannot, and postures given by their driven joints.
+"""A place that a handle can have near one that it cannot, and postures given by their driven joints.
 
 A handle with fewer drives than the space it lies in moves on a curve or a surface, which a typed position meets by
-chance only. The nearest one is found by descent: the driven joints p are turned so that the handle h comes nearer
+chance only. One near it is found by descent: the driven joints p are turned so that the handle h comes nearer
 to the goal g, with the loops held closed,
 
     minimise |g - h(p)|^2,      dp = (N^T J^T J N + mu)^-1 N^T J^T (g - h)        (Levenberg-Marquardt)
 
 with J = dh/dq of all joints and N = dq/dp, what the loops leave to the drives. A handle that is to have an
 orientation is taken there likewise, angles counting times the mechanism's size. What is found counts only where
-the posture solver gets there, too: it knows assemblies, and that the edge of a workspace is singular.
+the posture solver gets there, too: it knows assemblies, and that the edge of a workspace is singular. A descent
+ends in a local minimum, so that another place may be nearer: what comes back is an answered position, not the
+nearest.
 """
 
 from __future__ import annotations
@@ -40,15 +42,18 @@ DESCENTS: Final = 100
 LARGEST_TURN: Final = 0.2  # of a drive in one step [rad]
 ASTRAY: Final = 0.1  # share of a step by which it may miss where it should lead, of a handle that is posed
 SETTLED: Final = 1e-13  # turn of all drives, below which they have arrived [rad]
-# Shares of the way back from the nearest position to where the descent began: at the edge the drives lose control.
+# Shares of the way back from the descent's end to where the descent began: at the edge the drives lose control.
 RETREAT: Final = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.03, *np.linspace(0.1, 1.0, 19)])
 HALVINGS: Final = 12  # of a straight way, down to 1/4096 of it
 TURN: Final = 0.02  # of a drive in one step to a posture given by its joints [rad]
 
 
-def nearest_goal(mech: MechanismArrays, design: int, references: Floats, goal: Floats) -> Floats | None:
-    """The goal (g,) nearest to a goal (g,) of the handle that the assembly of the references (P, n) can have; a
-    little within the edge of its workspace. None where none is found, or the goal is not finite."""
+def answered_goal(mech: MechanismArrays, design: int, references: Floats, goal: Floats) -> Floats | None:
+    """A goal (g,) near a goal (g,) of the handle that the assembly of the references (P, n) can have.
+
+    Not shown to be the nearest; a little within the edge of its workspace. None where none is found, or the goal
+    is not finite.
+    """
     if not np.isfinite(goal).all():
         return None
     starts = references[design][None]

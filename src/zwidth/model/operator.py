@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -14,6 +14,13 @@ from zwidth.model.plant import Floats, Plant
 
 class OperatorError(ValueError):
     """An operator that cannot be attached to this plant."""
+
+
+ABOUT_AN_AXIS: Final = (
+    "is a hand in N/m, N s/m and kg, which holds the handle along a direction; about an axis it would have to be "
+    "in N m/rad, N m s/rad and kg m^2, which an operator cannot be given in. Use --operator none "
+    '(operator="none" in Python), or render a direction'
+)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from zwidth.model.continuation import (
     reference_batch,
 )
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.handle_position import goal_distance, goal_of_angles, nearest_goal, positions_about_reference
+from zwidth.model.handle_position import answered_goal, goal_distance, goal_of_angles, positions_about_reference
 from zwidth.model.mechanism import (
     ORIENTATION,
     POSE,
@@ -163,7 +163,7 @@ def solve_posture(
 
     The assembly's approximate joint coordinates are closed onto the reference; from there Newton is continued to
     the goal without passing a singularity (`continuation`), along the straight way or by the roadmap of all
-    postures of the assembly (`roadmap`). A goal that the handle cannot have is projected onto the nearest that it
+    postures of the assembly (`roadmap`). A goal that the handle cannot have is projected onto one near it that it
     has (`handle_position`). Free coordinates stay where the assembly has them.
 
     position  (..., 3), or (..., 2) in the plane of the reference position [m]; it broadcasts with the leading
@@ -213,7 +213,7 @@ def solve_posture(
     near, projected = None, np.where(solved.status == OK, 0.0, np.nan)
     wanted = np.flatnonzero(solved.status == OUT_OF_REACH) if tolerance > 0.0 or not shape else ()
     for i in wanted:
-        near, own_design = nearest_goal(mech, int(design[i]), reference, goals[i]), int(design[i])
+        near, own_design = answered_goal(mech, int(design[i]), reference, goals[i]), int(design[i])
         if near is None:
             continue
         away = goal_distance(mech, own_design, near, goals[i])

@@ -31,8 +31,8 @@ class PostureError(ValueError):
 class OutOfReach(PostureError):
     """The handle cannot get there in this assembly without passing a singularity.
 
-    nearest  (3,)  the position nearest to the requested one that it can have [m]; None where that is not known, or
-             the drives control its orientation
+    nearest  (3,)  a position that is answered [m], found by descent from the requested one and not shown to be the
+             nearest; None where none is known, or the drives control its orientation
     """
 
     def __init__(self, message: str, nearest: Floats | None = None) -> None:
@@ -71,14 +71,12 @@ def posture_failure(
 ) -> PostureError:
     """Why there is no posture of one design at a goal (g,), by its status.
 
-    reference  (n,) joint coordinates;   near  (g,) the nearest goal that the handle can have, None where unknown
+    reference  (n,) joint coordinates;   near  (g,) a goal near it that the handle can have, None where unknown
     """
     what = {POSITION: "position", POSE: "pose", ORIENTATION: "orientation"}[mech.controls]
     where, instead = describe_goal(mech, goal), f"ask for a{'n' * (what[0] == 'o')} {what} nearer to the reference"
     if near is not None:
-        instead = (
-            f"the nearest {what} it reaches is {describe_goal(mech, near)}, {_distance(mech, near, goal)} away"
-        )
+        instead = f"an answered {what} is {describe_goal(mech, near)}, {_distance(mech, near, goal)} away"
     if status == BEYOND_LIMIT:
         return BeyondLimit(
             f"with its handle at {where} in assembly {assembly!r} {_limit(mechanism, mech, reference, goal)}"

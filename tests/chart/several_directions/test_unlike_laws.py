@@ -33,6 +33,16 @@ def same_to(share, one, other):
     return shapely.symmetric_difference(one, other).area < share * max(one.area, other.area)
 
 
+def assert_that_its_pieces_hold(chart):
+    """Nothing speaks against what was found; it is confirmed only where it is shown that no cell is missing."""
+    assert chart.doubtful.tolist() == []
+    assert chart.off_circle.tolist() == []
+    assert chart.missed.tolist() == []
+    assert chart.decided is chart.complete is (chart.status == "confirmed")
+    assert chart.cells_may_be_missing is not chart.complete
+    assert chart.stiffness_max_is == ("exact" if chart.complete else "at least")
+
+
 # --- against eigenvalues -------------------------------------------------------------------------------
 
 
@@ -70,7 +80,7 @@ EVERYDAY = (6, 8, 10, 12, 13, 19, 20, 22, 25, 26, 32, 34, 35, 36, 38, 42, 48, 49
 def test_charts_of_random_laws_agree_with_eigenvalues(seed):
     """By a transition matrix that shares nothing with the package, on walls over the chart and about its edge."""
     chart = multi_chart(random_unlike(seed))
-    assert chart.status == "confirmed"
+    assert_that_its_pieces_hold(chart)
     assert walls_that_differ(chart, seed).tolist() == []
 
 
@@ -78,20 +88,18 @@ def test_charts_of_random_laws_agree_with_eigenvalues(seed):
 def test_a_velocity_estimate_of_0_in_rounding_leaves_the_chart_as_it_is(seed):
     """Beside z = -1 behind a low pass of second order or more."""
     chart = multi_chart(random_unlike(seed))
-    assert chart.status == "confirmed"
+    assert_that_its_pieces_hold(chart)
     assert walls_that_differ(chart, seed).tolist() == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(2000, 2500, 20))
 def test_charts_of_500_random_laws_agree_with_eigenvalues_or_say_that_they_are_in_doubt(first):
-    """Some three in 400 miss a piece of a curve, and say so."""
+    """Some three in 400 miss a piece of a curve, and say at which walls."""
     charts = {seed: multi_chart(random_unlike(seed)) for seed in range(first, first + 20)}
-    assert sum(chart.status == "in doubt" for chart in charts.values()) <= 1
+    assert sum(len(chart.doubtful) > 0 for chart in charts.values()) <= 1
     differing = {
-        seed: walls_that_differ(chart, seed).tolist()
-        for seed, chart in charts.items()
-        if chart.status == "confirmed"
+        seed: walls_that_differ(chart, seed).tolist() for seed, chart in charts.items() if not len(chart.doubtful)
     }
     assert {seed: walls for seed, walls in differing.items() if walls} == {}
 
@@ -178,7 +186,9 @@ def test_a_law_almost_alike_is_almost_one_law(unlike):
     one = multi_chart(loop)
     law = WallMatrices.of([1.0, 1.0 - unlike], [1.0 - unlike, 1.0])
     chart = multi_chart(MultiLoop(loop.plant, loop.controller, law))
-    assert chart.status == "confirmed"
+    assert one.decided
+    assert not chart.decided
+    assert_that_its_pieces_hold(chart)
     assert numbers(chart) == pytest.approx(numbers(one), rel=10.0 * unlike + 1e-12)
 
 
@@ -192,8 +202,8 @@ def test_turned_directions_with_their_law_turned_give_the_same_chart(seed):
     K0, B0 = T @ law.stiffness @ T.T, T @ law.damping @ T.T
     turned = MultiPlant(plant.mass, plant.damping, plant.stiffness, T @ plant.actuators, T @ plant.sensors)
     one, other = multi_chart(loop), multi_chart(MultiLoop(turned, loop.controller, WallMatrices.of(K0, B0)))
-    assert one.status == "confirmed"
-    assert other.status == "confirmed"
+    assert_that_its_pieces_hold(one)
+    assert_that_its_pieces_hold(other)
     assert numbers(other, (K0.max(), B0.max())) == pytest.approx(numbers(one), rel=1e-7, nan_ok=True)
 
 
@@ -232,7 +242,7 @@ def test_every_sliding_motion_is_set_aside_and_no_other(seed):
     law = WallMatrices.of(Y @ Y.T, rng.uniform(0.3, 1.0, m))
     loop = MultiLoop(plant, Controller(1.0, (0.0, 0.5, 1.0)[seed % 3]), law)
     chart = multi_chart(loop)
-    assert chart.status == "confirmed"
+    assert_that_its_pieces_hold(chart)
     assert chart.unobserved_modes == missing * ("rigid motion (0 Hz)",)
     K0, K1, B0, B1 = chart.box
     walls = rng.uniform(size=(200, 2)) * (K1 - K0, B1 - B0) + (K0, B0)

@@ -15,9 +15,10 @@ from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_edge import common_edge
 from zwidth.chart.robust.common_set import Shapes, incompatible_members, intersect_members
+from zwidth.chart.robust.edge_check import walls_off_edge
 from zwidth.chart.robust.members import Member, chart_members, member_polygons
 from zwidth.chart.traced_edge import TracedEdge
-from zwidth.chart.verdict import Verdicts, judge
+from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require, wrong_type
 
@@ -26,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RobustChart(CommonChart):
-    """The walls that are stable for every loop of a list, exactly.
+    """The walls that are stable for every loop of a list, exactly, or for those that could be charted.
 
     members  index -> loop, of those that could be charted
     """
@@ -44,7 +45,9 @@ class RobustChart(CommonChart):
 
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Verdicts:
         """Verdicts on walls K, B (...) that broadcast, by eigenvalues of every member: stable for all of them,
-        unstable for one, else undecided; radius and frequency are those of the member with the largest radius."""
+        unstable for one, else undecided; radius and frequency are those of the member with the largest radius.
+
+        Where nothing is known of a member no wall is known to be stable: it is undecided."""
         each = [judge(loop, wall_stiffness, wall_damping) for loop in self.members.values()]
         worst = np.argmax([one.spectral_radius for one in each], axis=0)
 
@@ -54,10 +57,13 @@ class RobustChart(CommonChart):
         return Verdicts(
             stiffness=each[0].stiffness,
             damping=each[0].damping,
-            verdict=np.min([one.verdict for one in each], axis=0),
+            verdict=np.minimum(
+                np.min([one.verdict for one in each], axis=0), UNDECIDED if self.failed else STABLE
+            ),
             frequency=of_worst([one.frequency for one in each]),
             spectral_radius=of_worst([one.spectral_radius for one in each]),
             uncertainty=of_worst([one.uncertainty for one in each]),
+            unheld=np.max([one.unheld for one in each], axis=0),
         )
 
     def spectral_radius(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
@@ -69,7 +75,9 @@ def robust_chart(members: Sequence[Loop]) -> RobustChart:
     """The exact chart of the walls stable for every one of several loops.
 
     Each member is charted by D-decomposition and the charts are intersected; corners between two members are
-    solved for to rounding, so that peak and area have the exactness of a single chart.
+    solved for to rounding, so that peak and area have the exactness of a single chart. Every wall of the edge is
+    judged for every member by eigenvalues; one that is not on the stability limit leaves the chart in doubt, and
+    so does a member that cannot be charted (`CommonChart`).
 
     members  loops; they may differ in anything, the sampling period included
     Raises   ValueError  for no members
@@ -125,6 +133,7 @@ def robust_chart_of_members(charted: dict[int, Member], failed: dict[int, str]) 
         excluding=() if edge.peak else incompatible_members(charted, shapes, unit),
         outlines={index: tuple(member.edge.outlines) for index, member in charted.items()},
         corner_blur=blur,
+        off_circle=walls_off_edge(edge, list(charted.values())),
     )
 
 

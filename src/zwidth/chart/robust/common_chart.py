@@ -18,7 +18,10 @@ Floats = NDArray[np.float64]
 class CommonChart(DrawnChart):
     """The walls that are stable for every member, each arc of the edge with the member that binds there.
 
-    failed          index -> why a member could not be charted; nothing is claimed for these
+    A member that could not be charted is one of which nothing is known: all walls and numbers are then those of
+    the charted members, and nothing is claimed for all. `decided` is False, and the chart says so first.
+
+    failed          index -> why a member could not be charted: nothing is known of these
     binding         indices of the members that bind anywhere on the edge, ascending; of several on one edge the
                     one of the smallest set
     members_at_stiffness_max     the members that bind there, ascending: one, or two at a corner between them
@@ -28,6 +31,8 @@ class CommonChart(DrawnChart):
     excluding       members that leave no wall in common (see `common_set.incompatible_members`); () where there is
                     one
     outlines        index -> the member's own closed walks (k, 2) of [stiffness, damping]
+    off_circle      (k, 2) [K, B] of walls of the edge that are not on the stability limit: for the member that
+                    binds there the largest root is off the unit circle, or for another it is outside
     corner_blur     share of the set's size to which its edge is known: 0 for rounding; more where rounding hides
                     a corner, and 1e-6 where a member cuts off less than chords of the arcs see
     """
@@ -42,6 +47,7 @@ class CommonChart(DrawnChart):
     excluding: tuple[int, ...]
     outlines: dict[int, tuple[Floats, ...]]
     corner_blur: float
+    off_circle: Floats
 
     _edge_columns: ClassVar[dict[str, str]] = {"member": "member", **Chart._edge_columns}
 
@@ -50,22 +56,86 @@ class CommonChart(DrawnChart):
         """Index -> member, of those that could be charted."""
         raise NotImplementedError
 
+    @property
+    def unknown_members(self) -> int:
+        """Number of members of which nothing is known, because they could not be charted."""
+        return len(self.failed)
+
+    @property
+    def decided(self) -> bool:
+        """Whether the chart is that of all members, and its edge on the stability limit."""
+        return not self.doubt
+
+    @property
+    def stiffness_max_is(self) -> str | None:
+        """What the largest stiffness is of that of all members: "exact"; "at most", where some are unknown; None
+        where the edge is in doubt."""
+        if len(self.off_circle):
+            return None
+        return "at most" if self.failed else "exact"
+
+    @property
+    def unknown_text(self) -> str:
+        """Of how many members nothing is known, and why of the first of them; "" where all are charted."""
+        if not self.failed:
+            return ""
+        first, reason = next(iter(self.failed.items()))
+        return (
+            f"nothing is known of {self.unknown_members} of {self.unknown_members + len(self.charted)} members "
+            f"(of {first}: {reason})"
+        )
+
+    @property
+    def doubt(self) -> str:
+        """What is in doubt, in a sentence; "" where the chart is that of all members."""
+        doubts = [f"{self.unknown_text}; all numbers are those of the others"] if self.failed else []
+        if len(self.off_circle):
+            K, B = self.off_circle[0]
+            doubts.append(
+                f"{len(self.off_circle)} walls of the edge, such as {K:.6g} N/m and {B:.6g} N s/m, are not on the "
+                "stability limit"
+            )
+        return "; ".join(doubts)
+
     def document(self) -> dict[str, Any]:
         """The chart as numbers and lists, under the keys of `zwidth robust --json`; nan where there is none."""
-        return super().document() | {
-            "members_at_stiffness_max": list(self.members_at_stiffness_max),
-            "failed": [{"member": index, "reason": reason} for index, reason in self.failed.items()],
-            "binding": list(self.binding),
-            "best_by_area": self.best_by_area,
-            "best_by_stiffness": self.best_by_stiffness,
-            "lost_share": self.lost_share,
-            "lost_stiffness_share": self.lost_stiffness_share,
-            "corner_blur": self.corner_blur,
-            "excluding": list(self.excluding) or None,
+        reason = {"reason": f"this is undecided: {self.doubt}"} if self.doubt else {}
+        doubt = {
+            "unknown_members": self.unknown_members,
+            "decided": self.decided,
+            "numbers_hold_for": "charted members" if self.failed else "all members",
+            "stiffness_max_is": self.stiffness_max_is,
+            "edge_walls_in_doubt": self.off_circle.tolist(),
         }
+        return (
+            doubt
+            | reason
+            | super().document()
+            | {
+                "members_at_stiffness_max": list(self.members_at_stiffness_max),
+                "failed": [{"member": index, "reason": reason} for index, reason in self.failed.items()],
+                "binding": list(self.binding),
+                "best_by_area": self.best_by_area,
+                "best_by_stiffness": self.best_by_stiffness,
+                "lost_share": self.lost_share,
+                "lost_stiffness_share": self.lost_stiffness_share,
+                "corner_blur": self.corner_blur,
+                "excluding": list(self.excluding) or None,
+            }
+        )
 
     def _summary(self) -> str:
-        return f"{super()._summary()} for all of {len(self.charted)} members, {len(self.binding)} of which bind"
+        bind = f"{len(self.binding)} of which bind"
+        if self.failed:
+            return f"{self.unknown_text}; {super()._summary()} for the other {len(self.charted)}, {bind}"
+        return f"{super()._summary()} for all of {len(self.charted)} members, {bind}"
+
+    def _numbers(self) -> list[str]:
+        if not self.doubt:
+            return super()._numbers()
+        doubt = [f"in doubt           {self.doubt}"] if len(self.off_circle) else []
+        of = "of the charted members" if self.failed else "in doubt"
+        return [*doubt, *(f"{line} ({of})" for line in super()._numbers())]
 
 
 def lost_share(left: float, whole: float) -> float:

@@ -30,6 +30,17 @@ def unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
     return out
 
 
+@compiled
+def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
+    """Which walls (k,) are not certainly stable for a loop, given by `Tracer.polynomials`."""
+    out = np.empty(len(K), dtype=np.bool_)
+    N = polynomials.shape[1] - 1
+    room = work_array(N)
+    for i in range(len(K)):
+        out[i] = is_stable(polynomials, N, K[i], B[i], room) <= 0
+    return out
+
+
 @compiled_lean
 def mark_unstable(polynomials: Floats, N: int, K: Floats, B: Floats, room: Floats, out: Marks) -> None:
     """Mark the walls (k,) that are certainly unstable for a loop of degree N."""

@@ -24,7 +24,7 @@ from zwidth.chart.rings import cut_at_holes
 from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_set import incompatible_shapes
 from zwidth.chart.robust.members import polygonal
-from zwidth.chart.verdict import STABLE
+from zwidth.chart.verdict import STABLE, UNDECIDED
 
 Floats = NDArray[np.float64]
 
@@ -47,16 +47,24 @@ class MeasuredRobustChart(CommonChart):
     def charted(self) -> Mapping[int, MeasuredChart]:
         return self.members
 
+    @property
+    def stiffness_max_is(self) -> str | None:
+        """What the largest stiffness is of that of all members: "at least", as it was softened until every member
+        found it stable; None where some are unknown."""
+        return None if self.failed else "at least"
+
     def check(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> MeasuredVerdicts:
         """Verdicts on walls K, B (...) that broadcast, by every member's count of roots: stable for all of them,
-        unstable for one, else undecided; the frequency is that of the member with the most roots outside."""
+        unstable for one, else undecided; the frequency is that of the member with the most roots outside.
+
+        Where nothing is known of a member no wall is known to be stable: it is undecided."""
         each = [chart.check(wall_stiffness, wall_damping) for chart in self.members.values()]
         worst = np.argmax([one.outside for one in each], axis=0)[None]
         frequency = np.take_along_axis(np.array([one.frequency for one in each]), worst, axis=0)[0]
         return MeasuredVerdicts(
             each[0].stiffness,
             each[0].damping,
-            np.min([one.verdict for one in each], axis=0),
+            np.minimum(np.min([one.verdict for one in each], axis=0), UNDECIDED if self.failed else STABLE),
             frequency,
             np.max([one.outside for one in each], axis=0),
         )
@@ -107,6 +115,7 @@ def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[
         excluding=() if K > 0.0 else (without[0],) if without else incompatible_shapes(shapes),
         outlines={index: _rings(shape, unit) for index, shape in shapes.items()},
         corner_blur=CHORD,
+        off_circle=np.empty((0, 2)),  # polygons: their edge is known to chords alone
     )
 
 

@@ -12,11 +12,13 @@ from shapely.geometry.polygon import orient
 
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.chart_base import DrawnChart
+from zwidth.chart.off_circle import sides_of_circle
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.branch import Branch
-from zwidth.chart.several_directions.curve_set import trace_curves
+from zwidth.chart.several_directions.completeness import shows_all_walls, walls_beside_regions
+from zwidth.chart.several_directions.curve_set import CurveSet, trace_curves
 from zwidth.chart.several_directions.polygon_arcs import ring_arcs
-from zwidth.chart.several_directions.raster import Raster, missed_angles, try_orders, try_walls
+from zwidth.chart.several_directions.raster import BESIDE, Raster, missed_angles, try_orders, try_walls
 from zwidth.chart.several_directions.stable_polygons import ROOM, box_of_edges, cut_lines, stable_polygons
 from zwidth.chart.several_directions.wall_curves import WallCurve
 from zwidth.chart.traced_edge import TracedEdge
@@ -35,24 +37,70 @@ MARGIN, MOVED = 0.25, 0.2
 WIDER, MOST_LOOKS = 10.0, 8
 # How close to a side that is, in shares of the box, and how much smaller a box is made in which no cell was found.
 AT_SIDE, NARROWER = 1e-6, 10.0
+# How often a chart is traced again because a wall of its edge is off the circle, with angles of so many of these
+# walls, of those of their roots that are so close to the circle: with fewer the doubt stays where one look helps.
+MOST_AGAIN, MOST_ROOTS, NEAR_CIRCLE = 2, 40, 1e-2
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The stable cells of walls [K T, B].
+
+    curves    all that cuts the plane, with its samples
+    inside    the curves as they run in the box: they cut out the cells
+    box       that fits them
+    raster    walls tried on them
+    """
+
+    curves: CurveSet
+    inside: list[WallCurve]
+    polygons: list[shapely.Polygon]
+    box: Box
+    raster: Raster
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class MultiChart(DrawnChart):
     """The stable walls of several directions under one law.
 
-    judged    number of walls all over the chart that were tried by eigenvalues
-    doubtful  (k, 2) [k, b] of those of them on which the regions say otherwise: none, or the chart is in doubt
+    "Confirmed" rests on three things. Eigenvalues of the transition matrix agree with the regions at walls tried
+    all over the chart. The walls of the regions' edge have their largest root on the unit circle. And no cell is
+    missing: where directions that the plant couples have one law, each eigenvalue of the plant's response at each
+    sampled angle is one wall, and those on an edge of the stable set lie on the regions' edge (`completeness`).
+    Under unlike laws on coupled directions nothing but the walls tried looks for cells, which sees no small ones:
+    such a chart is in doubt, and its numbers are those of the cells found.
+
+    judged      number of walls all over the chart that were tried by eigenvalues
+    doubtful    (k, 2) [k, b] of those of them on which the regions say otherwise
+    off_circle  (k, 2) [k, b] of walls of the regions' edge that have their largest root elsewhere
+    missed      (k, 2) [k, b] of walls on an edge of the stable set that is none of the regions'
+    complete    whether it is shown that no cell is missing
     """
 
     loop: MultiLoop
     judged: int
     doubtful: Floats
+    off_circle: Floats
+    missed: Floats
+    complete: bool
 
     @property
     def status(self) -> str:
-        """ "confirmed" where eigenvalues agree with the regions at all walls tried; else "in doubt"."""
-        return "in doubt" if len(self.doubtful) else "confirmed"
+        """ "confirmed" where nothing speaks against the regions, and no cell is missing; else "in doubt"."""
+        return "in doubt" if self.doubt else "confirmed"
+
+    @property
+    def decided(self) -> bool:
+        """Whether the chart is confirmed."""
+        return not self.doubt
+
+    @property
+    def stiffness_max_is(self) -> str | None:
+        """What the largest stiffness found is: "exact"; "at least", where cells may be missing; None where the
+        regions themselves are in doubt."""
+        if len(self.doubtful) or len(self.off_circle):
+            return None
+        return "exact" if self.complete and not len(self.missed) else "at least"
 
     def document(self) -> dict[str, Any]:
         """The chart under the keys of every chart, the law's matrices, and what was tried by eigenvalues."""
@@ -65,22 +113,57 @@ class MultiChart(DrawnChart):
                 "relative_damping": matrices.damping.tolist(),
             }
         )
-        return super().document() | law | {"walls_judged": self.judged, "walls_in_doubt": self.doubtful.tolist()}
+        tried = {
+            "stiffness_max_is": self.stiffness_max_is,
+            "walls_judged": self.judged,
+            "walls_in_doubt": self.doubtful.tolist(),
+            "edge_walls_in_doubt": self.off_circle.tolist(),
+            "missed_edge_walls": self.missed.tolist(),
+            "cells_may_be_missing": self.cells_may_be_missing,
+            "decided": self.decided,
+        }
+        reason = {"reason": f"this is undecided: {self.doubt}"} if self.doubt else {}
+        return super().document() | law | tried | reason
+
+    def _summary(self) -> str:
+        return f"in doubt, {super()._summary()} found" if self.doubt else super()._summary()
 
     def _numbers(self) -> list[str]:
-        doubt = [f"IN DOUBT           {self.doubt}"] if self.doubt else []
-        return [*super()._numbers(), *doubt]
+        if not self.doubt:
+            return super()._numbers()
+        numbers = [line.replace("none: no stable wall has", "none found with") for line in super()._numbers()]
+        return [f"in doubt           {self.doubt}", *(f"found: {line}" for line in numbers)]
+
+    @property
+    def cells_may_be_missing(self) -> bool:
+        """Whether the stable set may have cells that the regions have not."""
+        return not self.complete or bool(len(self.missed))
 
     @property
     def doubt(self) -> str:
-        """What is in doubt, in a sentence; "" where eigenvalues agree with the regions at all walls tried."""
-        if not len(self.doubtful):
-            return ""
-        K, B = self.doubtful[0]
-        return (
-            f"at {len(self.doubtful)} of {self.judged} walls tried, such as {K:.6g} N/m and {B:.6g} N s/m, "
-            "eigenvalues say otherwise than the regions"
-        )
+        """What is in doubt, in a sentence; "" where the chart is confirmed."""
+        doubts = []
+        if n := len(self.doubtful):
+            doubts.append(
+                f"at {n} of {self.judged} walls tried, such as {_wall_text(self.doubtful[0])}, eigenvalues say "
+                "otherwise than the regions"
+            )
+        if n := len(self.off_circle):
+            doubts.append(
+                f"{n} walls of the regions' edge, such as {_wall_text(self.off_circle[0])}, are not on the "
+                "stability limit"
+            )
+        if len(self.missed):
+            doubts.append(
+                f"stable cells are missing, one with {_wall_text(self.missed[0])} on its edge; the numbers are "
+                "those of the cells found"
+            )
+        elif not self.complete:
+            doubts.append(
+                "stable cells may be missing, as under unlike laws along coupled directions only the walls tried "
+                "look for them; the numbers are those of the cells found"
+            )
+        return "; ".join(doubts)
 
     @property
     def unobserved_modes(self) -> tuple[str, ...]:
@@ -102,7 +185,8 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
 
     The plane of walls is cut by the curves and lines of walls with a root on the unit circle, a wall in each piece
     is judged by eigenvalues of the transition matrix, and the corners and peaks of what is stable are solved on
-    the curves. Walls tried all over the chart show what fell between samples.
+    the curves. Walls tried all over the chart show what fell between samples, walls of its edge that are off the
+    circle where to trace it again. What "confirmed" rests on: see `MultiChart`.
 
     Raises  UnmovedError  where the walls move nothing that is read
 
@@ -114,28 +198,41 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     (0.686292, 2.0)
     """
     require("loop", loop, MultiLoop, "stability_chart takes a Loop" if isinstance(loop, Loop) else "")
-    curves, polygons, raster = _stable_cells(loop)
-    edge = _edge(loop, curves, polygons)
+    cells = _stable_cells(loop, trace_curves(loop))
+    edge = _edge(loop, cells.inside, cells.polygons)
+    off = _walls_off_circle(loop, edge)
+    for _ in range(MOST_AGAIN):
+        if not len(off):
+            break
+        cells = _stable_cells(loop, cells.curves.with_angles(_angles_beside(loop, off)))
+        edge = _edge(loop, cells.inside, cells.polygons)
+        off = _walls_off_circle(loop, edge)
+    curves, raster = cells.curves, cells.raster
+    complete, missed = shows_all_walls(curves.equations), np.empty((0, 2))
+    if complete:
+        missed = walls_beside_regions(loop, curves.equations, curves.angles, cells.polygons, cells.box)
     return MultiChart(
         loop=loop,
         judged=len(raster.walls),
         doubtful=raster.walls[raster.differs] / (loop.period, 1.0),
+        off_circle=off,
+        missed=missed / (loop.period, 1.0),
+        complete=complete,
         **edge.chart_fields(loop.period, lambda K, B: _is_stable(loop, K, B)),
     )
 
 
-def _stable_cells(loop: MultiLoop) -> tuple[list[WallCurve], list[shapely.Polygon], Raster]:
-    """The stable cells of walls [K T, B], the curves that cut them out, and the walls that were tried on them.
+def _stable_cells(loop: MultiLoop, curves: CurveSet) -> _Cells:
+    """The stable cells that curves cut out.
 
     The curves are drawn in boxes that come to fit the cells, with samples added where walls tried show that a
     piece of a curve was missed.
     """
-    curves = trace_curves(loop)
     box = box_of_edges(loop, curves.samples, curves.lines)
     if box is None:
         raster = try_orders(loop, curves.samples)
         if not raster.differs.any():
-            return [], [], raster
+            return _Cells(curves, [], [], Box(-np.ones(2), np.ones(2)), raster)
         curves = curves.with_angles(missed_angles(loop, raster, [], Box(np.zeros(2), np.ones(2))))
         far = ROOM * np.abs(raster.walls[raster.differs]).max(axis=0)
         box = box_of_edges(loop, curves.samples, curves.lines) or Box(-far, far)
@@ -144,7 +241,7 @@ def _stable_cells(loop: MultiLoop) -> tuple[list[WallCurve], list[shapely.Polygo
         curves, inside = curves.within(box, tolerance)
         polygons = stable_polygons(loop, cut_lines(inside, box))
         raster = try_walls(loop, polygons, box)
-        fitting = _fitting_box(polygons, box)
+        cells, fitting = _Cells(curves, inside, polygons, box, raster), _fitting_box(polygons, box)
         moved = np.abs(np.concatenate([fitting.low - box.low, fitting.high - box.high])) > np.tile(
             MOVED * box.size, 2
         )
@@ -153,7 +250,20 @@ def _stable_cells(loop: MultiLoop) -> tuple[list[WallCurve], list[shapely.Polygo
         if raster.differs.any():
             curves = curves.with_angles(missed_angles(loop, raster, polygons, box))
         box, tolerance = fitting, CLOSE
-    return inside, polygons, raster
+    return cells
+
+
+def _walls_off_circle(loop: MultiLoop, edge: TracedEdge) -> Floats:
+    """Walls (k, 2) of [K, B] of an edge that are not on the stability limit."""
+    walls = np.vstack([np.empty((0, 2)), *(np.column_stack([K, B]) for _, K, B in edge.arc_points)])
+    return walls[sides_of_circle(loop, *walls.T) != 0.0] if len(walls) else walls
+
+
+def _angles_beside(loop: MultiLoop, off: Floats) -> Floats:
+    """Angles of the roots near the circle, or outside, of walls (k, 2) of [K, B]; and around them."""
+    off = off[:: max(1, len(off) // MOST_ROOTS)]
+    z = np.linalg.eigvals(loop.transition_matrix(*off.T))
+    return np.unique(np.abs(np.angle(z[np.abs(z) > 1.0 - NEAR_CIRCLE]))[:, None] * (1.0 + BESIDE))
 
 
 def _fitting_box(polygons: list[shapely.Polygon], box: Box) -> Box:
@@ -188,3 +298,8 @@ def _edge(loop: MultiLoop, curves: list[WallCurve], polygons: list[shapely.Polyg
 def _is_stable(loop: MultiLoop, wall_stiffness: float, wall_damping: float) -> bool:
     """Whether all eigenvalues of the transition matrix lie inside the unit circle."""
     return bool(np.abs(np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping))).max() < 1.0)
+
+
+def _wall_text(wall: Floats) -> str:
+    K, B = wall
+    return f"{K:.6g} N/m and {B:.6g} N s/m"

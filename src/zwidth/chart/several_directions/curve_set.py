@@ -33,12 +33,21 @@ STEPS: Final = 48
 
 @dataclass(frozen=True)
 class CurveSet:
-    """What cuts the plane of walls: equations with the samples at which all their walls are known, and lines."""
+    """What cuts the plane of walls: equations with the samples at which all their walls are known, and lines.
+
+    equations  of all sets of coupled directions; those that both numbers move are the ones of `pairs`
+    """
 
     loop: MultiLoop
+    equations: tuple[WallEquation, ...]
     pairs: tuple[tuple[WallEquation, Samples], ...]
     real: tuple[RealRootEquation, ...]
     lines: tuple[StraightLine, ...]
+
+    @property
+    def angles(self) -> Floats:
+        """All angles (n,) at which walls are known, ascending."""
+        return np.unique(np.concatenate([np.empty(0), *(samples.parameters for _, samples in self.pairs)]))
 
     @property
     def samples(self) -> Floats:
@@ -85,7 +94,8 @@ def trace_curves(loop: MultiLoop) -> CurveSet:
     pairs: list[tuple[WallEquation, Samples]] = []
     real: list[RealRootEquation] = []
     lines: list[StraightLine] = []
-    for equation in wall_equations(loop):
+    equations = wall_equations(loop)
+    for equation in equations:
         if (equation.stiffness > 0.0).any() and (equation.damping > 0.0).any():
             pairs.append((equation, Samples.of(equation, thetas)))
         else:
@@ -93,7 +103,7 @@ def trace_curves(loop: MultiLoop) -> CurveSet:
         own_lines, own_real = real_root_walls(equation)
         lines += own_lines
         real += own_real
-    return CurveSet(loop, tuple(pairs), tuple(real), tuple(lines))
+    return CurveSet(loop, tuple(equations), tuple(pairs), tuple(real), tuple(lines))
 
 
 def _steps_across(real: RealRootEquation, box: Box) -> Floats:

@@ -1,0 +1,44 @@
+"""Whether walls are on the stability limit: their largest root lies on the unit circle, as far as rounding tells.
+
+The rule is that of verdicts on single walls, with the digits that a computed wall has: a wall of an edge is off
+where `check` would find walls stable, or unstable, all round it within `WALL_ROUNDING`.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from zwidth.chart.verdict import BAND, MOST_ROUNDING, rounding_of_roots
+from zwidth.loop.loop import Loop
+from zwidth.loop.multi_loop import MultiLoop
+
+Floats = NDArray[np.float64]
+
+# How exactly a wall of an edge is known, relative. Less would call corners off at which two roots meet: these part
+# with the square root of it, already by 1e-8 for the last digit of K.
+WALL_ROUNDING: Final = 1e-13
+AT_ONCE: Final = 4000  # walls judged in one batch of transition matrices
+
+
+def sides_of_circle(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Floats:
+    """Where the largest |z| of walls K, B (k,) is: outside the circle 1, inside -1; 0 on it, but for rounding."""
+    return np.sign(distances_from_circle(loop, wall_stiffness, wall_damping))
+
+
+def distances_from_circle(
+    loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike, radius: float = 1.0
+) -> Floats:
+    """How far outside the circle |z| = radius the largest root of walls K, B (k,) is, negative inside; 0 for one
+    that is there, but for rounding."""
+    K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
+    away = np.zeros(len(K))
+    for first in range(0, len(K), AT_ONCE):
+        L = loop.transition_matrix(K[first : first + AT_ONCE], B[first : first + AT_ONCE])
+        some = np.abs(np.linalg.eigvals(L)).max(axis=-1) - radius
+        for k in np.flatnonzero(np.abs(some) > BAND).tolist():
+            if abs(some[k]) > MOST_ROUNDING or abs(some[k]) > rounding_of_roots(L[k], rounding=WALL_ROUNDING):
+                away[first + k] = some[k]
+    return away
