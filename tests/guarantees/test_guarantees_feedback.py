@@ -90,7 +90,7 @@ def test_feedforward_that_some_hand_makes_vibrate_guarantees_nothing():
     ("feedback", "words", "springs"),
     [
         ({"force_sensor": ForceSensor(0.5)}, "force feedback (gain 0.5)", False),
-        ({"local_loop": LocalLoop(4, damping=1.0)}, "a local loop at 4 times the rate (1 N s/m)", True),
+        ({"local_loop": LocalLoop(4, damping=1.0)}, "a local loop at 4 times the rate", True),
     ],
 )
 def test_what_is_not_known_says_with_what(feedback, words, springs):

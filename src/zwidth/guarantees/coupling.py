@@ -10,6 +10,7 @@ import numpy as np
 
 from zwidth.guarantees.port import Floats, hold_fixed, port
 from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffness_text
+from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.guarantees.two_port import (
     Demand,
     coupling_impedance,
@@ -106,6 +107,8 @@ def couplings(loop: Loop, held: Floats, wall: tuple[float, float] | None = None)
 
     wall  K [N/m] and B [N s/m] of a wall: also the stiffest coupling that it needs
     """
+    if (alone := stable_alone(loop)).fails:
+        return no_couplings(alone.reason)
     angles = coupling_angles(loop, held)
     sampled = sampled_demand(loop, angles, held)
     return Couplings(

@@ -10,6 +10,7 @@ from zwidth.chart.measured.chart import MeasuredChart
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.guarantees.coupling import Couplings
 from zwidth.guarantees.region import Region, outline_columns, stiffness_text
+from zwidth.guarantees.stable_alone import Premise
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.result import Result
@@ -36,12 +37,14 @@ class Guarantees(Result):
     """The guarantees of a loop, from the strongest to plain stability, and the chart that holds them all.
 
     couplings  virtual couplings through which walls are stable with every passive operator; None: not computed
+    premises   what must hold for the guarantees; where one fails, they are withheld
     """
 
     loop: Loop | MeasuredLoop
     guarantees: tuple[Guarantee, ...]
     chart: StabilityChart | MeasuredChart
     couplings: Couplings | None = None
+    premises: tuple[Premise, ...] = ()
 
     def __getitem__(self, name: str) -> Guarantee:
         """The guarantee of that name. Raises KeyError."""
@@ -57,6 +60,11 @@ class Guarantees(Result):
         return super().about(point)
 
     @property
+    def refusal(self) -> str | None:
+        """Why guarantees are withheld; None where no premise of theirs fails."""
+        return next((premise.reason for premise in self.premises if premise.fails), None)
+
+    @property
     def is_empty(self) -> bool:
         """Whether no wall with K > 0 and B >= 0 has any of the guarantees."""
         return all(guarantee.region.reason is not None for guarantee in self.guarantees)
@@ -68,7 +76,7 @@ class Guarantees(Result):
             for one in self.guarantees
         ]
         coupling = {} if self.couplings is None else {"coupling": self.couplings.document()}
-        return {"guarantees": entries} | coupling
+        return {"guarantees": entries} | coupling | {"premises": [one.document() for one in self.premises]}
 
     def table(self) -> dict[str, list[Any]]:
         """The outlines as columns, region after region."""
@@ -77,4 +85,5 @@ class Guarantees(Result):
     def __repr__(self) -> str:
         stiffest = ", ".join(f"{one.name} {stiffness_text(one.region)}" for one in self.guarantees)
         coupled = [] if self.couplings is None else repr(self.couplings).splitlines()
-        return "\n  ".join([f"Guarantees: {stiffest}", *coupled])
+        unsure = [premise.reason for premise in self.premises if premise.reason]
+        return "\n  ".join([f"Guarantees: {stiffest}", *unsure, *coupled])

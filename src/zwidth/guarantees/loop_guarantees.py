@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from zwidth.chart.chart import stability_chart
+from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.guarantees.coupling import couplings, no_couplings
 from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
@@ -16,7 +16,8 @@ from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import Floats, without_idle_motions
 from zwidth.guarantees.region import Region, empty_region, stiffest_corner
 from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
-from zwidth.loop.fixed_feedback import acts, describe_feedback
+from zwidth.guarantees.stable_alone import AS_BENT, Premise, bent_as_loaded, stable_alone
+from zwidth.loop.fixed_feedback import acts, feedback_name
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require, wrong_type
@@ -36,7 +37,8 @@ def find_guarantees(
     progress  as in `spring_stable_region`, which takes most of the time
 
     Names: `passive-at-actuator` (where the handle is elsewhere), `passive`, `spring-stable`, `nyquist-spring`,
-    `robust` (if given), `stable`. Without a handle only the first and the last are known.
+    `robust` (if given), `stable`. Without a handle only the first and the last are known. Of a device that is
+    unstable by itself (`stable_alone`) all but the last two are withheld.
 
     >>> from zwidth.loop.controller import Controller
     >>> from zwidth.model.plant import Plant
@@ -47,16 +49,32 @@ def find_guarantees(
     ['passive', 'spring-stable', 'nyquist-spring', 'stable']
     """
     require("loop", loop, Loop)
+    return _guarantees(loop, (stable_alone(loop),), robust, progress)
+
+
+def _guarantees(
+    loop: Loop,
+    premises: tuple[Premise, ...],
+    robust: Sequence[Floats] | None = None,
+    progress: Progress | None = None,
+) -> Guarantees:
+    """Every guarantee of a loop as far as its premises allow; the first that fails is why others are withheld."""
     moving = _without_idle_motions(loop)
     plant = moving.plant
     guarantees = []
+    failing = next((each for each in premises if each.fails), None)
+    unknown = "; ".join(each.reason for each in premises if each.holds is None)
+
+    def as_known(find: Callable[[], Region]) -> Region:
+        return empty_region(failing.reason) if failing is not None else find().with_warning(unknown)
+
     apart = plant.handle is None or not _same_place(plant.actuator, plant.handle)
     if apart:
         guarantees.append(
             Guarantee(
                 "passive-at-actuator",
                 "stable whatever passive linear operator holds the actuator",
-                passive_region(moving, plant.actuator),
+                as_known(lambda: passive_region(moving, plant.actuator)),
                 COLGATE,
             )
         )
@@ -65,7 +83,7 @@ def find_guarantees(
         Guarantee(
             "passive",
             "stable whatever passive linear operator holds the handle",
-            passive_region(moving) if has_handle else empty_region(NO_HANDLE),
+            as_known(lambda: passive_region(moving) if has_handle else empty_region(NO_HANDLE)),
             COLGATE,
         )
     )
@@ -73,7 +91,7 @@ def find_guarantees(
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
-            _of_springs(partial(spring_stable_region, progress=progress), moving),
+            as_known(lambda: _of_springs(partial(spring_stable_region, progress=progress), moving)),
             SPRINGS,
         )
     )
@@ -81,7 +99,7 @@ def find_guarantees(
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
-            _of_springs(nyquist_region, moving),
+            as_known(lambda: _of_springs(nyquist_region, moving)),
             SPRINGS,
         )
     )
@@ -89,11 +107,17 @@ def find_guarantees(
         guarantees.append(
             Guarantee("robust", "stable for a whole range of operators", region_of(robust), "robust chart")
         )
-    chart = stability_chart(loop, decay=False)
-    peak = chart.stiffness_max
-    stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
+    chart = stability_chart(loop, decay=False).drawn()
+    of_chart = next((each for each in premises if each.fails and each.what == AS_BENT), None)
+    stable = _stable(chart) if of_chart is None else empty_region(of_chart.reason)
     guarantees.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
-    return Guarantees(loop, tuple(guarantees), chart)
+    return Guarantees(loop, tuple(guarantees), chart, premises=premises)
+
+
+def _stable(chart: StabilityChart) -> Region:
+    """The walls that are stable with the device as described."""
+    peak = chart.stiffness_max
+    return Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
 
 
 def guarantees_of(
@@ -123,9 +147,12 @@ def guarantees_of(
             found, couplings=no_couplings("no coupling is known of a measured response; give a [plant]")
         )
     loop = point.without_operator.loop
-    guarantees = find_guarantees(loop, progress=progress)
+    premises = (*(bent_as_loaded(text) for text in point.load_omissions), stable_alone(loop))
+    guarantees = _guarantees(loop, premises, progress=progress)
     if not coupling and wall is None:
         return guarantees
+    if guarantees.refusal is not None:
+        return replace(guarantees, couplings=no_couplings(guarantees.refusal))
     if loop.has_fixed_feedback:
         names = [*loop.controller.feedback_names, *(["a load"] if loop.plant.is_loaded else [])]
         reason = f"no coupling is known with {', '.join(names)}"
@@ -154,7 +181,7 @@ def _of_springs(find_region: Callable[[Loop], Region], loop: Loop) -> Region:
         return empty_region(NO_HANDLE)
     sensor = loop.controller.force_sensor
     if sensor is not None and acts(sensor):
-        return empty_region(f"this is not known with {describe_feedback(sensor)}")
+        return empty_region(f"this is not known with {feedback_name(sensor)}")
     try:
         return find_region(loop)
     except ChartError as error:

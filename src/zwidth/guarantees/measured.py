@@ -28,6 +28,7 @@ from zwidth.guarantees.gauge import Gauge
 from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
 from zwidth.guarantees.passive import passive_region_of
 from zwidth.guarantees.region import Region, empty_region
+from zwidth.guarantees.stable_alone import NOT_MEASURED
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.measured.measured_port import MeasuredPort
@@ -167,7 +168,7 @@ def measured_guarantees(point: OperatingPoint) -> Guarantees:
     """Every guarantee of a measured device without its operator, with the reason where one is not known."""
     bare = point.without_operator
     chart: MeasuredChart = measured_chart(bare.measured, bare.controller)
-    region = measured_passive_region(bare.measured_port, chart.loop)
+    region = measured_passive_region(bare.measured_port, chart.loop).with_warning(NOT_MEASURED.reason)
     peak = chart.stiffness_max
     stable = Region(chart.regions, peak, chart.damping_at_stiffness_max, None if np.isfinite(peak) else NO_STABLE)
     return Guarantees(
@@ -183,4 +184,5 @@ def measured_guarantees(point: OperatingPoint) -> Guarantees:
             Guarantee("stable", "stable with the device as measured", stable, EXACT),
         ),
         chart,
+        premises=(NOT_MEASURED,),
     )

@@ -1,8 +1,9 @@
 """Walls that are stable with every passive operator: Colgate and Schenkel's theorem for any device and estimator.
 
-The device with a passive operator is stable without a wall. Along a ray of walls lambda H, lambda from 0, no root
-crosses the circle before lambda = 1/mu, the gauge's answer (see `gauge`); nor does a root at z = 1 while no spring
-makes the reading give way by more than the wall pushes back. So the rays, cut off there, are the passive walls.
+The device by itself is stable (`stable_alone`), and with a passive operator, too. Along a ray of walls lambda H,
+lambda from 0, no root crosses the circle before lambda = 1/mu, the gauge's answer (see `gauge`); nor does a root
+at z = 1 while no spring makes the reading give way by more than the wall pushes back. So the rays, cut off there,
+are the passive walls.
 
 A mass m with viscous friction b has C = -(T/4b)(1 - e^(-i theta))/(1 - cos theta) e^(-i l theta), R = |C|: half
 planes, and the theorem of Colgate and Schenkel 1997 (read in Weir and Colgate's chapter of 2008) to the letter,
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from zwidth.guarantees.gauge import Gauge, gauge
 from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty_region
-from zwidth.loop.fixed_feedback import Feedforward, describe_feedback
+from zwidth.guarantees.stable_alone import stable_alone
+from zwidth.loop.fixed_feedback import Feedforward, feedback_name
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 
@@ -61,6 +63,8 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     obstacle = feedback_obstacle(loop)
     if obstacle:
         return empty_region(obstacle)
+    if (alone := stable_alone(loop)).fails:
+        return empty_region(alone.reason)
     loop_gauge = gauge(loop, held)
     if loop_gauge.conics is None and loop.has_fixed_feedback:
         return empty_region(ACTIVE)
@@ -93,7 +97,7 @@ def feedback_obstacle(loop: Loop) -> str:
     if loop.plant.is_loaded:
         return "this is not known under load, where the computer's own force turns with what the operator moves"
     unlike = [part for part in loop.controller.fixed_feedback if not isinstance(part, Feedforward)]
-    return f"this is not known with {describe_feedback(unlike[0])}" if unlike else ""
+    return f"this is not known with {feedback_name(unlike[0])}" if unlike else ""
 
 
 def _walls(directions: Floats, reach: Floats, period: float) -> tuple[Floats, Floats]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,12 @@ class Region(Result):
     def polygon(self) -> Any:
         """The set as a shapely geometry."""
         return shapely.union_all([shapely.Polygon(ring) for ring in self.rings])
+
+    def with_warning(self, warning: str) -> Region:
+        """The same set with one more limitation; itself where that is "", or where the set is empty."""
+        if not warning or not self.rings:
+            return self
+        return replace(self, warning=warning if self.warning is None else f"{self.warning}; {warning}")
 
     def contains(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.bool_]:
         """Whether walls K, B of any shape (...) lie inside, to the accuracy of the rings."""

@@ -16,6 +16,7 @@ from zwidth.guarantees.envelope_cuts import EnvelopeCuts
 from zwidth.guarantees.port import Floats, without_idle_motions
 from zwidth.guarantees.region import Region, empty_region, rings_of, stiffest_corner
 from zwidth.guarantees.spring_family import SpringFamily, handle_of, polygons_of, spring_for
+from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
@@ -70,6 +71,8 @@ def nyquist_spring(loop: Loop) -> float:
 
 def nyquist_region(loop: Loop) -> Region:
     """The walls that are stable with the Nyquist spring alone; empty, with a reason, where there is none."""
+    if (alone := stable_alone(loop)).fails:
+        return empty_region(alone.reason)
     k = nyquist_spring(loop)
     if not np.isfinite(k):
         return empty_region("no spring at the handle puts a mode at the Nyquist frequency")
@@ -107,6 +110,8 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
     True
     """
     require("loop", loop, Loop)
+    if (alone := stable_alone(loop)).fails:
+        return empty_region(alone.reason)
     springs = SpringFamily.of(Loop(without_idle_motions(loop.plant), loop.controller))
     new = _spread(np.union1d(springs.shares(_grid(springs.loop, SPRINGS)), _alternating(springs)))
     tried = np.union1d(springs.shares(_grid(springs.loop, TRIED)), _springs_of_one_alias(springs))
