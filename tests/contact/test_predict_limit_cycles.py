@@ -12,12 +12,16 @@ import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
 from zwidth.contact.friction_quantisation_plane import quiet_limit, resting_limit
+from zwidth.contact.limit_cycle_answer import answered_cycles
+from zwidth.contact.motion_verdict import judge_response
 from zwidth.contact.predict_limit_cycles import (
     NoEncoderStepsError,
     NothingNonlinearError,
+    behaviour_at_the_end,
     largest_motion,
     predict_limit_cycles,
 )
+from zwidth.contact.time_response import SOURCES, TimeResponse
 from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sections import HysteresisError
@@ -82,15 +86,95 @@ def test_the_limits_are_those_of_friction_and_steps():
     assert smooth.resting_limit is None
 
 
-def test_a_simulation_at_another_frequency_is_told():
+def test_where_simulation_and_prediction_part_the_simulation_is_the_answer():
     predicted = predict_limit_cycles(package.load(TWO_MASS, [LIMITED]).at(), 8000.0, 10.0)
-    (simulated,) = predicted.simulated
+    (answer,) = predicted.answers
+    assert (answer.source, answer.confirmed) == ("describing function", True)
     assert not predicted.simulation_disagrees
+    cycle, simulated = answer.cycle, answer.simulated
+
+    def answered(*runs, others=()):
+        return answered_cycles([cycle], [runs], others, 1.0)
+
     slower = replace(simulated, frequency=0.5 * simulated.frequency)
-    assert replace(predicted, simulated=(slower,)).simulation_disagrees
+    (other,) = answered(slower, slower).cycles
+    assert (other.source, other.confirmed) == ("simulation", True)
+    assert (other.cycle.frequency_Hz, other.predicted) == (slower.frequency, cycle)
+    larger = replace(simulated, amplitude=1.3 * simulated.amplitude)
+    assert answered(larger, larger).cycles[0].cycle.amplitude == larger.amplitude
     resting = replace(slower, behaviour="converged")
-    assert not replace(predicted, simulated=(resting,)).simulation_disagrees
-    assert not replace(predicted, simulated=(None,)).simulation_disagrees
+    gone = answered(resting, resting)
+    assert (gone.cycles, gone.contradicted[0].confirmed) == ((), False)
+    (open_,) = answered(replace(slower, behaviour="undecided")).cycles
+    assert (open_.source, open_.confirmed) == ("describing function", None)
+    found = answered(simulated, simulated, others=(larger, slower, resting))
+    assert [each.source for each in found.cycles] == ["describing function", "simulation", "simulation"] or [
+        each.source for each in found.cycles
+    ] == ["simulation", "describing function", "simulation"]
+    assert not answered_cycles([cycle], [()], [], 1.0).cycles[0].confirmed
+    (elsewhere,) = answered_cycles([cycle], [(resting, resting)], [simulated], 1.0).cycles
+    assert (elsewhere.confirmed, elsewhere.predicted) == (True, cycle)  # another start leads to it
+
+
+def response(truth, reading=None, **more):
+    """A run of a nonlinear device on a two-sided wall, given its motion."""
+    S = len(truth)
+    still = np.zeros(S)
+    return TimeResponse(
+        period=1e-3,
+        wall_position=0.0,
+        time=1e-3 * np.arange(S),
+        reading=truth if reading is None else reading,
+        truth=truth,
+        velocity=still,
+        force=still + 1.0,
+        handle=truth,
+        trail_time=np.zeros(0),
+        trail=np.zeros(0),
+        energies=np.zeros((S, len(SOURCES))),
+        stored=still,
+        given_up=False,
+        **{"quantum": 0.0, "noise": 0.0, "linear": False, "surface": False, "held": False} | more,
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "behaviour"), [(0.0, "limit cycle"), (0.02, "undecided"), (-0.02, "undecided")]
+)
+def test_a_vibration_that_still_changes_is_no_limit_cycle_yet(change, behaviour):
+    """Neither a slow decay nor a slow approach to another vibration has settled."""
+    t = np.arange(4000)
+    run = response(np.exp(change * t / 1000.0) * np.sin(0.2 * t))
+    judged = judge_response(run)
+    assert judged.behaviour == "limit cycle"
+    assert behaviour_at_the_end(run, judged, 1000) == behaviour
+
+
+def test_what_noise_alone_keeps_up_is_no_limit_cycle():
+    rng = np.random.default_rng(3)
+    truth = 1e-7 * np.sin(0.2 * np.arange(4000))
+    run = response(truth, truth + 1e-6 * rng.normal(size=4000), quantum=1e-6, noise=1e-6)
+    judged = judge_response(run)
+    assert judged.behaviour == "converged"
+    assert behaviour_at_the_end(run, judged, 1000) == "undecided"
+
+
+def test_a_vibration_that_only_a_large_motion_falls_into_is_found_by_simulation():
+    """Nothing grows from small motions, so that no stable cycle is predicted from them alone; one that the
+    force limit
+    keeps up is in the answer, whoever finds it."""
+    point = package.load(TWO_MASS, [LIMITED, "loop.delay_samples=0.5"]).at()
+    found = predict_limit_cycles(point, 7000.0, 10.0)
+    met = [answer for answer in found.answers if answer.source == "simulation"]
+    assert met
+    assert found.simulation_disagrees
+    document = found.document()
+    assert [each["from"] for each in document["limit_cycles"]] == [answer.source for answer in found.answers]
+    for answer, told in zip(found.answers, document["limit_cycles"], strict=True):
+        if answer.source == "simulation":
+            assert told["amplitude_m"] == answer.simulated.amplitude
+            assert told["frequency_Hz"] == answer.simulated.frequency
+    assert found.table()["amplitude_m"] == [cycle.amplitude for cycle in found.cycles]
 
 
 def test_a_device_moves_as_far_as_its_handle_and_a_given_plant_a_metre(tmp_path):
@@ -128,8 +212,8 @@ def test_the_table_has_a_row_for_each_cycle():
 
 def test_it_shows_itself_in_five_lines():
     predicted = predict_limit_cycles(rough(), 2600.0, 0.0, simulate=False)
-    many = replace(predicted, cycles=5 * predicted.cycles)
-    none = replace(predicted, cycles=())
+    many = replace(predicted, answers=5 * predicted.answers)
+    none = replace(predicted, answers=())
     for shown in (predicted, many, none):
         assert len(repr(shown).splitlines()) <= 5
         assert max(map(len, repr(shown).splitlines())) <= 115

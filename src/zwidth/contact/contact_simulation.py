@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from zwidth.contact.run_length import RunLength
 from zwidth.contact.time_response import SOURCES, TimeResponse, as_key
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.unheld_positions import unheld_positions
 from zwidth.result import Result
 
+WALLS: Final = ("wall", "one-sided wall")
 AT_LIMIT = 1.0 - 1e-12  # share of the largest force from which a force was cut to it
 
 
@@ -42,6 +44,16 @@ class PassivityComparison(NamedTuple):
     rendered_stiffness: float
     uncontrolled_stiffness: float
     uncontrolled: Judgement
+
+
+def is_pushed_on(loop: Loop, touched: Environment, values: Floats, hand: Hand) -> bool:
+    """Whether the hand's push moves the device on and on, since no stiffness of the wall holds a position.
+
+    loop  held by its operator
+    """
+    if touched.name not in WALLS or values[0] != 0.0 or hand.push == 0.0 or hand.tremor is not None:
+        return False
+    return unheld_positions(loop) > 0
 
 
 @dataclass(frozen=True, repr=False)
@@ -132,9 +144,9 @@ class ContactSimulation(Result):
         """Effect of the passivity controller; None without one."""
         if self.uncontrolled is None:
             return None
-        return PassivityComparison(
-            _felt_stiffness(self.response), _felt_stiffness(self.uncontrolled), judge_response(self.uncontrolled)
-        )
+        drifts = is_pushed_on(self.point.loop, self.environment, self.values, self.hand)
+        judged = judge_response(self.uncontrolled, drifts=drifts)
+        return PassivityComparison(_felt_stiffness(self.response), _felt_stiffness(self.uncontrolled), judged)
 
     @property
     def ledger(self) -> dict[str, float]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle
 from zwidth.result import Result
 
-OTHERWISE: Final = 1.5  # ratio of frequencies from which a simulation does not have the vibration predicted
 CYCLE_KEYS: Final = ("amplitude_m", "frequency_Hz", "stable", "within_range", "force_N", "velocity_m_per_s")
+CycleSource = Literal["describing function", "simulation"]
 MOST_TOLD: Final = 4  # cycles that a prediction shows of itself
 
 
@@ -40,6 +40,36 @@ class SimulatedVibration:
         }
 
 
+@dataclass(frozen=True)
+class LimitCycleAnswer:
+    """One limit cycle, and what it rests on.
+
+    cycle      the answer
+    source     "describing function": as harmonic balance predicts it; "simulation": as a simulation ends
+    confirmed  True: a simulation ends in it; False: simulations from both sides of it end elsewhere; None: not
+               simulated, or no run has settled
+    simulated  where a simulation from near it ends; None: not simulated
+    predicted  what harmonic balance predicts in its place; None: nothing
+    """
+
+    cycle: LimitCycle
+    source: CycleSource
+    confirmed: bool | None
+    simulated: SimulatedVibration | None
+    predicted: LimitCycle | None
+
+    def document(self) -> dict[str, Any]:
+        """The numbers by key and unit."""
+        predicted = self.predicted
+        return _cycle_document(self.cycle) | {
+            "from": self.source,
+            "confirmed": self.confirmed,
+            "predicted": predicted
+            and {"amplitude_m": predicted.amplitude, "frequency_Hz": predicted.frequency_Hz},
+            "simulated": self.simulated and self.simulated.document(),
+        }
+
+
 @dataclass(frozen=True, repr=False)
 class LimitCyclePrediction(Result):
     """Limit cycles of a device on one two-sided wall.
@@ -51,12 +81,12 @@ class LimitCyclePrediction(Result):
     left_out               what of the device the prediction leaves out, in words
     predicted_by           the method, and what it is worth
     balance                growth of vibrations over their amplitude, and as far as the device can move
-    cycles                 by amplitude
-    simulated              what a simulation finds for each; None: not simulated, as is none that is unstable or
-                           beyond the range
+    answers                the limit cycles by amplitude: predicted, or simulated where the two part
+    contradicted           predicted cycles that no simulation has
     small_start_vibration  what it finds where no stable cycle is predicted within the range; None: not simulated
     resting_limit          stiffest wall on which there is a place to rest under every push [N/m]; None: not known
     quiet_limit            stiffest wall, of this damping, without any hunting [N/m]; None: not known
+    was_simulated          whether predictions were held against simulations
     """
 
     wall_stiffness: float
@@ -67,11 +97,19 @@ class LimitCyclePrediction(Result):
     left_out: tuple[str, ...]
     predicted_by: str
     balance: HarmonicBalance
-    cycles: tuple[LimitCycle, ...]
-    simulated: tuple[SimulatedVibration | None, ...]
+    answers: tuple[LimitCycleAnswer, ...]
+    contradicted: tuple[LimitCycleAnswer, ...]
     small_start_vibration: SimulatedVibration | None
     resting_limit: float | None
     quiet_limit: float | None
+    was_simulated: bool = True
+
+    @property
+    def none_found(self) -> str:
+        """What is said where there is no limit cycle."""
+        if self.contradicted:
+            return "no limit cycle: what is predicted, the simulation does not have"
+        return "no limit cycle is predicted" + (", and none was met by simulation" if self.was_simulated else "")
 
     @property
     def largest_motion(self) -> float:
@@ -84,14 +122,20 @@ class LimitCyclePrediction(Result):
         return self.balance.leaves_range
 
     @property
+    def cycles(self) -> tuple[LimitCycle, ...]:
+        """The limit cycles by amplitude."""
+        return tuple(answer.cycle for answer in self.answers)
+
+    @property
+    def simulated(self) -> tuple[SimulatedVibration | None, ...]:
+        """What a simulation finds for each; None: not simulated, as is none that is unstable or beyond the
+        range."""
+        return tuple(answer.simulated for answer in self.answers)
+
+    @property
     def simulation_disagrees(self) -> bool:
-        """Whether a simulation has a limit cycle at another frequency than predicted; it is right then."""
-        return any(
-            vibration is not None
-            and vibration.behaviour != "converged"
-            and not 1.0 / OTHERWISE < vibration.frequency / cycle.frequency_Hz < OTHERWISE
-            for cycle, vibration in zip(self.cycles, self.simulated, strict=True)
-        )
+        """Whether a simulation has another vibration than predicted, or none; it is the answer then."""
+        return bool(self.contradicted) or any(answer.source == "simulation" for answer in self.answers)
 
     def document(self) -> dict[str, Any]:
         """Everything by key and unit; None where it is not known, or was not simulated."""
@@ -103,10 +147,8 @@ class LimitCyclePrediction(Result):
             "verdict": self.verdict,
             "nonlinear": list(self.nonlinear),
             "predicted_by": self.predicted_by,
-            "limit_cycles": [
-                _cycle_document(cycle) | {"simulated": vibration and vibration.document()}
-                for cycle, vibration in zip(self.cycles, self.simulated, strict=True)
-            ],
+            "limit_cycles": [answer.document() for answer in self.answers],
+            "contradicted": [answer.document() for answer in self.contradicted],
             "otherwise": self.small_start_vibration and self.small_start_vibration.document(),
             "largest_motion_m": self.largest_motion,
             "leaves_range": self.leaves_range,
@@ -123,6 +165,10 @@ class LimitCyclePrediction(Result):
         """The limit cycles as columns, one a row."""
         rows = [_cycle_document(cycle) for cycle in self.cycles]
         columns: dict[str, list[Any]] = {key: [_as_cell(row[key]) for row in rows] for key in CYCLE_KEYS}
+        columns["from"] = [answer.source for answer in self.answers]
+        columns["confirmed"] = [
+            None if answer.confirmed is None else _as_cell(answer.confirmed) for answer in self.answers
+        ]
         documents = [simulated.document() if simulated else {} for simulated in self.simulated]
         for key in ("behaviour", "amplitude_m", "frequency_Hz"):
             columns[f"simulated_{key}"] = [own.get(key) for own in documents]
@@ -133,7 +179,9 @@ class LimitCyclePrediction(Result):
             f"  {cycle.amplitude:.4g} m at {cycle.frequency_Hz:.4g} Hz, "
             + ("stable" if cycle.stable else "unstable")
             + ("" if cycle.within_range else ", beyond the range")
-            for cycle in self.cycles
+            + (", simulated" if answer.source == "simulation" else "")
+            for answer in self.answers
+            for cycle in [answer.cycle]
         ]
         if len(lines) > MOST_TOLD:
             lines = [*lines[: MOST_TOLD - 1], f"  and {len(lines) - MOST_TOLD + 1} more limit cycles"]
@@ -141,7 +189,7 @@ class LimitCyclePrediction(Result):
             [
                 f"LimitCyclePrediction: wall of {self.wall_stiffness:.6g} N/m, {self.wall_damping:.6g} N s/m, "
                 f"{self.verdict} if linear; {', '.join(self.nonlinear)}",
-                *(lines or ["  no limit cycle is predicted"]),
+                *(lines or [f"  {self.none_found}"]),
             ]
         )
 

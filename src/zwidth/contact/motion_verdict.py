@@ -8,6 +8,10 @@ sample to sample, which do not depend on where the device comes to rest: with d_
 Each motion rho^j gives ln rho, in the end that of the slowest decay or the fastest growth: the logarithm of the
 spectral radius. The quarters are weighted by a Hann window, so that a started period does not count. The
 verdict holds for this start only: without a hand the wall may hold a small motion and lose a large one.
+
+A steady push moves a device on a wall without stiffness on and on, with the velocity that the damping leaves: the
+position that nobody holds is no vibration. There the changes of d are judged in its place, which that velocity
+has none of.
 """
 
 from __future__ import annotations
@@ -23,7 +27,9 @@ from zwidth.model.argument_checks import require
 
 Floats = NDArray[np.float64]
 
-Behaviour = Literal["converged", "decaying", "growing", "limit cycle", "bouncing", "lost contact", "undecided"]
+Behaviour = Literal[
+    "converged", "decaying", "drifting", "growing", "limit cycle", "bouncing", "lost contact", "undecided"
+]
 
 QUIET: Final = 1e-9  # share of the largest motion of a run that counts as none
 LINEAR_TREND: Final = (
@@ -31,6 +37,7 @@ LINEAR_TREND: Final = (
 )
 TREND: Final = 0.2  # the same where a limit cycle may be: 20 % between quarters
 STEADY: Final = 0.05  # below it, the motion goes round
+DIGITS: Final = 1e-14  # share of a position that its rounding may be, in the changes of its differences
 FEWEST: Final = 16  # samples
 
 
@@ -38,9 +45,10 @@ FEWEST: Final = 16  # samples
 class Judgement:
     """Verdict on a run.
 
-    behaviour     converged: at rest inside; decaying; growing; limit cycle: keeps its size without losing contact;
+    behaviour     converged: at rest inside; decaying; drifting: on and on under a push; growing; limit cycle:
+                  keeps its size without losing contact;
                   bouncing: in and out without an end; lost contact: out, and not back; undecided
-    stable        True for converged and decaying, None for undecided
+    stable        True for converged, decaying and drifting, None for undecided
     growth        of the motion per sample, ln rho; nan where nothing moves
     amplitude     half of peak to peak of the handle in the last quarter [m]
     frequency     dominant in the second half [Hz]; nan where nothing moves
@@ -58,11 +66,14 @@ class Judgement:
         """Whether the motion decays inside the wall."""
         if self.behaviour == "undecided":
             return None
-        return self.behaviour in ("converged", "decaying")
+        return self.behaviour in ("converged", "decaying", "drifting")
 
 
-def judge_response(response: TimeResponse) -> Judgement:
+def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement:
     """Judge a run; one with fewer than 16 samples is undecided, unless it has left its bounds.
+
+    drifts  whether a steady push moves the device where no stiffness holds a position: leaving the bounds is no
+            growth then
 
     A motion below half the encoder's step that the encoder does not see is at rest; so is one that noise alone
     keeps up, below half a step and three standard deviations. One that the encoder sees goes round, however small.
@@ -82,42 +93,52 @@ def judge_response(response: TimeResponse) -> Judgement:
     S = len(response.time)
     touching = response.force != 0.0
     if S < FEWEST:
-        judged: Behaviour = "growing" if response.given_up else "undecided"
+        judged: Behaviour = "growing" if response.given_up and not drifts else "undecided"
         return Judgement(
             judged, float("nan"), _half_peak_to_peak(response.handle), float("nan"), float(touching.mean())
         )
     third, last, half = slice(S // 2, S // 4 * 3), slice(S // 4 * 3, S), slice(S // 2, S)
-    d = np.diff(response.truth)
+    d = np.diff(response.truth, n=2 if drifts else 1)
     size = float(np.abs(d[np.isfinite(d)]).max(initial=0.0))
     before, after = _rms(d[S // 2 : S // 4 * 3]), _rms(d[S // 4 * 3 :])
     floor = max(QUIET * size, 1e-300)
-    moving = after > floor or response.given_up
+    if drifts:  # far away the changes of d are rounding of the position
+        floor = max(floor, DIGITS * float(np.abs(response.truth[np.isfinite(response.truth)]).max(initial=0.0)))
+    moving = after > floor or (response.given_up and not drifts)
     growth = float(np.log(after / before)) if moving and before > 0.0 else float("nan")
     contact = float(touching[half].mean())
-    judged = _behaviour(response, touching, third, last, growth, moving)
+    judged = _behaviour(response, touching, third, last, growth, moving, drifts)
     per_sample = growth / (S // 4) if moving else float("nan")
     tone = dominant_frequency(response.truth[half], response.period) if moving else float("nan")
     return Judgement(judged, per_sample, _half_peak_to_peak(response.handle[last]), tone, contact)
 
 
 def _behaviour(
-    response: TimeResponse, touching: NDArray[np.bool_], third: slice, last: slice, growth: float, moving: bool
+    response: TimeResponse,
+    touching: NDArray[np.bool_],
+    third: slice,
+    last: slice,
+    growth: float,
+    moving: bool,
+    drifts: bool,
 ) -> Behaviour:
-    if response.given_up or not np.all(np.isfinite(response.truth)):
+    if (response.given_up and not drifts) or not np.all(np.isfinite(response.truth)):
         return "growing"
     inside = float(touching[last].mean())
     if response.surface and inside == 0.0 and not touching[third].any():
         return "lost contact" if touching.any() or not response.held else "undecided"
     if inside < 1.0 and response.surface:
         return "bouncing" if growth > -TREND else "undecided"
+    if drifts and not moving:
+        return "drifting"
     if not moving or _at_rest(response, last):
         return "converged"
     trend = LINEAR_TREND if response.linear else TREND
     if growth < -trend:
-        return "decaying"
+        return "drifting" if drifts else "decaying"
     if growth > trend:
         return "growing"
-    return "limit cycle" if abs(growth) < STEADY and not response.linear else "undecided"
+    return "limit cycle" if abs(growth) < STEADY and not response.linear and not drifts else "undecided"
 
 
 def _at_rest(response: TimeResponse, last: slice) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import log
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -13,9 +13,11 @@ from zwidth.contact.environments.wall import wall
 from zwidth.contact.friction_quantisation_plane import device_plane
 from zwidth.contact.harmonic_balance import Floats, LimitCycle, harmonic_balance
 from zwidth.contact.harmonics import with_harmonics
+from zwidth.contact.limit_cycle_answer import answered_cycles
 from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration
-from zwidth.contact.motion_verdict import judge_response
+from zwidth.contact.motion_verdict import Behaviour, Judgement, judge_response
 from zwidth.contact.simulate import LARGEST_MOTION, Run, simulate_batch
+from zwidth.contact.time_response import TimeResponse
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
@@ -28,14 +30,20 @@ STARTS: Final = (0.7, 1.4)  # of the predicted amplitude; the run that ends near
 CYCLES: Final = 500  # that a run has, within these numbers of samples
 FEWEST, MOST = 4_000, 60_000
 COUNTS: Final = 5.0  # from which a device starts where no stable cycle is predicted
+# Depths, times the one at which the spring alone takes all of the force limit, from which a device is let go
+# besides: with fewer, a vibration that only large motions fall into is missed.
+DEEP: Final = (2.0, 10.0)
 SMALL: Final = 1e-3  # m, from which one without encoder steps does
+# Change of a vibration's logarithm between the last quarters of a run, below which it has settled: with more, one
+# that still nears another, slowly, would count as a limit cycle of its own.
+SETTLED: Final = 0.01
 BY_FIRST: Final = (
-    "harmonic balance: each nonlinear part as it acts on a sine. Good to some per cent for vibrations of ten "
-    "samples and more in a cycle; an estimate for what an encoder holds, or locks to the samples"
+    "harmonic balance: each nonlinear part as it acts on a sine; its error is not known where no simulation "
+    "confirms it"
 )
 BY_HARMONICS: Final = (
-    "harmonic balance with up to 16 odd harmonics of the limited force: a few per cent, and less good where a "
-    "cycle has few samples and the force is far beyond its limit"
+    "harmonic balance with up to 16 odd harmonics of the limited force; its error is not known where no "
+    "simulation confirms it"
 )
 
 
@@ -98,15 +106,19 @@ def predict_limit_cycles(
     cycles, by = balance.cycles, BY_FIRST
     if parts == ("the force limit",):
         cycles, by = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
-    simulated: tuple[SimulatedVibration | None, ...] = (None,) * len(cycles)
-    otherwise = None
+    runs: list[list[SimulatedVibration]] = [[] for _ in cycles]
+    otherwise: SimulatedVibration | None = None
+    others: list[SimulatedVibration] = []
     if simulate:
         tell = progress or (lambda stage, done, of: None)
         tell("simulating", 0, 1)
-        simulated = tuple(_simulated(loop, K, B, offset, cycle) if settles(cycle) else None for cycle in cycles)
+        runs = [_simulated(loop, K, B, offset, cycle) if settles(cycle) else [] for cycle in cycles]
         if not any(map(settles, cycles)):
             otherwise = _simulate_small_start(loop, K, B, offset, cycles)
+            others.append(otherwise)
+        others += _simulate_large_starts(loop, K, B, offset, cycles, balance.largest_motion)
         tell("simulating", 1, 1)
+    found = answered_cycles(cycles, runs, others, balance.largest_motion)
     resting, quiet = _limits(loop, K, B)
     return LimitCyclePrediction(
         wall_stiffness=K,
@@ -117,11 +129,12 @@ def predict_limit_cycles(
         left_out=tuple(name for name in point.linear_omissions if name in NOT_PREDICTED),
         predicted_by=by,
         balance=balance,
-        cycles=cycles,
-        simulated=simulated,
+        answers=found.cycles,
+        contradicted=found.contradicted,
         small_start_vibration=otherwise,
         resting_limit=resting,
         quiet_limit=quiet,
+        was_simulated=simulate,
     )
 
 
@@ -174,12 +187,9 @@ def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]
     return resting, max(resting - 2.0 * abs(B) / loop.period, 0.0)
 
 
-def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle) -> SimulatedVibration:
-    """Simulate from both sides of a cycle; the vibration that ends nearer to it."""
-    starts = [share * cycle.amplitude for share in STARTS]
-    runs = _runs(loop, K, B, offset, starts, cycle.frequency_Hz)
-    alive = [run for run in runs if run.amplitude > 0.0 and run.behaviour != "converged"]
-    return min(alive or runs, key=lambda run: abs(log(max(run.amplitude, 1e-300) / cycle.amplitude)))
+def _simulated(loop: Loop, K: float, B: float, offset: float, cycle: LimitCycle) -> list[SimulatedVibration]:
+    """Simulate from both sides of a cycle."""
+    return _runs(loop, K, B, offset, [share * cycle.amplitude for share in STARTS], cycle.frequency_Hz)
 
 
 def _simulate_small_start(
@@ -191,6 +201,21 @@ def _simulate_small_start(
     starts += [0.5 * cycle.amplitude for cycle in cycles]
     frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period
     return _runs(loop, K, B, offset, [min(starts)], frequency)[0]
+
+
+def _simulate_large_starts(
+    loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...], largest: float
+) -> list[SimulatedVibration]:
+    """Simulate from where a force at its limit may keep up a vibration that small ones do not grow into."""
+    limit = loop.nonlinear.force_limit
+    if not (limit < inf and K > 0.0):
+        return []
+    starts = [deep * limit / K for deep in DEEP] + [
+        STARTS[-1] * cycle.amplitude for cycle in cycles if cycle.within_range and not cycle.stable
+    ]
+    frequency = cycles[0].frequency_Hz if cycles else 0.01 / loop.period
+    within = sorted({start for start in starts if start < largest})
+    return _runs(loop, K, B, offset, within, frequency) if within else []
 
 
 def _runs(
@@ -214,13 +239,21 @@ def _runs(
     simulations = []
     for start, response in zip(starts, simulate_batch(runs, wall, duration=seconds), strict=True):
         judged = judge_response(response)
-        last = slice(-(len(response.truth) // 4), None)
-        # between two counts a relay keeps up motions far below a step
-        hunts = judged.behaviour == "converged" and np.ptp(response.reading[last]) > 0.0
-        behaviour = "limit cycle" if hunts else judged.behaviour
-        amplitude = float(np.ptp(response.truth[last]) / 2.0)
+        quarter = len(response.truth) // 4
+        amplitude = float(np.ptp(response.truth[-quarter:]) / 2.0)
+        behaviour = behaviour_at_the_end(response, judged, quarter)
         simulations.append(SimulatedVibration(start, seconds, behaviour, amplitude, judged.frequency))
     return simulations
+
+
+def behaviour_at_the_end(response: TimeResponse, judged: Judgement, quarter: int) -> Behaviour:
+    """How a run ends, where that is to be held against a prediction; quarter is in samples."""
+    if judged.behaviour == "converged" and np.ptp(response.reading[-quarter:]) > 0.0:
+        # between two counts a relay keeps up motions far below a step; noise alone does, too
+        return "undecided" if response.noise > 0.0 else "limit cycle"
+    if judged.behaviour == "limit cycle" and abs(judged.growth) * quarter > SETTLED:
+        return "undecided"
+    return judged.behaviour
 
 
 def _middle(loop: Loop, offset: float) -> tuple[Floats, float]:

@@ -42,10 +42,12 @@ class PredictedGrowth(NamedTuple):
 
     per_sample  ln rho; None where it is not known
     frequency   of that motion [Hz]; 0 where it has none, or none is known
+    decays      whether it dies away beyond doubt; None where it is not known
     """
 
     per_sample: float | None
     frequency: float
+    decays: bool | None = None
 
 
 def predicted_growth(loop: Loop, environment: Environment, values: Floats) -> PredictedGrowth:
@@ -61,7 +63,11 @@ def predicted_growth(loop: Loop, environment: Environment, values: Floats) -> Pr
         return PredictedGrowth(None, 0.0)
     radius, frequency = float(judged.spectral_radius[0]), float(judged.frequency[0])
     known = isfinite(radius) and radius > 0.0
-    return PredictedGrowth(log(radius) if known else None, frequency if isfinite(frequency) else 0.0)
+    return PredictedGrowth(
+        log(radius) if known else None,
+        frequency if isfinite(frequency) else 0.0,
+        judged.names[0] == "stable" if known else None,
+    )
 
 
 def contact_run_length(

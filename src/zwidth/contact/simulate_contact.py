@@ -15,7 +15,7 @@ from zwidth.contact.contact_arguments import (
     active_hand,
     environment_with_values,
 )
-from zwidth.contact.contact_simulation import ContactSimulation, RangeExit
+from zwidth.contact.contact_simulation import ContactSimulation, RangeExit, is_pushed_on
 from zwidth.contact.environments import ENVIRONMENTS
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import Reach, Reflex, Tremor
@@ -174,6 +174,11 @@ def simulate_contact(
         length = contact_run_length(loop, hand, growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
         length, responses = _long_enough(simulate, length, loop.period, seconds_to_hear)
     _check_forces(responses, touched)
+    drifts = is_pushed_on(point.loop, touched, values, hand)
+    judgement = judge_response(responses[0], drifts=drifts)
+    if judgement.behaviour == "converged" and growth.decays is False and not _is_disturbed(responses[0]):
+        # a device that nothing disturbs stays at rest on an unstable wall, too
+        judgement = replace(judgement, behaviour="undecided")
     return ContactSimulation(
         point=point,
         environment=touched,
@@ -187,10 +192,15 @@ def simulate_contact(
         substeps=substeps,
         seed=seed,
         response=responses[0],
-        judgement=judge_response(responses[0]),
+        judgement=judgement,
         range_exit=range_exit(point, responses[0]),
         uncontrolled=responses[1] if controlled else None,
     )
+
+
+def _is_disturbed(response: TimeResponse) -> bool:
+    """Whether a run has a motion, or a force that friction holds against."""
+    return bool(np.ptp(response.truth) > 0.0 or np.any(response.force))
 
 
 def _long_enough(

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from zwidth.measures.handle_impedance import Complex, Floats
+from zwidth.measures.handle_impedance import Complex, Floats, LimitKind
 from zwidth.result import Result
+
+LIMIT_HEADINGS: Final[dict[LimitKind, str]] = {
+    "bound": "no wall is felt above",
+    "limit": "a wall without end is felt with",
+    "infinite": "a wall without end is felt with",
+    "unknown": "a wall without end is felt with",
+}
+LIMIT_WORDS: Final[dict[LimitKind, str]] = {
+    "infinite": "no limit: nothing gives way between sensor and handle",
+    "unknown": "a stiffness that the measurement does not show",
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -23,7 +34,9 @@ class FeltWall(Result):
                                          ground
     stiffness_max                        of the stiffest stable wall [N/m]; None: none has K > 0 and B >= 0
     static_stiffness_at_stiffness_max    felt stiffness of that wall [N/m]; None as before
-    static_stiffness_limit               felt stiffness that no wall exceeds [N/m]; inf for a rigid device
+    static_stiffness_limit               felt stiffness of a wall without end [N/m]; inf where nothing gives way
+    static_stiffness_limit_kind          "bound": no wall is felt stiffer; "limit": walls of finite stiffness
+                                         may be; "infinite"; "unknown": errors of a measurement hide it
     frequency                            (k,)  [Hz]
     felt_impedance                       (k,)  at the handle [N s/m]; None where the wall is not stable
     commanded_impedance                  (k,)  that of an ideal wall, B + K/(jw) [N s/m]
@@ -39,6 +52,7 @@ class FeltWall(Result):
     stiffness_max: float | None
     static_stiffness_at_stiffness_max: float | None
     static_stiffness_limit: float
+    static_stiffness_limit_kind: LimitKind
     frequency: Floats
     felt_impedance: Complex | None
     commanded_impedance: Complex
@@ -67,6 +81,7 @@ class FeltWall(Result):
             "stiffness_max_N_per_m": self.stiffness_max,
             "static_stiffness_at_stiffness_max_N_per_m": self.static_stiffness_at_stiffness_max,
             "static_stiffness_limit_N_per_m": self.static_stiffness_limit,
+            "static_stiffness_limit_kind": self.static_stiffness_limit_kind,
             **self.table(),
             **unknown,
         }
@@ -86,12 +101,12 @@ class FeltWall(Result):
         }
 
     def __repr__(self) -> str:
-        stiffest, limit = "no stable wall has K > 0 and B >= 0", self.static_stiffness_limit
+        stiffest = "no stable wall has K > 0 and B >= 0"
         if self.stiffness_max is not None:
             felt = f"felt with {self.static_stiffness_at_stiffness_max:.4g} N/m"
             stiffest = f"stiffest stable wall {self.stiffness_max:.4g} N/m, {felt}"
-        if limit < np.inf:
-            stiffest += f"; no wall is felt above {limit:.4g} N/m"
+        limit, kind = self.static_stiffness_limit, self.static_stiffness_limit_kind
+        stiffest += f"; {LIMIT_HEADINGS[kind]} {LIMIT_WORDS.get(kind, f'{limit:.4g} N/m')}"
         low, high = self.frequency[0], self.frequency[-1]
         return "\n".join(
             [

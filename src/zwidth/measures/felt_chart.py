@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.chart_base import BoundaryArc
-from zwidth.measures.handle_impedance import static_stiffness, static_stiffness_limit
+from zwidth.measures.felt import LIMIT_HEADINGS
+from zwidth.measures.handle_impedance import (
+    LimitKind,
+    static_stiffness,
+    static_stiffness_limit,
+    static_stiffness_limit_kind,
+)
 from zwidth.model.argument_checks import require
 from zwidth.model.plant import Plant
 from zwidth.result import Result
@@ -30,13 +36,15 @@ class FeltChart(Result):
     regions        closed rings (k, 2) of [felt stiffness, wall damping], counter-clockwise
     boundary       the arcs of the stable set's edge with K >= 0; `stiffness` is the felt one
     stiffness_max  felt stiffness of the stiffest stable wall with B >= 0 [N/m]; nan if there is none
-    limit          felt stiffness that no wall exceeds [N/m]; inf for a rigid device
+    limit          felt stiffness of a wall without end [N/m]; inf where nothing gives way
+    limit_kind     "bound": no wall is felt stiffer; "limit": walls of finite stiffness may be; "infinite"
     """
 
     regions: tuple[Floats, ...]
     boundary: tuple[BoundaryArc, ...]
     stiffness_max: float
     limit: float
+    limit_kind: LimitKind
 
     def document(self) -> dict[str, Any]:
         """The chart by key and unit."""
@@ -52,6 +60,7 @@ class FeltChart(Result):
             ],
             "felt_stiffness_max_N_per_m": self.stiffness_max,
             "felt_stiffness_limit_N_per_m": self.limit,
+            "felt_stiffness_limit_kind": self.limit_kind,
         }
 
     def table(self) -> dict[str, Floats]:
@@ -70,7 +79,7 @@ class FeltChart(Result):
             if isfinite(self.stiffness_max)
             else "no stable wall"
         )
-        limit = f", no wall is felt above {self.limit:.6g} N/m" if isfinite(self.limit) else ""
+        limit = f", {LIMIT_HEADINGS[self.limit_kind]} {self.limit:.6g} N/m" if isfinite(self.limit) else ""
         return f"FeltChart: {hardest}{limit}"
 
 
@@ -112,6 +121,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
         if chart.stiffness_max > 0.0
         else float("nan"),
         limit=static_stiffness_limit(plant),
+        limit_kind=static_stiffness_limit_kind(plant, computer),
     )
     return felt if chart.operating_point is None else felt.about(chart.operating_point)
 

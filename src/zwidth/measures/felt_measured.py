@@ -69,6 +69,8 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
 
     rigid = port.origin["hh"] == port.origin["sh"]
     spring = not (port.model.free or np.any(own == 0.0))
+    unyielding = UNYIELDING * float(np.max(np.abs(1.0 / paths["P"])))
+    limit = np.inf if rigid else felt_at_rest(unyielding)
     free = 1.0 / (jw * paths["hh"])
     return FeltWall(
         wall_stiffness=stiffness,
@@ -78,9 +80,8 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
         free_motion_mass=np.nan if spring else at_rest(0.0 * force)[1],
         stiffness_max=peak if np.isfinite(peak) else None,
         static_stiffness_at_stiffness_max=felt_at_rest(peak) if np.isfinite(peak) else None,
-        static_stiffness_limit=np.inf
-        if rigid
-        else felt_at_rest(UNYIELDING * float(np.max(np.abs(1.0 / paths["P"])))),
+        static_stiffness_limit=limit,
+        static_stiffness_limit_kind="infinite" if rigid else "unknown" if np.isnan(limit) else "limit",
         frequency=frequency,
         felt_impedance=1.0 / (jw * _handle_motion(paths, force * (stiffness + damping * speed)))
         if stable

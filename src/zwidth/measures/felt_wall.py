@@ -20,6 +20,7 @@ from zwidth.measures.handle_impedance import (
     refuse_local_loop,
     static_stiffness,
     static_stiffness_limit,
+    static_stiffness_limit_kind,
 )
 from zwidth.model.argument_checks import check_number, require
 
@@ -73,6 +74,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
         if peak
         else None,
         static_stiffness_limit=static_stiffness_limit(plant),
+        static_stiffness_limit_kind=static_stiffness_limit_kind(plant, computer),
         frequency=frequency,
         felt_impedance=felt_impedance(loop, K, B, frequency) if stable else None,
         commanded_impedance=commanded_impedance(K, B, frequency),

@@ -31,7 +31,7 @@ plant with mass hardly follows at these frequencies.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,14 +43,16 @@ from zwidth.loop.feedback_response import feedforward_response, sensor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
 from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
+from zwidth.measures.rest_compliance import rest_compliance
 from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+LimitKind = Literal["bound", "limit", "infinite", "unknown"]
 
-# Relative size below which a singular value, or a component along a free motion, is rounding of 0.
+# Relative size, squared, below which a component along a free motion is rounding of 0.
 FREE = 1e-12
 
 
@@ -182,10 +184,11 @@ def static_stiffness(plant: Plant, wall_stiffness: ArrayLike, controller: Contro
     """
     require("plant", plant, Plant)
     K = np.asarray(wall_stiffness, dtype=float)
-    plant_stiffness, act, read, h = _dynamic_stiffness(plant, np.zeros(()))
     gain, error, spring = _static_gains(controller)
-    commanded = K * (1.0 + gain * error) + spring
-    return _stiffness(plant_stiffness + commanded[..., None, None] * np.outer(act, read), h, h + gain * act)
+    compliance = rest_compliance(plant, handle_of(plant), gain).at(K * (1.0 + gain * error) + spring)
+    with np.errstate(divide="ignore"):
+        # nothing moves: + inf, whichever sign its zero has; nothing is held: 0 without a sign
+        return np.where(compliance == 0.0, np.inf, 1.0 / compliance + 0.0)
 
 
 def _static_gains(controller: Controller | None) -> tuple[float, bool, float]:
@@ -199,15 +202,30 @@ def _static_gains(controller: Controller | None) -> tuple[float, bool, float]:
 def static_stiffness_limit(plant: Plant) -> float:
     """Felt stiffness of an infinitely stiff wall: the limit of `static_stiffness` for K to infinity [N/m].
 
-    The wall then holds the sensor fixed, and the structure between it and the hand deflects: k of the
-    two-mass plant, inf for a rigid one. The limit of a hard contact by flexibility (after Tavakoli and Howe 2009,
-    known at second hand).
+    The wall then holds the sensor still, and the structure between it and the hand deflects: k of the
+    two-mass plant. The limit of a hard contact by flexibility (after Tavakoli and Howe 2009, known at second
+    hand).
+    With wall force, sensor and handle at different places walls of finite stiffness may be felt stiffer, and the
+    limit may be negative; `static_stiffness_limit_kind` says which.
+
+    Returns  inf where nothing gives way, as with rigid drives; 0 where a motion of the handle is not held
+    Raises   HandleError  where the plant has no handle
     """
-    own, act, read, h = _dynamic_stiffness(plant, np.zeros(()))
-    size = max(float(np.abs(own).max()), np.finfo(float).tiny)
-    constrained = np.block([[own / size, act[:, None]], [read[None, :], np.zeros((1, 1))]])
-    held = np.append(h, 0.0)
-    return float(_stiffness(constrained, held, held)) * size
+    require("plant", plant, Plant)
+    return rest_compliance(plant, handle_of(plant)).stiffness_limit
+
+
+def static_stiffness_limit_kind(plant: Plant, controller: Controller | None = None) -> LimitKind:
+    """What `static_stiffness_limit` is; with a force sensor of the controller, whose help makes walls felt softer.
+
+    "bound"     no wall with K > 0 is felt stiffer
+    "limit"     the limit for K to infinity alone: walls of finite stiffness may be felt stiffer
+    "infinite"  nothing gives way: there is no limit
+    """
+    compliance = rest_compliance(plant, handle_of(plant), _static_gains(controller)[0])
+    if compliance.stiffness_limit == np.inf:
+        return "infinite"
+    return "bound" if compliance.limit_is_bound else "limit"
 
 
 def free_motion_mass(plant: Plant, controller: Controller | None = None) -> float:
@@ -277,19 +295,3 @@ def _sampled(loop: Loop, log_z: Complex) -> tuple[Complex, Complex]:
     """P and w at z = exp(log_z)."""
     z, d = np.exp(log_z), np.expm1(log_z)
     return loop.plant_response(z, d), loop.velocity_response(z, d)
-
-
-def _stiffness(A: Floats, h: Floats, push: Floats) -> Floats:
-    """1/(h^T A^-1 push) for A (..., n, n), also where A is singular along motions that do not concern h."""
-    left, size, right = np.linalg.svd(A)
-    small = size <= FREE * np.maximum(size[..., :1], np.finfo(float).tiny)
-    into = np.einsum("...ij,i->...j", left, push)  # its components along the left singular vectors
-    out = np.einsum("...ji,i->...j", right, h)
-    scale = max(float(np.linalg.norm(h)), float(np.linalg.norm(push)))
-    is_free = np.any(small & ((np.abs(into) > 1e-6 * scale) | (np.abs(out) > 1e-6 * scale)), axis=-1)
-    compliance = np.sum(np.where(small, 0.0, into * out / np.where(small, 1.0, size)), axis=-1)
-    # a compliance that is only rounding is 0: the handle is held still
-    whole = np.sum(np.where(small, 0.0, np.abs(into * out) / np.where(small, 1.0, size)), axis=-1)
-    compliance = np.where(np.abs(compliance) <= 1e-14 * whole, 0.0, compliance)
-    with np.errstate(divide="ignore"):
-        return np.where(is_free, 0.0, 1.0 / compliance)

@@ -52,6 +52,6 @@ def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, s
             break
     where = "(" + ", ".join(f"{x:.4g}" for x in nearest) + ") m"
     raise SurfaceOutOfReach(
-        f"the handle never touches the surface in assembly {posture.assembly!r}: the nearest it comes is about "
-        f"{least:.3g} m, at {where}; move the surface into the workspace"
+        f"the handle never touches the surface in assembly {posture.assembly!r}: of the postures tried the "
+        f"closest is about {least:.3g} m away, at {where}; move the surface into the workspace"
     )
