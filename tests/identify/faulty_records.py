@@ -180,7 +180,7 @@ RECORDS: tuple[FaultyRecord, ...] = (
         "arm",
         lambda: (arm()[1], changed(arm()[1], **{"torque_Nm.link-1": _times(-1.0)})),
         "signs",
-        "has the other sign",
+        "runs against what the other records predict",
     ),
     FaultyRecord(
         "a sign flips in the middle of a run",

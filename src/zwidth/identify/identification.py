@@ -39,6 +39,8 @@ class Estimate:
     low, high  ends of the interval; -inf or inf where the data set no bound
     unit   in words as users read it; "" for a share
     path   of the number in the device file, as `--set` takes it; "" where the file has no such key
+    told   "yes"; "only a sum", of numbers that the data do not tell apart; or "no", with a value of nan
+    reason  why not, where it is not "yes"
     within  key of the file's matrix whose entries the number makes, as a spring's stiffness does; with a path: it
             is one of these entries; "" where it belongs to none
     """
@@ -50,16 +52,20 @@ class Estimate:
     unit: str
     path: str = ""
     within: str = ""
+    told: str = "yes"
+    reason: str = ""
 
     def document(self) -> dict[str, Any]:
         """The number as --json has it; an end without bound is null."""
         return {
             "name": self.name,
             "path": self.path or None,
-            "value": self.value,
+            "value": self.value if isfinite(self.value) else None,
             "low": self.low if isfinite(self.low) else None,
             "high": self.high if isfinite(self.high) else None,
             "unit": self.unit,
+            "told": self.told,
+            "reason": self.reason or None,
         }
 
 
@@ -116,8 +122,28 @@ class Identification(Result):
 
     @property
     def settings(self) -> dict[str, float]:
-        """Path -> value of all numbers that a device file holds, as `Device.with_` takes them."""
-        return {one.path: one.value for one in self.estimates if one.path}
+        """Path -> value of all numbers that a device file holds, as `Device.with_` takes them.
+
+        Raises IdentificationError  where no device file may get them, see `not_written`
+        """
+        if self.not_written:
+            raise IdentificationError(self.not_written)
+        return {one.path: one.value for one in self.estimates if one.path and one.told != "no"}
+
+    @property
+    def not_written(self) -> str:
+        """Why no device file gets these numbers; "" where one may."""
+        return ""
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the intervals do not hold, sentences."""
+        return ()
+
+    @property
+    def premises(self) -> tuple[Mapping[str, Any], ...]:
+        """What the answer rests on: `what`, `holds` (True, False, None) and `how` it was seen."""
+        return ()
 
     def document(self) -> dict[str, Any]:
         """Keys and values of --json."""
@@ -128,6 +154,8 @@ class Identification(Result):
             "validation": self.validation,
             "validated_on": self.validated_on,
             "remarks": list(self.remarks),
+            "left_out": list(self.left_out),
+            "premises": [dict(one) for one in self.premises],
             **self.details,
         }
 
@@ -140,7 +168,11 @@ class Identification(Result):
         if self.reason:
             return "\n".join([*lines, f"  nothing fitted: {self.reason}"])
         for one in self.listed:
+            if one.told == "no":
+                lines.append(f"  {one.path or one.name} is not told: {one.reason}")
+                continue
             lines.append(f"  {one.path or one.name} = {value_text(one)}, {interval(one)} {one.unit}".rstrip())
+        lines += [f"  {text}" for text in self.left_out]
         return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
 
 
@@ -160,7 +192,9 @@ def interval(estimate: Estimate) -> str:
 
 
 def value_text(estimate: Estimate) -> str:
-    """The value with the digits of its interval."""
+    """The value with the digits of its interval; in words where it is not told."""
+    if estimate.told == "no":
+        return "not told"
     return f"{estimate.value:.{_digits(estimate)}g}"
 
 

@@ -136,19 +136,26 @@ def velocity_check(
         velocity = convolved(survey.rows[channels.velocity[k]], taps)
         alike = [_correlation(velocity, rates[:, j]) for j in range(len(drives))]
         best = int(np.argmax(np.abs(alike)))
-        slope = float(velocity @ rates[:, k]) / max(float(rates[:, k] @ rates[:, k]), 1e-300)
+        power = max(float(rates[:, k] @ rates[:, k]), 1e-300)
+        slope = float(velocity @ rates[:, k]) / power
+        # noise of the derivative draws this slope towards 0, noise of the velocity the other one from it
+        other = float(velocity @ velocity) / power / slope if slope else 0.0
         column = channels.velocity[k]
         if best != k and abs(alike[best]) > ALIKE and abs(alike[k]) < ALIKE:
-            faults.append(f"{column} follows the derivative of {channels.coordinate[best]}: columns are swapped")
+            faults.append(
+                f"{column} goes with the derivative of {channels.coordinate[best]} (correlation "
+                f"{alike[best]:.2f}), and less with that of {channels.coordinate[k]} ({alike[k]:.2f}): are "
+                "columns swapped?"
+            )
         elif not abs(alike[k]) > ALIKE:
             faults.append(
                 f"{column} does not follow the derivative of {channels.coordinate[k]} (correlation {alike[k]:.2f})"
             )
-        elif not abs(slope - 1.0) < SLOPE:
-            known = next(
-                (text for ratio, text in RATIOS.items() if abs(slope / ratio - 1.0) < SLOPE), "in another unit"
-            )
-            faults.append(f"{column} is {slope:.4g} times the derivative of {channels.coordinate[k]}: {known}")
+        elif min(slope, other) > 1.0 + SLOPE or max(slope, other) < 1.0 - SLOPE:
+            both = np.array([slope, other])
+            known = [text for ratio, text in RATIOS.items() if np.all(np.abs(both / ratio - 1.0) < SLOPE)]
+            cause = f"is it {known[0]}?" if known else "is it in another unit, or do rows repeat?"
+            faults.append(f"{column} is {slope:.4g} times the derivative of {channels.coordinate[k]}: {cause}")
     if faults:
         return Check("velocity", False, f"{'; '.join(faults)}; correct the columns, or leave the velocities out")
     return Check("velocity", True, "recorded velocities are the derivatives of the positions, which are used")
@@ -200,7 +207,7 @@ def other_readings(
 def sign_check(
     names: Sequence[str], labels: Sequence[str], predicted: Sequence[Floats], measured: Sequence[Floats]
 ) -> Check | None:
-    """That no torque has another sign in one record than in the others; None where it has not.
+    """That no torque runs against the others in one record; None where it does not.
 
     predicted, measured  (n, d) of each record
     """
@@ -212,5 +219,8 @@ def sign_check(
     if not faults:
         return None
     return Check(
-        "signs", False, f"{comma_list(faults)} has the other sign than what all records tell; turn it round"
+        "signs",
+        False,
+        f"{comma_list(faults)} runs against what the other records predict: was a sign turned in between, or are "
+        "they not of one device, load and gravity? The records do not tell",
     )

@@ -19,6 +19,11 @@ from zwidth.identify.identification import Check
 Floats = NDArray[np.float64]
 
 FEWEST: Final = 25  # torques of all joints that are compared for each base parameter: fewer make narrow intervals
+CAUSES: Final = (
+    "noise of the positions (counts, jitter of the time, rows that repeat, vibration), a motion too slow for "
+    "inertia to show, gravity that is not stated, or a column with another sign or order may do this, and the "
+    "record does not tell which"
+)
 UNSEEN: Final = 10  # samples to validate, at least
 WORSE: Final = 3.0  # deviations per base parameter by which a consistent set may miss
 POOR: Final = 0.5  # share explained, below which a reader is warned
@@ -71,8 +76,8 @@ def positive_check(
     wrong = [name for name, own in zip(drives, np.diag(M), strict=True) if own < 0.0]
     if not wrong:
         return None
-    reason = f"the inertia seen by {comma_list(wrong)} is negative"
-    return Check("signs", False, f"{reason}: turn the sign of its torque or of its angle round")
+    reason = f"the inertia seen by {comma_list(wrong)} comes out negative, which none is"
+    return Check("inertia", False, f"{reason}: {CAUSES}")
 
 
 def timing_check(fit: Regression, period: float, torque: str) -> Check:
@@ -164,11 +169,23 @@ def consistency_check(links: ConsistentLinks) -> Check:
     return Check("physical consistency", False, reason, warning=True)
 
 
-def validation_check(drives: Sequence[str], shares: Sequence[float]) -> Check:
-    """That torques which were not fitted are predicted; refused where no prediction at all would be better."""
+def validation_check(drives: Sequence[str], shares: Sequence[float], edge: float) -> Check:
+    """That torques which were not fitted are predicted; refused where no prediction at all would be better.
+
+    What is compared has passed a low pass, and the accelerations are the recorded ones: a high share is no proof
+    of the numbers, and no reason to call them right.
+
+    edge  of the band in which they are compared [Hz]
+    """
     listed = comma_list([f"{name} {100.0 * share:.4g} %" for name, share in zip(drives, shares, strict=True)])
     if min(shares) > POOR:
-        return Check("validation", True, f"of the unseen torque are explained: {listed}")
+        return Check(
+            "validation",
+            False,
+            f"of the unseen torque up to {edge:.3g} Hz are explained: {listed}; by the accelerations of the "
+            "record, noise included: that does not show that the inertias are right",
+            warning=True,
+        )
     reason = f"of the unseen torque are explained only: {listed}"
     if min(shares) < WRONG:
         advice = "has a sign flipped in between, or do the torques only shake what the counts cannot show?"

@@ -67,6 +67,14 @@ FITTED: Final = 0.7  # share of a single record that is fitted; the rest is for 
 SEEN: Final = 400_000  # rows of a record that are looked at first
 FLEXIBLE: Final = 0.2  # share of the lowest flexible mode up to which the model of rigid links is used
 PAIRS: Final = 2  # of noise of either sign, by which the bias is seen
+POSITION_NOISE: Final = (
+    "noise in the positions is not in the intervals: counts, jitter of the time, rows that repeat and vibration "
+    "draw inertias and first moments of mass towards 0, by more than the intervals say"
+)
+NOT_WRITTEN: Final = (
+    "noise in the positions is not in the intervals of 'identify arm', so that its numbers are not put into a "
+    "device file; compare them with other records, and set by --set or by hand what you trust"
+)
 LAGS: Final = 16  # of the errors' autocovariances
 
 
@@ -75,15 +83,29 @@ class ArmIdentification(Identification):
     """Numbers of a mechanism from the torques of its joints.
 
     numbers   path -> number or list of numbers: of the links, that reproduce the base parameters and that bodies
-              can have, as the device file takes them
+              can have, as the device file takes them; their intervals leave noise in the positions out
     """
 
     numbers: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def settings(self) -> dict[str, Any]:
-        """Path -> value of all numbers that a device file holds, as `Device.with_` takes them."""
-        return {**super().settings, **self.numbers}
+    def not_written(self) -> str:
+        """Why no device file gets these numbers."""
+        return NOT_WRITTEN
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the intervals do not hold."""
+        return (POSITION_NOISE,) if self.estimates else ()
+
+    @property
+    def premises(self) -> tuple[Mapping[str, Any], ...]:
+        """What the intervals rest on."""
+        if not self.estimates:
+            return ()
+        return (
+            {"what": "noise in the positions is small in the analysed band", "holds": None, "how": "not checked"},
+        )
 
     def document(self) -> dict[str, Any]:
         """Keys and values of --json."""
@@ -371,8 +393,12 @@ class _Work:
             self.drives, [o.columns[..., :-1] for o in seen], [o.torques for o in seen]
         )
         if text:
-            reason = f"{100.0 * now:.3g} % of the torque is left unexplained, {100.0 * then:.3g} % if {text}"
-            checks.append(Check("signs", False, f"{reason}; check the columns"))
+            reason = (
+                f"{100.0 * now:.3g} % of the torque is left unexplained, {100.0 * then:.3g} % would be if {text}; "
+                "noise of the positions, gravity that is not stated or another friction can look so too, and the "
+                "record does not tell which: check the columns"
+            )
+            checks.append(Check("signs", False, reason))
         checks += [
             excitation_check(fit, base, beta),
             positive_check(self.drives, base, beta, self._start(), self._known_rotors()),
@@ -408,7 +434,7 @@ class _Work:
         numbers, noted = link_settings(self.device, self.mechanism, base.parameters, links.values)
         best = np.append(beta, fit.delay)
         shares, total = _explained(validation, best)
-        checks = [*checks, consistency_check(links), validation_check(self.drives, shares)]
+        checks = [*checks, consistency_check(links), validation_check(self.drives, shares, band.edge)]
         estimates = [
             *mass_estimates(self.point, masses, base, fit),
             *friction_estimates(self.device, self.mechanism, base, fit, beta),
@@ -433,7 +459,8 @@ class _Work:
             checks=tuple(checks),
             estimates=tuple(estimates),
             validation=total,
-            validated_on=f"torque of {what} by its motion, mean of the joints",
+            validated_on=f"torque of {what} up to {band.edge:.3g} Hz by its recorded accelerations, whose "
+            "noise is in both; mean of the joints",
             remarks=remarks,
             curves=self._curves(validation, best),
             details={

@@ -10,6 +10,7 @@ import numpy as np
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
 from zwidth.identify.joint.fit import Windows
+from zwidth.identify.joint.force_balance import ForceBalance
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.joint.record import Motion
 
@@ -120,6 +121,26 @@ def check_force(motion: Motion, joint: Joint) -> Check:
             "only up to a factor: record one that changes in size and sign",
         )
     return Check("force", True, f"{motion.force_name} from {low:.4g} to {high:.4g} {unit}")
+
+
+def check_dependence(balance: ForceBalance, motion: Motion) -> list[Check]:
+    """That the force depends on the motion beyond its own noise; [] where it does."""
+    if balance.depends is None:
+        reason = (
+            f"too little of the motion is sliding to see whether {motion.force_name} goes with it, or is constant "
+            "but for its noise, when friction and mass are told only up to a factor; record longer, or push harder"
+        )
+        return [Check("force", False, reason)]
+    if balance.depends:
+        return []
+    return [
+        Check(
+            "force",
+            False,
+            f"{motion.force_name} varies by no more than its own noise, in no way that goes with the motion: "
+            "under a constant force friction and mass are told only up to a factor; step it, or reverse it",
+        )
+    ]
 
 
 def check_amount(windows: Windows) -> Check:

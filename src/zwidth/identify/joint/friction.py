@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Any, Final
 
 import numpy as np
@@ -117,7 +117,7 @@ def _estimate(
     fitted: FittedJoint, name: str, quantity: str, weights: Any, *, key: str = "", least: float = -np.inf
 ) -> Estimate:
     """A sum over the numbers as an estimate, in the file's key where it has one; no less than `least`."""
-    value, low, high = fitted.fit.interval(np.asarray(weights, dtype=float))
+    value, low, high = fitted.interval(np.asarray(weights, dtype=float))
     path, factor = fitted.joint.paths.get(key, ("", 1.0))
     unit = fitted.joint.unit(quantity)
     if fitted.unit_mass:
@@ -168,10 +168,22 @@ def mass_estimates(fitted: FittedJoint) -> list[Estimate]:
     if not fitted.motion.driven:
         return []
     delay = fitted.fit.interval(ONE[DELAY])
+    mass = _estimate(fitted, fitted.joint.mass_name, "mass", ONE[MASS], key="mass", least=0.0)
+    if not fitted.tells_mass:
+        mass = replace(mass, value=nan, low=-inf, high=inf, told="no", reason=untold_mass(fitted))
     return [
-        _estimate(fitted, fitted.joint.mass_name, "mass", ONE[MASS], key="mass", least=0.0),
+        mass,
         Estimate("delay of the force", *delay, "s"),
     ]
+
+
+def untold_mass(fitted: FittedJoint) -> str:
+    """Why the mass is not told, and what to record instead."""
+    return (
+        f"{fitted.motion.force_name} does not grow with the acceleration beyond its own noise, so that no "
+        f"{fitted.joint.mass_name.removeprefix('effective ')} is told: record faster changes of a larger force, "
+        "such as steps in both directions"
+    )
 
 
 def usual_speed(fitted: FittedJoint, side: float) -> float:
@@ -190,6 +202,8 @@ def usual_speed(fitted: FittedJoint, side: float) -> float:
 def friction_points(fitted: FittedJoint) -> tuple[Floats, Floats]:
     """Mean velocity (s,) and friction (s,) in segments in which the joint slides one way throughout."""
     windows, v = fitted.fit.windows, fitted.fit.numbers.values
+    if fitted.motion.driven and not fitted.tells_mass:  # what accelerates the mass cannot be taken from the force
+        return np.zeros(0), np.zeros(0)
     size = int(max(np.median(windows.length) // 8, SHORTEST))
     delay = max(round(float(v[DELAY]) / float(np.mean(windows.period))), 0)
     A, force = weighted_balance(windows, size, fitted.motion.resolution, [delay], 1.0)
@@ -229,8 +243,10 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
 
     needed  the mass is what was asked for: without it the data are refused
     """
+    if not fitted.tells_mass:
+        return Check("acceleration", False, untold_mass(fitted), warning=not needed)
     name, unit = fitted.joint.mass_name, fitted.joint.unit("mass")
-    value, low, high = fitted.fit.interval(ONE[MASS])
+    value, low, high = fitted.interval(ONE[MASS])
     if isfinite(high) and high - value < UNKNOWN_MASS * value:
         return Check("acceleration", True, f"{name} is told to {100.0 * (high - value) / value:.2g} %")
     upper = f"only below {high:.3g} {unit}" if isfinite(high) else "not at all"
@@ -245,8 +261,8 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
 
 
 def mass_in_file(fitted: FittedJoint) -> list[Check]:
-    """Whether the mass is of the size that the file gives; [] in free motion, which tells none."""
-    if not fitted.motion.driven:
+    """Whether the mass is of the size that the file gives; [] where none is told."""
+    if not fitted.tells_mass:
         return []
     joint, value = fitted.joint, float(fitted.fit.numbers.values[MASS])
     return check_mass_in_file(joint.mass_name, value, joint.mass, joint.unit("mass"), turns=joint.angular)
@@ -312,7 +328,7 @@ def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
         remarks.append(
             f"the bias is that at {joint.position} = {motion.reference:.6g}, and the spring acts from there"
         )
-    if motion.driven and joint.mass > 0.0:
+    if fitted.tells_mass and joint.mass > 0.0:
         ratio = float(fitted.fit.numbers.values[MASS]) / joint.mass
         low, high = MASS_IN_FILE
         agrees = "agrees with" if low < ratio < high else "is far from"

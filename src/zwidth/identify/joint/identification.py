@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from zwidth.device.device import Device
 from zwidth.device.faults import fail
 from zwidth.identify.identification import Check
-from zwidth.identify.joint.checks import checks_of, directions
+from zwidth.identify.joint.checks import check_dependence, checks_of, directions
 from zwidth.identify.joint.fit import (
     COUNT,
     DELAY,
@@ -28,6 +28,7 @@ from zwidth.identify.joint.fit import (
     fit_joint,
     predict,
 )
+from zwidth.identify.joint.force_balance import ForceBalance, force_balance
 from zwidth.identify.joint.joint import Joint, joint_of
 from zwidth.identify.joint.record import Motion, read_motion, windows_of
 from zwidth.identify.joint.reversed_sense import reason_of_misfit
@@ -59,6 +60,7 @@ class FittedJoint:
     explained      share of the unseen windows' motion that is predicted
     outlying       times of the windows that were left out, as their motion follows no such model [s]
     unit_mass      the mass is not known, and all numbers are those over it
+    balance        of the recorded force with the motion that was fitted; None of free motion
     """
 
     joint: Joint
@@ -73,6 +75,30 @@ class FittedJoint:
     explained: float
     outlying: tuple[float, ...]
     unit_mass: bool
+    balance: ForceBalance | None
+
+    @property
+    def tells_mass(self) -> bool:
+        """Whether the recorded force goes with the acceleration, without which no mass is told."""
+        return self.balance is not None and self.balance.tells_mass
+
+    def interval(self, weights: Floats) -> tuple[float, float, float]:
+        """Value and ends of the interval of a sum over the numbers, weights (10,).
+
+        Noise of the force makes output error's numbers too large, and in its intervals it is not: where more is
+        left than the readings' noise, or the mass is not told, they are widened to hold the balance's too.
+        """
+        value, low, high = self.fit.interval(weights)
+        balance = self.balance
+        if (
+            balance is None
+            or balance.depends is None
+            or weights[DELAY]
+            or (self.tells_mass and self.misfit <= POOR)
+        ):
+            return value, low, high
+        ends = balance.interval(weights)
+        return value, min(low, ends[0]), max(high, ends[1])
 
     @property
     def misfit(self) -> float:
@@ -133,6 +159,8 @@ def fitted_joint(
     motion = _limited(motion, joint)
     windows = windows_of(motion)
     checks += checks_of(motion, windows, joint)
+    if motion.driven and all(check.passed or check.warning for check in checks):
+        checks += check_dependence(force_balance(windows, motion.resolution), motion)
     if any(not (check.passed or check.warning) for check in checks):
         return tuple(checks), None
     mass = 1.0
@@ -155,14 +183,36 @@ def fitted_joint(
     share = explained(unseen.chosen(kept), squares[kept])
     unit_mass = not motion.driven and not mass_from_file
     outlying += tuple(unseen.time[~kept].tolist())
+    balance = balance_of(fit, motion) if motion.driven else None
     fitted = FittedJoint(
-        joint, motion, samplings[0], (), fit, unseen, starts, forward, backward, share, outlying, unit_mass
+        joint,
+        motion,
+        samplings[0],
+        (),
+        fit,
+        unseen,
+        starts,
+        forward,
+        backward,
+        share,
+        outlying,
+        unit_mass,
+        balance,
     )
     checks.append(_check_model(fitted, windows, numbers, records))
     if (checks[-1].passed or checks[-1].warning) and not fit.converged:
         checks.append(_no_minimum(fit))  # a model that is wrong is the better reason
+    if balance is not None and (checks[-1].passed or checks[-1].warning):
+        checks += check_dependence(balance, motion)
     fitted = replace(fitted, checks=tuple(checks))
     return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
+
+
+def balance_of(fit: JointFit, motion: Motion) -> ForceBalance:
+    """The balance in the windows that were fitted: a force that changes elsewhere alone tells nothing there."""
+    values = fit.numbers.values
+    spring = STIFFNESS in fit.numbers.free
+    return force_balance(fit.windows, motion.resolution, delay=float(values[DELAY]), spring=spring)
 
 
 def _enough(motion: Motion, samplings: Sequence[Sampling]) -> list[Check]:
@@ -291,7 +341,8 @@ def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, record
         return Check(
             "model",
             False,
-            f"{text}; the windows at {times} s do not follow the rest: an end stop, a hand, a saturated stretch?",
+            f"{text}; the windows at {times} s do not follow the rest, and are left out: an end stop, a hand, a "
+            "saturated stretch, a step of the force that the rest does not explain? The record does not tell",
             warning=True,
         )
     return Check("model", True, text)

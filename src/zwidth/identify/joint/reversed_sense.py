@@ -1,8 +1,8 @@
-"""Why no mass with friction explains a motion: a sense reversed, all along or in between, or columns swapped."""
+"""Why no mass with friction explains a motion: a sense reversed, records that differ, perhaps columns swapped."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.faults import comma_list
-from zwidth.identify.joint.fit import Numbers, Windows, explained, squares_of
+from zwidth.identify.joint.fit import MASS, ONE, Numbers, Windows, explained, squares_of
+from zwidth.identify.joint.force_balance import ForceBalance, force_balance
 from zwidth.identify.joint.record import Motion
 from zwidth.identify.joint.start import search_guess
 from zwidth.identify.records.record import Record
@@ -25,28 +26,69 @@ MOST: Final = 6  # windows that are looked at of each part
 
 
 def reason_of_misfit(windows: Windows, motion: Motion, numbers: Numbers, records: Sequence[Record]) -> str:
-    """A sentence with the cause, and what to do; "" where none explains the motion."""
+    """What was seen where no mass with friction explains the motion, and what may cause it; "" where nothing was.
+
+    A sign is called turned only where the force falls with the acceleration beyond its noise, and the motion is
+    explained once it is turned. Everything else that is better so than as recorded is a question.
+    """
     if not motion.driven:
         return ""
     name, reversed_ = motion.force_name, replace(windows, force=-windows.force)
-    along, against = list[str](), list[str]()
-    for group, which in _groups(windows, motion, records).items():
-        left = 1.0 - _explained(windows.chosen(which), motion, numbers)
-        left_reversed = 1.0 - _explained(reversed_.chosen(which), motion, numbers)
+    groups = _groups(windows, motion, records)
+    seen = {group: force_balance(windows.chosen(which), motion.resolution) for group, which in groups.items()}
+    along, against, own = list[str](), list[str](), list[str]()
+    for group, which in groups.items():
+        left = 1.0 - _explained(windows.chosen(_some(which)), motion, numbers)
+        left_reversed = 1.0 - _explained(reversed_.chosen(_some(which)), motion, numbers)
+        if left <= 1.0 - CLEARLY:
+            own.append(group)
         if min(left, left_reversed) > 1.0 - CLEARLY:
             continue
-        if left_reversed < BETTER * left:
+        if left_reversed < BETTER * left and seen[group].against_mass:
             against.append(group)
-        elif left < BETTER * left_reversed:
+        elif left < BETTER * left_reversed and seen[group].tells_mass:
             along.append(group)
     if against and along:
         return (
-            f"a positive {name} accelerates backward in {comma_list(against)}: a sign has flipped, change it there"
+            f"a positive {name} accelerates backward in {comma_list(against)}, and forward in "
+            f"{comma_list(along)}: a sign has flipped, change it there"
         )
+    everywhere = np.ones(len(windows.first), dtype=bool)
+    if against or (not along and _turned(windows, reversed_, motion, numbers)):
+        return f"a positive {name} accelerates backward: change the sign of one of the two columns"
+    if len(records) > 1 and len(own) == len(groups):
+        return f"each record by itself is explained, all together are not: {_differences(seen)}"
     swapped = replace(windows, position=windows.force, force=windows.position + motion.reference)
-    if _explained(swapped.chosen(_some(np.ones(len(windows.first), dtype=bool))), motion, numbers) > SWAPPED:
-        return f"the columns of position and {name} are swapped: exchange their names"
-    return f"a positive {name} accelerates backward: change the sign of one of the two columns" if against else ""
+    share = _explained(swapped.chosen(_some(everywhere)), motion, numbers)
+    if share > SWAPPED:
+        return (
+            f"were the columns of position and {name} swapped, {100.0 * share:.4g} % would be explained: are "
+            "they, or did another force act too, or something change while it was recorded? The record does not "
+            "tell"
+        )
+    return ""
+
+
+def _turned(windows: Windows, reversed_: Windows, motion: Motion, numbers: Numbers) -> bool:
+    """Whether the force of the whole record falls with the acceleration, and explains the motion with its sign
+    turned."""
+    if not force_balance(windows, motion.resolution).against_mass:
+        return False
+    some = _some(np.ones(len(windows.first), dtype=bool))
+    left, left_reversed = (1.0 - _explained(one.chosen(some), motion, numbers) for one in (windows, reversed_))
+    return left_reversed <= 1.0 - CLEARLY and left_reversed < BETTER * left
+
+
+def _differences(seen: Mapping[str, ForceBalance]) -> str:
+    """The mass by each record, and what may be the reason where they differ."""
+    masses = list[str]()
+    for group, one in seen.items():
+        low, high = one.interval(ONE[MASS])
+        masses.append(f"{low:.3g} to {high:.3g} by {group}" if one.tells_mass else f"not told by {group}")
+    return (
+        f"the mass or inertia is {comma_list(masses)}; another device or load, another friction, or another unit "
+        "or sign in one of them? Give them one by one"
+    )
 
 
 def _explained(windows: Windows, motion: Motion, numbers: Numbers) -> float:
@@ -73,4 +115,4 @@ def _groups(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict
         for part in np.array_split(np.arange(len(owner)), max(min(GROUPS, len(owner) // FEWEST), 1)):
             end = windows.time[part[-1]] + windows.length[part[-1]] * windows.period[part[-1]]
             groups[f"{windows.time[part[0]]:.4g} to {end:.4g} s"] = np.isin(np.arange(len(owner)), part)
-    return {name: _some(which) for name, which in groups.items() if np.sum(which) >= FEWEST}
+    return {name: which for name, which in groups.items() if np.sum(which) >= FEWEST}

@@ -54,6 +54,19 @@ def weighted_balance(
     moving   share of a segment that must be motion for its row to count
     Returns  (s, 5) of m, b, F forward and backward, and k, and (s, D) of the force
     """
+    weight = weighting(size)[0]
+    rows, at, _ = balance_rows(windows, size, step, moving)
+    # a force is held from its sample to the next: its mean about a sample is that of two
+    forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
+    last = len(windows.position) - 1
+    right = [forces[np.clip(at - delay, 0, last)] @ weight for delay in delays]
+    return rows, np.stack(right, axis=1)
+
+
+def balance_rows(
+    windows: Windows, size: int, step: float, moving: float
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """The motion's side of `weighted_balance`: its rows (s, 5), their samples (s, size), and periods (s,) [s]."""
     weight, slope, bend = weighting(size)
     reach = max(size // 8, 1)
     starts = [
@@ -76,10 +89,7 @@ def weighted_balance(
         -((side < 0.0) @ weight),
         place @ weight,
     ]
-    # a force is held from its sample to the next: its mean about a sample is that of two
-    forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
-    right = [forces[np.clip(at - delay, 0, last)] @ weight for delay in delays]
-    return np.stack(rows, axis=1), np.stack(right, axis=1)
+    return np.stack(rows, axis=1), at, T
 
 
 def weighting(size: int) -> tuple[Floats, Floats, Floats]:
