@@ -240,7 +240,7 @@ def test_an_orientation_that_cannot_be_reached_is_said_with_the_nearest():
     del wrist["mechanism"]["assemblies"]["upright"]["joints_rad"]["roll"]
     device = from_document(wrist)
     with pytest.raises(
-        OutOfReach, match=r"cannot reach roll, pitch, yaw .* the nearest orientation it reaches is .* degrees"
+        OutOfReach, match=r"cannot reach roll, pitch, yaw .* an answered orientation is .* degrees"
     ):
         device.at(orientation=[0.8, 0.0, 0.0])
     assert device.at(orientation=[0.0, 0.3, 0.2]).posture.status == 0
@@ -250,9 +250,9 @@ def test_an_orientation_that_cannot_be_reached_is_said_with_the_nearest():
 def test_the_nearest_pose_is_reached_and_no_farther_than_the_last_on_the_straight_way(turn):
     """A descent alone ended half a metre away, where a turn about the same axis by less is reached in place."""
     device = _stage(limited=False)
-    with pytest.raises(OutOfReach, match=r"the nearest pose it reaches is .* [0-9.]+ degrees away") as caught:
+    with pytest.raises(OutOfReach, match=r"an answered pose is .* [0-9.]+ degrees away") as caught:
         device.at(orientation=turn)
-    place, vector = re.findall(r"\((.*?)\)", str(caught.value).partition("nearest")[2])
+    place, vector = re.findall(r"\((.*?)\)", str(caught.value).partition("an answered pose is")[2])
     position, turned = (np.array([float(x) for x in part.split(",")]) for part in (place, vector))
     assert device.at(position, orientation=turned).posture.status == 0
     assert position == pytest.approx([0.0, 0.0, 0.15], abs=1e-9)

@@ -10,6 +10,7 @@ import pytest
 from zwidth import __version__
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
+from zwidth.device.format_version import STORE_VERSION
 from zwidth.device.load import from_document, load, schema
 from zwidth.device.operator_choice import operator_table
 from zwidth.study.designs.study_file import read_study
@@ -27,6 +28,7 @@ OPERATOR = (
 READ = {"device": load, "study": read_study, "operator": operator_table}
 TEXT = {"device": DEVICE, "study": STUDY, "operator": OPERATOR}
 NEWER = f"is {{}}, and zwidth {__version__} reads up to version 1; upgrade zwidth"
+NEWER_STORE = NEWER.replace("version 1", f"version {STORE_VERSION}").format(STORE_VERSION + 1)
 
 
 @pytest.fixture
@@ -108,22 +110,30 @@ def change_attributes(path, **changes):
 def test_a_newer_store_is_refused_and_left_alone(tmp_path, changes):
     path = tmp_path / "store"
     new_store(path)
-    assert json.loads((path / "zarr.json").read_text())["attributes"]["version"] == 1
-    change_attributes(path, version=2, **changes)
+    assert json.loads((path / "zarr.json").read_text())["attributes"]["version"] == STORE_VERSION
+    change_attributes(path, version=STORE_VERSION + 1, **changes)
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     with pytest.raises(StoreError) as caught:
         Store(path, Job())
-    assert str(caught.value) == f"store: its version {NEWER.format(2)}, or name another folder"
+    assert str(caught.value) == f"store: its version {NEWER_STORE}, or name another folder"
     assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
 
 
-def test_a_store_without_a_version_is_of_the_first(tmp_path):
+@pytest.mark.parametrize("version", [None, 1])
+def test_a_store_of_the_first_version_is_refused_and_left_alone(tmp_path, version):
+    """Its cells have no checksums. One that names no version is of the first."""
     path = tmp_path / "store"
     new_store(path)
     document = json.loads((path / "zarr.json").read_text())
-    document["attributes"].pop("version", None)
+    for name in ("digest", "descriptions", "version"):
+        document["attributes"].pop(name)
+    if version is not None:
+        document["attributes"]["version"] = version
     (path / "zarr.json").write_text(json.dumps(document))
-    assert len(list(Store(path, Job()).stored_batches())) == 1
+    before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
+    with pytest.raises(StoreError, match=rf"^store: its version is 1, .* version {STORE_VERSION}; remove it"):
+        Store(path, Job())
+    assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
 
 
 @pytest.mark.parametrize("question", ["how much?", "another"])
@@ -131,17 +141,29 @@ def test_a_newer_journal_is_refused_and_left_alone(tmp_path, question):
     path = tmp_path / "journal"
     Journal(path, fingerprint("how much?")).get_or_compute("first", lambda: [1.5])
     head, *lines = path.read_text().splitlines()
-    assert json.loads(head)["version"] == 1
-    path.write_text("\n".join([json.dumps(json.loads(head) | {"version": 2}), *lines]) + "\n")
+    assert json.loads(head)["version"] == STORE_VERSION
+    newer = json.dumps(json.loads(head) | {"version": STORE_VERSION + 1})
+    path.write_text("\n".join([newer, *lines]) + "\n")
     before = path.read_bytes()
     with pytest.raises(JournalError) as caught:
         Journal(path, fingerprint(question))
-    assert str(caught.value) == f"journal: its version {NEWER.format(2)}, or name another file"
+    assert str(caught.value) == f"journal: its version {NEWER_STORE}, or name another file"
     assert path.read_bytes() == before
 
 
-def test_a_journal_without_a_version_is_of_the_first(tmp_path):
+@pytest.mark.parametrize("version", [{}, {"version": 1}])
+def test_a_journal_of_the_first_version_is_read_and_gets_checksums(tmp_path, version):
+    """One that names no version is of the first. A damaged line of it is dropped with those behind it."""
     path = tmp_path / "journal"
     question = fingerprint("how much?")
-    path.write_text(json.dumps({"question": question}) + '\n{"name": "first", "value": [1.5]}\n')
-    assert Journal(path, question).known == {"first": [1.5]}
+    entries = [{"name": "first", "value": [1.5, 1e-320]}, {"name": "second", "value": None}]
+    lines = [json.dumps(version | {"question": question}), *map(json.dumps, entries), '{"name": "third", "val']
+    path.write_text("\n".join([*lines, lines[-2]]) + "\n")
+    known = {"first": [1.5, 1e-320], "second": None}
+    assert Journal(path, question).known == known
+    text = path.read_text()
+    assert json.loads(text.splitlines()[0])["version"] == STORE_VERSION
+    assert len(text.splitlines()) == 3
+    assert Journal(path, question).known == known
+    path.write_text(text.replace("1.5", "1.6"))
+    assert Journal(path, question).known == {}

@@ -320,7 +320,7 @@ def test_a_task_that_no_design_meets_says_which_demand_fails_first():
     found = optimise(study, workers=1)
     assert not len(found.front)
     assert found.knee is None
-    assert found.reason.startswith("no design keeps rigid_mass <= 0.001, the best of ")
+    assert found.reason.startswith("no design tried keeps rigid_mass <= 0.001, the best of ")
     records = {one.demand.key: one for one in found.demands}
     assert records["rigid_mass"].kept == 0.0
     assert records["isotropy"].kept > 0.9
@@ -329,10 +329,10 @@ def test_a_task_that_no_design_meets_says_which_demand_fails_first():
 def test_a_demand_of_the_task_that_no_design_keeps_is_named_by_its_key():
     far = {**TASK, "apparent_mass_kg": 0.001, "footprint_radius_m": 1.0}
     found = optimise(problem_study(LENGTH, objectives={"stiffness_max": "max"}, task=far, budget=20), workers=1)
-    assert found.reason.startswith("no design keeps task.apparent_mass_kg <= 0.001, the best of 20 has 0.")
+    assert found.reason.startswith("no design tried keeps task.apparent_mass_kg <= 0.001, the best of 20 has 0.")
     near = far | {"apparent_mass_kg": 1.0, "footprint_radius_m": 1e-3}
     found = optimise(problem_study(LENGTH, objectives={"stiffness_max": "max"}, task=near, budget=20), workers=1)
-    assert found.reason.startswith("no design keeps task.footprint_radius_m <= 0.001, the best of 20 has 0.")
+    assert found.reason.startswith("no design tried keeps task.footprint_radius_m <= 0.001, the best of 20 has 0.")
 
 
 def test_demands_that_are_kept_apart_and_never_together():
@@ -344,7 +344,7 @@ def test_demands_that_are_kept_apart_and_never_together():
         budget=40,
     )
     found = optimise(study, workers=1)
-    assert found.reason.startswith("no design keeps all demands together: ")
+    assert found.reason.startswith("no design tried keeps all demands together: ")
     assert "stiffness_max >= 3510 is kept by" in found.reason
 
 

@@ -44,7 +44,7 @@ def test_bars_are_those_of_the_closed_form():
     expected = np.quantile(STIFFEST * m / T**2, [0.05, 0.95])
     np.testing.assert_allclose([found.bars.low[0, 0], found.bars.high[0, 0]], expected, rtol=1e-9)
     assert found.bars.kept.tolist() == [1.0]
-    assert "64 devices were drawn within the tolerances of the best design" in sentences(found)
+    assert "64 devices were drawn within the tolerances of the best design found" in sentences(found)
     assert found.values[0, 0] == pytest.approx(STIFFEST * 0.3 / 1e-6, rel=1e-9)
 
 
@@ -55,7 +55,8 @@ def test_the_share_that_keeps_a_demand_is_that_of_the_closed_form():
     m = changes.of({"plant.mass_kg": 0.3})[:, 0]
     assert found.bars.kept[0] == (m >= 0.295).mean()
     assert 0.2 < found.bars.kept[0] < 0.8
-    said = f"{percent(found.bars.kept[0])} of 64 devices within the tolerances of the best design keep all demands"
+    share = percent(found.bars.kept[0])
+    said = f"{share} of 64 devices within the tolerances of the best design found keep all demands"
     assert said in sentences(found)
 
 

@@ -68,7 +68,8 @@ def test_a_folder_of_an_older_layout_is_told_by_its_stores(tmp_path):
     ("change", "said"),
     [
         (lambda header: header[:20], "its series.json is damaged; remove the folder, or name another"),
-        (lambda header: json.dumps(json.loads(header) | {"version": 2}), "its version is 2, and zwidth "),
+        (lambda header: json.dumps(json.loads(header) | {"version": 3}), "its version is 3, and zwidth "),
+        (lambda header: json.dumps(json.loads(header) | {"version": 1}), "its version is 1, whose cells "),
     ],
 )
 def test_a_fingerprint_that_cannot_be_read_is_refused(tmp_path, change, said):

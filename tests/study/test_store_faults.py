@@ -17,6 +17,7 @@ import pytest
 
 from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
+from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.study.jobs import executor
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.store import Store, StoredCells, StoreError
@@ -146,3 +147,84 @@ def test_many_cells_stay_in_the_store(tmp_path, monkeypatch):
     pieces = list(many.pieces())
     assert [first for first, _ in pieces] == list(range(0, 1000, 30))
     assert np.concatenate([cells.values for _, cells in pieces]).tobytes() == few.values.tobytes()
+
+
+def judge_flipped_bits(folder: Path, seed: int, most: int) -> dict[str, int]:
+    """Flip one bit after another in every file of a store, and ask the store for its cells.
+
+    most     places that are tried in each file; all of a shorter one
+    Returns  how often the store was refused, batches were computed again, and everything was read as it was.
+             Cells other than those that were computed are an error, and so is any exception but StoreError.
+    """
+    rng = np.random.default_rng(seed)
+    kind = (RootsJob, NotedJob)[seed % 2]
+    count = int(rng.integers(5, 40))
+    batch = count // 2 + 1  # two batches: each attempt opens and reads the whole store
+    path, right = folder / f"cells-{seed}", run(kind(count), workers=1)
+    run(kind(count), Store(path, kind(count)), workers=1, batch=batch)
+    intact = {file: file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
+    assert {file.name for file in intact} >= {"zarr.json", "notes.jsonl", "lock", "0"}
+    tally = {"refused": 0, "again": 0, "as it was": 0}
+    for file, data in intact.items():
+        for place in rng.permutation(len(data))[:most]:
+            damaged = bytearray(data)
+            damaged[place] ^= 1 << int(rng.integers(8))
+            file.write_bytes(damaged)
+            job = kind(count)
+            try:
+                found = run(job, Store(path, job), workers=1)
+            except StoreError:
+                outcome = "refused"
+            else:
+                assert same_cells(found, right), f"byte {place} of {file.relative_to(path)}"
+                outcome = "again" if job.computed_ranges else "as it was"
+                assert outcome == "again" or file.name in ("lock", "zarr.json"), f"byte {place} of {file}"
+            tally[outcome] += 1
+            for one, kept in intact.items():
+                one.write_bytes(kept)
+    return tally
+
+
+@pytest.mark.parametrize("seed", EVERYDAY_SEEDS)
+def test_no_flipped_bit_changes_a_cell(tmp_path, seed):
+    tally = judge_flipped_bits(tmp_path, seed, 2)
+    assert min(tally["refused"], tally["again"]) > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(study_size(continuous=10, full=100)))
+def test_no_flipped_bit_changes_a_cell_of_many_stores(tmp_path, seed):
+    judge_flipped_bits(tmp_path, seed, 40)
+
+
+def test_cells_that_are_damaged_after_the_run_are_refused(tmp_path, monkeypatch):
+    """Cells that stay on the disk are read once more when they are asked for."""
+    monkeypatch.setattr(executor, "MOST_IN_MEMORY", 5)
+    job = RootsJob(40)
+    found = run(job, Store(tmp_path / "cells", job), workers=1, batch=10)
+    chunk = tmp_path / "cells" / "values" / "c" / "2" / "0"
+    chunk.write_bytes(chunk.read_bytes()[:-9] + b"x" * 9)
+    with pytest.raises(StoreError, match="cells 20 to 29"):
+        found.values  # noqa: B018
+
+
+def test_a_store_without_checksums_is_refused_by_its_version(tmp_path):
+    job = RootsJob(40)
+    run(job, Store(tmp_path / "cells", job), workers=1, batch=10)
+    header = tmp_path / "cells" / "zarr.json"
+    parts = json.loads(header.read_text())
+    parts["attributes"] |= {"version": 1}
+    header.write_text(json.dumps(parts))
+    with pytest.raises(StoreError, match="its version is 1"):
+        Store(tmp_path / "cells", job)
+
+
+def test_lines_of_notes_that_are_damaged_cost_their_own_batch_alone(tmp_path):
+    path, job = tmp_path / "cells", NotedJob(40)
+    run(job, Store(path, job), workers=1, batch=10)
+    notes = path / "notes.jsonl"
+    notes.write_text(notes.read_text().replace("cell 13", "cell 14"))
+    again = NotedJob(40)
+    found = run(again, Store(path, again), workers=1)
+    assert same_cells(found, NotedJob(40).compute(0, 40))
+    assert again.computed_ranges == [(10, 20)]

@@ -235,6 +235,16 @@ def test_members_that_cannot_be_built_are_counted_and_named():
     assert all(study.members[k]["plant.mass_kg.0.1"] > 0.1 for k in study.chart.failed)
     assert set(study.chart.failed) | set(study.chart.members) == set(range(len(study.members)))
     assert study.violation.unseen < 200
+    assert study.violation.unseen + study.violation.unknown == 200
+    assert study.unknown_members >= len(study.chart.failed) + study.violation.unknown
+    document = study.document()
+    assert study.decided is document["decided"] is False
+    assert document["unknown_members"] == study.unknown_members
+    assert document["numbers_hold_for"] == "charted members"
+    assert document["stiffness_max_is"] == "at most"
+    assert document["violation"]["unknown"] == study.violation.unknown
+    assert document["search"]["unknown"] == study.unknown_searched
+    assert repr(study).startswith("RobustStudy: in doubt")
 
 
 def test_nobody_to_chart_is_an_error(monkeypatch):

@@ -21,6 +21,7 @@ from tests.study.study_cases import (
 from zwidth.chart.chart import largest_stiffness
 from zwidth.device.device import Device
 from zwidth.device.load import load
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import (
     FAILED,
     NO_VALUE,
@@ -34,7 +35,7 @@ from zwidth.measures.definition import (
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.effective_parameters import effective_parameters
 from zwidth.study.designs.study_file import study_of
-from zwidth.study.designs.sweep import Sweep, run_study
+from zwidth.study.designs.sweep import Sweep, run_study, sweep
 from zwidth.study.designs.sweep_job import sweep_job
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.store import Store
@@ -332,3 +333,14 @@ def test_a_hypercube_and_lists_as_a_dataset():
     assert set(dataset["at_x"].values) == {0.0, 0.05}
     ratio = dataset["links.upper-left.center_of_mass_m.0"] / dataset[RIGHT_LENGTH]
     assert np.allclose(ratio, -0.04565 / 0.147, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("count", "measure"), [(5, "rigid_mass"), (60, "rigid_mass")])
+def test_designs_that_are_measured_together_are_not_cut_apart(monkeypatch, count, measure):
+    """To cut one design's point out of those of many takes far longer than to measure it."""
+    cuts, cut = [], OperatingPoint.__getitem__
+    monkeypatch.setattr(OperatingPoint, "__getitem__", lambda self, at: (cuts.append(at), cut(self, at))[1])
+    lengths = np.linspace(0.14, 0.155, count).tolist()
+    found = sweep(load("five-bar"), {"links.upper-right.length_m": lengths}, measure, workers=1)
+    assert np.isfinite(found[measure].values).all()
+    assert len(cuts) < 5

@@ -9,6 +9,7 @@ import pytest
 
 import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least_mass, radius, uniform
+from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.show.figures.tolerance import band_path
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.series import JobSeries
@@ -21,6 +22,7 @@ from zwidth.study.tolerances.tolerance_study import answer, run_tolerances, tole
 MASSES = {"plant.mass_kg": uniform(20.0)}
 BOTH = {"plant.mass_kg": uniform(20.0), "loop.sampling_period_s": uniform(5.0)}
 WALL = {"stiffness": 62_000.0, "damping": 90.0}
+DELAYED_WALL = 55_000.0, 80.0
 
 
 def drawn_masses(count, seed=1):
@@ -181,6 +183,70 @@ def test_a_certain_gain_is_named_and_two_alike_are_not_told_apart():
     swapped = np.concatenate([np.arange(376) < 376, [False] * 20, [True] * 4]).astype(bool)
     found = tightened(["b", "s"], before, np.array([better, swapped]))
     assert [one.may_be_best for one in found] == [True, True]
+
+
+def judge_middle(seed: int) -> str:
+    """A random mass and a random wall, sampling period and mass with tolerances: the device in the middle is
+    judged by roots, and no tolerance is named where it is not stable. Returns its outcome."""
+    rng = np.random.default_rng(seed)
+    spread = {"distribution": "uniform", "plus_minus_percent": float(rng.uniform(5.0, 40.0))}
+    low = MASS * float(rng.uniform(0.3, 1.0))
+    masses = {"distribution": "uniform", "low": low, "high": low + MASS * float(rng.uniform(0.1, 1.5))}
+    K = STIFFEST * MASS / PERIOD**2 * float(rng.uniform(0.2, 1.5))
+    B = float(rng.uniform(30.0, 120.0))
+    found = tolerance(
+        free_mass(),
+        {"plant.mass_kg": masses, "loop.sampling_period_s": spread},
+        stiffness=K,
+        damping=B,
+        samples=72,
+        index_samples=0,
+    )
+    middle = 0.5 * (masses["low"] + masses["high"])
+    stable = radius(middle, PERIOD, K, B) < 1.0
+    assert found.middle == ("stable" if stable else "unstable")
+    document = found.document()
+    assert document["middle"] == found.middle
+    assert (document["tighten_first_reason"] is None) == bool(document["tighten_first"])
+    if not stable:
+        assert document["tighten_first"] == []
+    return found.middle
+
+
+@pytest.mark.parametrize("seed", EVERYDAY_SEEDS)
+def test_where_the_middle_is_unstable_no_tolerance_is_to_be_tightened(seed):
+    judge_middle(seed)
+
+
+@pytest.mark.slow
+def test_where_the_middle_is_unstable_no_tolerance_is_to_be_tightened_of_many():
+    outcomes = [judge_middle(seed) for seed in range(study_size(continuous=30, full=100))]
+    assert set(outcomes) == {"stable", "unstable"}
+
+
+def delayed_radius(mass: float, delay: float, K: float, B: float) -> float:
+    """Spectral radius of a free mass at a wall whose force comes a part 0 <= delay < 1 of a sample late: the state
+    is position, velocity, last force and last position; the old force acts for the first part of the period."""
+    T, late, rest = PERIOD, delay * PERIOD, (1.0 - delay) * PERIOD
+    force = np.array([-K - B / T, 0.0, 0.0, B / T])
+    old, place = np.array([0.0, 0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0])
+    position = place + [0.0, T, 0.0, 0.0] + (0.5 * (T**2 - rest**2) * old + 0.5 * rest**2 * force) / mass
+    velocity = [0.0, 1.0, 0.0, 0.0] + (late * old + rest * force) / mass
+    return float(np.abs(np.linalg.eigvals(np.array([position, velocity, force, place]))).max())
+
+
+def test_no_tolerance_is_named_where_a_delay_makes_the_wall_unstable_in_the_middle():
+    """The file has no delay, and its wall is stable: the middle of the tolerances is elsewhere."""
+    K, B = DELAYED_WALL
+    assert delayed_radius(MASS, 0.0, K, B) < 1.0 < delayed_radius(MASS, 0.15, K, B)
+    delay = {"distribution": "uniform", "low": 0.0, "high": 0.3}
+    numbers = {"loop.delay_samples": delay, "plant.mass_kg": uniform(10.0)}
+    found = tolerance(free_mass(), numbers, stiffness=K, damping=B, samples=100, index_samples=0)
+    assert 0.0 < found.probability.value < 1.0
+    assert found.middle == "unstable"
+    assert found.best_to_tighten == ()
+    assert found.document()["tighten_first"] == []
+    assert found.no_advice is not None
 
 
 def test_devices_without_a_stable_wall_are_an_outcome_and_their_stiffness_is_zero():

@@ -17,8 +17,9 @@ from zwidth.device.faults import DeviceError, fail, quote, suggestion
 from zwidth.device.missing import missing_numbers
 from zwidth.device.posture_arguments import joint_angles, positions, rotations, screws, unit_vectors
 from zwidth.loop.controller import Controller
-from zwidth.loop.linear_omissions import linear_omissions
+from zwidth.loop.linear_omissions import linear_omissions, load_omissions
 from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.operator import ABOUT_AN_AXIS
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response
 
@@ -116,6 +117,13 @@ class Device:
         """Parts of the device that a linear answer leaves out, in words; () if there are none."""
         return linear_omissions(self.mechanism, self.given_plant, self.controller)
 
+    def omissions(self, model: str | None = None) -> tuple[str, ...]:
+        """What a linear answer leaves out, in words: the same, and what it leaves out of the load.
+
+        model  "rigid" has no links that bend
+        """
+        return self.linear_omissions + load_omissions(self.mechanism, self.load, model)
+
     def at(
         self,
         position: Position | ArrayLike | Posture | None = None,
@@ -137,8 +145,9 @@ class Device:
 
             device.at((0.0, 0.25), (0.0, 1.0)).chart()
 
-        A single position that the handle misses by 1 % of the arm's length or less is projected onto the nearest
-        that it has; `point.posture.projected` says how far. In a batch a position that cannot be had is marked in
+        A single position that the handle misses by 1 % of the arm's length or less is projected onto one
+        that it has, found by descent; `point.posture.projected` says how far. In a batch a position that cannot
+        be had is marked in
         `point.status`.
 
         position    (..., 2) or (..., 3) [m]; x, y lies at the height of the file's reference, whose plane a planar
@@ -208,6 +217,8 @@ class Device:
             )
         else:
             rendered = self._unit_directions(direction, axis, characteristic_length, directions)
+            if self.operator is not None and rendered.shape[-1] == 6 and not rendered[..., :3].any():
+                raise fail(self.label, "operator", ABOUT_AN_AXIS)
             posture = self._posture(position, orientation, assembly)
             shape = np.broadcast_shapes(posture.status.shape, rendered.shape[:-2])
             posture = posture.broadcast_to(shape)

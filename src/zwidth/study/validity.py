@@ -257,7 +257,7 @@ def _fit(
         return Fit(key, label, none, none, (), reason)
     try:
         model = Loop(plant, controller)
-        chart, tracer = stability_chart(model, decay=False), Tracer(model)
+        chart, tracer = stability_chart(model, decay=False).drawn(), Tracer(model)
     except (ChartError, ModelError) as problem:
         return Fit(key, label, none, none, (), str(problem))
 

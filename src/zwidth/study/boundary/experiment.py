@@ -237,7 +237,7 @@ def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
     """The exact chart with the operator; None where the loop has none."""
     held = loop if operator is None else Loop(attach(loop.plant, operator), loop.controller)
     try:
-        return stability_chart(held, decay=False)
+        return stability_chart(held, decay=False).drawn()
     except (NonlinearError, ChartError):
         return None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -88,11 +88,16 @@ class Column:
         return float("nan"), status, next((note.reason for note in values.notes if note.status == status), "")
 
     def reduce(
-        self, values: MeasureValues, point: OperatingPoint, weights: NDArray[np.float64] | None = None
+        self,
+        values: MeasureValues,
+        point: Callable[[], OperatingPoint],
+        weights: NDArray[np.float64] | None = None,
     ) -> tuple[float, int, str]:
         """Value, status and reason of a design, from the measure's values over its workspace.
 
-        found    the measure at each cell;   point  the operating point of all cells
+        values   the measure at each cell
+        point    gives the operating point of all cells; called where the statistic needs more than the values, as
+                 to cut one design's point out of those of many takes longer than to measure it
         weights  area of each cell [m^2]; None: all equal
         Returns  the statistic of the cells that have a value; nan with the commonest status where none has one
         """
@@ -101,7 +106,8 @@ class Column:
             if self.statistic == "conditioning_index":
                 value = global_conditioning_index(values.values, values.status, weights)
             elif self.statistic == "isotropy_index":
-                value = global_isotropy_index(point.jacobian, values.status, len(point.drives.names))
+                own = point()
+                value = global_isotropy_index(own.jacobian, values.status, len(own.drives.names))
             else:
                 whole = overall(values.values, values.status, weights, self.measure.better)
                 value = float(getattr(whole, self.statistic))

@@ -1,8 +1,9 @@
 """Journal of a long run: its results on disk, one a line, from which an interrupted run continues.
 
 The first line holds the fingerprint of the question and the version of the format. A journal of another question
-is emptied and begun again; one of a newer version is refused. Numbers are read back exactly. A line cut short, by
-a crash or a full disk, is dropped and computed again.
+is emptied and begun again; one of a newer version is refused. Numbers are read back exactly. Each line has a
+checksum: one that a crash or a disk has damaged is dropped with those behind it, and computed again. A journal of
+version 1 has none; its lines are taken as they are, and get theirs.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.device.format_version import STORE_VERSION, newer_version_message
+from zwidth.device.format_version import STORE_VERSION, newer_version_message, without_checksums
+from zwidth.study.jobs.checked_lines import checked_line, read_checked_line
 
 
 def fingerprint(*parts: object) -> str:
@@ -80,7 +82,7 @@ class Journal:
             raise JournalError(f"{path.name or path}: is not an ordinary file; name another")
         data = path.read_bytes() if path.exists() else b""
         lines = _read(path, data.split(b"\n")[:-1], data != b"", question)
-        self.known = {entry["name"]: entry["value"] for entry in map(json.loads, lines[1:])}
+        self.known = {entry["name"]: entry["value"] for entry in map(read_checked_line, lines[1:])}
         if (text := b"".join(line + b"\n" for line in lines)) != data:
             path.write_bytes(text)
         self.entries_read = len(self.known)  # number of results that the file held
@@ -94,7 +96,7 @@ class Journal:
             value = compute()
             if self.path is not None:
                 with open(self.path, "ab") as stream:
-                    stream.write(json.dumps({"name": name, "value": value}).encode() + b"\n")
+                    stream.write(checked_line({"name": name, "value": value}))
                     stream.flush()
                     os.fsync(stream.fileno())
             self.known[name] = value
@@ -111,10 +113,14 @@ def _read(path: Path, lines: list[bytes], not_empty: bool, question: str) -> lis
         raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
     if header.get("question") != question:
         return [first]
-    count = 1
-    while count < len(lines) and _entry(lines[count]).keys() >= {"name", "value"}:
-        count += 1
-    return lines[:count]
+    unchecked = without_checksums(header.get("version"))
+    kept = [first]
+    for line in lines[1:]:
+        entry = _entry(line) if unchecked else read_checked_line(line)
+        if not entry.keys() >= {"name", "value"}:
+            break
+        kept.append(checked_line(entry).removesuffix(b"\n") if unchecked else line)
+    return kept
 
 
 def _entry(line: bytes) -> dict[str, Any]:

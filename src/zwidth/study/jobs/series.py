@@ -24,7 +24,7 @@ from types import TracebackType
 from typing import Final
 
 from zwidth._version import __version__
-from zwidth.device.format_version import STORE_VERSION, newer_version_message
+from zwidth.device.format_version import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.progress import Progress
 from zwidth.study.jobs.executor import SMALL, run
 from zwidth.study.jobs.executor_interface import Executor, open_executor
@@ -115,6 +115,8 @@ class JobSeries:
             raise StoreError(f"{self.folder}: its {HEADER} is damaged; remove the folder, or name another")
         if message := newer_version_message(header.get("version"), STORE_VERSION):
             raise StoreError(f"{self.folder}: its version {message}, or name another folder")
+        if message := unchecked_version_message(header.get("version")):
+            raise StoreError(f"{self.folder}: its version {message}; remove it, or name another folder")
         if header.get("question") != own["question"]:
             raise KeptForAnother(str(self.folder), whose_work(header, own["study"]))
         return True

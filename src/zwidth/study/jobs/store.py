@@ -2,20 +2,26 @@
 
     values    (count, measures)  float64; nan where there is none
     status    (count, measures)  uint8, named by its attributes; 255 = not computed
-    notes                        a file beside them: why cells have no value
+    notes                        a file beside them: why cells have no value, and a digest of each batch
     lock                         held by the run that writes here
 
 Attributes hold the fingerprint of the question, the release of zwidth that computes and the version of the format.
-A store of another question or release, or of a newer version, is refused and left as it is. Chunks are batches:
+A store of another question or release, or of another version, is refused and left as it is. Chunks are batches:
 one file of values and one of status, each written whole or not at all, the status last.
+
+Every file can be told from a damaged one: chunks and lines of notes have checksums, the arrays' descriptions
+digests in the group's attributes, and these a digest of their own. A damaged batch is not done, and is computed
+again; a store with damaged descriptions is refused.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import secrets
 import shutil
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -27,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth._version import __version__
-from zwidth.device.format_version import STORE_VERSION, newer_version_message
-from zwidth.measures.definition import MISSING, OK, OUT_OF_TIME, STATUS
+from zwidth.device.format_version import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS
 from zwidth.memory_limit import check_memory
 from zwidth.study.jobs.job import CellValues, Job, Notes
 from zwidth.study.jobs.journal import fingerprint
@@ -38,6 +44,9 @@ from zwidth.study.jobs.store_notes import NotesFile
 
 KIND: Final = "cells"
 NOTES: Final = "notes.jsonl"
+DESCRIPTION: Final = "zarr.json"  # of an array: shape, type, chunks, codecs, attributes
+ARRAYS: Final = ("values", "status")
+DIGEST: Final = "digest"  # attribute: of all others
 PER_CELL: Final = 9  # bytes of value and status; compressed they take less
 UNLIMITED: Final = float("inf")
 
@@ -111,8 +120,9 @@ class Store:
                 "study": self._study,
                 "release": __version__,
                 "batch": batch,
+                "descriptions": _descriptions(draft),
             }
-            group.attrs.update(header)
+            group.attrs.update(header | {DIGEST: _digest_of(header)})
             if self.path.is_dir():
                 self.path.rmdir()  # empty
             draft.replace(self.path)  # fails where another run has just put its own
@@ -145,35 +155,42 @@ class Store:
         import zarr
 
         if time_limit is not None and time_limit != self._given_up_after():
-            zarr.open_group(str(self.path), mode="r+").attrs["time_limit_s"] = time_limit
+            attributes = zarr.open_group(str(self.path), mode="r+").attrs
+            header = {**attributes, "time_limit_s": time_limit}
+            attributes.update({"time_limit_s": time_limit, DIGEST: _digest_of(header)})
 
     def stored_batches(self) -> Iterator[tuple[int, CellValues]]:
         """First cell and values of each batch that is done."""
         assert self.batch is not None
         for first in range(0, self.count, self.batch):
-            with suppress(Exception):  # a file that a crash has damaged: its batch is not done
-                cells = self.read_batch(first)
-                # zarr does not tell a file that has gone from one that holds nan only
-                lost = (cells.status == OK) & np.isnan(cells.values)
-                if not (lost | (cells.status == MISSING)).any():
-                    yield first, cells
+            with suppress(Exception):  # a file that a crash or a disk has damaged: its batch is not done
+                yield first, self.read_batch(first)
 
     def read_batch(self, first: int) -> CellValues:
-        """The batch that begins with a cell. Raises what zarr does where a file is damaged."""
-        values, status = self._open_arrays()
+        """The batch that begins with a cell. Raises StoreError where it is not there, or is damaged."""
+        arrays = self._open_arrays()
         assert self.batch is not None
         assert self._notes is not None
-        part = slice(first, min(first + self.batch, self.count))
-        return CellValues(values[part], status[part], self._notes.read(first, len(self.measures)))
+        last = min(first + self.batch, self.count)
+        try:
+            values, status = (np.asarray(one[first:last]) for one in arrays)
+            notes = self._notes.read(first, _digest_of_cells(values, status))
+        except OSError:
+            raise
+        except Exception as error:  # zarr's own and those of its codecs, of many kinds
+            raise StoreError(
+                f"{self.path.name}: cells {first} to {last - 1} are missing or damaged; the same command computes "
+                "them again"
+            ) from error
+        return CellValues(values, status, notes)
 
     def write_batch(self, first: int, cells: CellValues) -> None:
         """Write a batch. Raises OSError where it cannot be written."""
         values, status = self._open_arrays()
         part = slice(first, first + len(cells.values))
         values[part] = cells.values
-        if any(cells.notes):
-            assert self._notes is not None
-            self._notes.write(first, cells.notes)
+        assert self._notes is not None
+        self._notes.write(first, cells.notes, _digest_of_cells(cells.values, cells.status))
         status[part] = cells.status
 
     def remove(self) -> None:
@@ -193,10 +210,20 @@ class Store:
             )
 
     def _create_arrays(self, group: Any, batch: int) -> None:
+        from zarr.codecs import Crc32cCodec, ZstdCodec
+
+        # the checksum stands last, over the bytes that lie on the disk
+        codecs: dict[str, Any] = {"compressors": (ZstdCodec(), Crc32cCodec())}
         shape, chunks = (self.count, len(self.measures)), (batch, len(self.measures))
         attributes: dict[str, Any] = {"measures": list(self.measures)}
         group.create_array(
-            "values", shape=shape, chunks=chunks, dtype="float64", fill_value=np.nan, attributes=attributes
+            "values",
+            shape=shape,
+            chunks=chunks,
+            dtype="float64",
+            fill_value=np.nan,
+            attributes=attributes,
+            **codecs,
         )
         meanings = [text.replace(" ", "_") for text in STATUS.values()]
         flags: dict[str, Any] = {"flag_values": list(STATUS), "flag_meanings": " ".join(meanings)}
@@ -207,6 +234,7 @@ class Store:
             dtype="uint8",
             fill_value=MISSING,
             attributes=attributes | flags,
+            **codecs,
         )
 
     def _open_arrays(self) -> tuple[Any, Any]:
@@ -235,16 +263,23 @@ class Store:
         kind, version, batch = (attributes.get(key) for key in ("zwidth", "version", "batch"))
         if kind == KIND and (message := newer_version_message(version, STORE_VERSION)):
             raise StoreError(f"{self.path.name}: its version {message}, or name another folder")
-        if kind != KIND or not isinstance(batch, int):
+        if kind != KIND:
             raise other
+        damaged = StoreError(f"{self.path.name}: is damaged; remove it, or name another folder")
+        if message := unchecked_version_message(version):
+            raise StoreError(f"{self.path.name}: its version {message}; remove it, or name another folder")
+        if attributes.get(DIGEST) != _digest_of(attributes) or not isinstance(batch, int):
+            raise damaged
         if attributes.get("question") != self.question:
             raise KeptForAnother(self.path.name, whose_work(attributes, self._study))
         try:
+            if attributes.get("descriptions") != _descriptions(self.path):
+                raise damaged
             self._arrays = group["values"], group["status"]
             header = json.dumps({"version": STORE_VERSION, "question": self.question})
             self._notes = NotesFile(self.path / NOTES, header)
-        except (KeyError, ValueError):
-            raise StoreError(f"{self.path.name}: is damaged; remove it, or name another folder") from None
+        except (KeyError, ValueError, FileNotFoundError):
+            raise damaged from None
         self.batch = batch
 
     def _check_disk(self) -> None:
@@ -256,6 +291,23 @@ class Store:
                 f"{wanted / 1e9:.3g} GB of disk, of {free / 1e9:.3g} GB that are free; ask for fewer, or name a "
                 "folder on another disk"
             )
+
+
+def _digest_of(attributes: Mapping[str, Any]) -> str:
+    """Digest of a store's attributes but itself."""
+    others = {name: value for name, value in attributes.items() if name != DIGEST}
+    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
+
+
+def _descriptions(folder: Path) -> dict[str, str]:
+    """Digests of the descriptions of a store's arrays."""
+    return {name: hashlib.sha256((folder / name / DESCRIPTION).read_bytes()).hexdigest() for name in ARRAYS}
+
+
+def _digest_of_cells(values: NDArray[np.float64], status: NDArray[np.uint8]) -> int:
+    """Digest of a batch's numbers; all nan are alike, of which zarr keeps none apart."""
+    plain = np.where(np.isnan(values), np.nan, values).astype("<f8")
+    return zlib.crc32(np.asarray(status, dtype=np.uint8).tobytes(), zlib.crc32(plain.tobytes()))
 
 
 def whose_work(attributes: Mapping[str, Any], study: str) -> str:

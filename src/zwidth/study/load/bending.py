@@ -298,7 +298,7 @@ def _numbers(point: OperatingPoint) -> BendingNumbers:
     first = _first_moved(point.ungripped_plant)
     chart, reason = None, ""
     try:
-        chart = stability_chart(point.loop, decay=False).about(point)
+        chart = stability_chart(point.loop, decay=False).about(point).drawn()
     except (ChartError, UnresolvedError) as error:
         reason = str(error)
     if chart is not None and isnan(chart.stiffness_max):

@@ -286,7 +286,7 @@ class _Pushes:
             return PushedChart(push, f"no equilibrium: {error}", fixed_surface_status="no equilibrium")
         try:
             sideways = fastest_sideways_motion(point)
-            chart = stability_chart(point.loop, decay=False).about(point)
+            chart = stability_chart(point.loop, decay=False).about(point).drawn()
         except (ChartError, UnresolvedError) as error:
             return PushedChart(push, f"undecided: {error}", equilibrium=found, fixed_surface_status="undecided")
         status = OK if chart.stiffness_max == chart.stiffness_max else NONE_STABLE

@@ -1,4 +1,4 @@
-"""`Optimisation`: the best designs, beside the device as it is, and how they were found."""
+"""`Optimisation`: the best designs found, beside the device as it is, and how they were found."""
 
 from __future__ import annotations
 
@@ -24,6 +24,12 @@ from zwidth.study.optimise.variables import pieces, value_at, values_at
 
 Floats = NDArray[np.float64]
 
+BEST_FOUND: Final = "best found"
+NO_BETTER: Final = "no better design lies within the bounds"
+NOT_PROVEN: Final = (
+    "whether a better design than those tried lies within the bounds is not known; another seed or a larger "
+    "budget may find one"
+)
 AT_BOUND: Final = 1e-6  # share of a range, or of a bound's size, within which a design lies at it
 SHOWN: Final = 3  # designs of a repr
 GIVEN_UP: Final = (FAILED, OUT_OF_TIME)
@@ -58,7 +64,9 @@ class NotJudged:
 
 @dataclass(frozen=True, repr=False)
 class Optimisation(Result):
-    """The best designs of a study.
+    """The best designs found of a study.
+
+    The best of those that were tried: whether a better one lies within the bounds is not known, see `premises`.
 
     problem    what was optimised
     shares     (n, v)  of all designs judged, in their order
@@ -95,7 +103,7 @@ class Optimisation(Result):
                 f"{self.problem.columns[one.column].name} {self.values[place, one.column]:.6g}"
                 for one in self.problem.objectives
             )
-            lines.append(f"{'best' if len(self.problem.objectives) == 1 else 'knee'}: {said}")
+            lines.append(f"{self.word}: {said}")
         return "\n  ".join(lines)
 
     @property
@@ -108,10 +116,23 @@ class Optimisation(Result):
         """Columns of the front's designs (k, c)."""
         return self.judgement.values[self.front]
 
+    @property
+    def word(self) -> str:
+        """What the design at `knee` is called."""
+        return BEST_FOUND if len(self.problem.objectives) == 1 else "knee"
+
+    @property
+    def premises(self) -> tuple[Mapping[str, Any], ...]:
+        """What the front rests on: `what`, `holds` (None: not known), `how` it was seen, `reason`. () where there
+        is no front."""
+        if not len(self.front):
+            return ()
+        return ({"what": NO_BETTER, "holds": None, "how": "not checked", "reason": NOT_PROVEN},)
+
     @cached_property
     def knee(self) -> int | None:
         """Place in the front of the design from which either objective gains little and the other loses much; with
-        one objective the best. None where no design keeps the demands."""
+        one objective the best found. None where no design keeps the demands."""
         if not len(self.front):
             return None
         return knee(self.judgement.costs(self.problem)[self.front])
@@ -132,16 +153,18 @@ class Optimisation(Result):
                 return self._nowhere(objective.column, f"{column.name} has no value in any design tried")
         records = sorted(self.demands, key=lambda one: one.kept)
         if not records:
-            return "no design has a value in every objective"
+            return "no design tried has a value in every objective"
         first = records[0]
         column = self.problem.columns[first.demand.column]
         if np.isnan(first.best):
-            return self._nowhere(first.demand.column, f"no design keeps {first.demand.full_text}: it has no value")
+            return self._nowhere(
+                first.demand.column, f"no design tried keeps {first.demand.full_text}: it has no value"
+            )
         if not first.kept:
             best = f"{first.best:.6g} {unit_text(column.unit)}".rstrip()
-            return f"no design keeps {first.demand.full_text}, the best of {len(self.shares)} has {best}"
+            return f"no design tried keeps {first.demand.full_text}, the best of {len(self.shares)} has {best}"
         each = "; ".join(f"{one.demand.full_text} is kept by {one.kept:.1%}" for one in records)
-        return f"no design keeps all demands together: {each}"
+        return f"no design tried keeps all demands together: {each}"
 
     def _nowhere(self, column: int, sentence: str) -> str:
         """A sentence with the commonest cause."""
@@ -190,8 +213,8 @@ class Optimisation(Result):
         return {axis.key: value for axis, value in pairs if axis.parts} | self.settings(place)
 
     def active(self, place: int) -> list[str]:
-        """What holds a design of the front back: variables at a bound, or at an end of their list of numbers, and
-        demands kept exactly."""
+        """Which variables of a design of the front lie at a bound, or at an end of their list of numbers, and
+        which demands it just keeps. Of a better design that was not found this says nothing."""
         held = []
         for axis, share in zip(self.problem.variables, self.shares[self.front[place]].tolist(), strict=True):
             held += _end_of(axis, share)
@@ -226,6 +249,7 @@ class Optimisation(Result):
             ],
             "knee": self.knee,
             "active": [self.active(place) for place in places],
+            "premises": [dict(one) for one in self.premises],
             "baseline": None if self.baseline is None else self._baseline_document(names),
             "demands": [
                 {

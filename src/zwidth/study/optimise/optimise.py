@@ -1,4 +1,4 @@
-"""Find the best designs of a study: search, polish, and what the front is worth.
+"""Look for the best designs of a study: search, polish, and what the front is worth.
 
 found = optimise("study.toml")
 found.values, found.knee
@@ -55,7 +55,7 @@ def optimise(
     cluster: str | None = None,
     time_limit: float | None = None,
 ) -> Optimisation:
-    """Find the designs of a study that are best in its objectives and keep its demands.
+    """Look for the designs of a study that are best in its objectives and keep its demands.
 
     study     a study file, or a `Study` read with bounds
     store     a folder that keeps what is done, so that the same call goes on from there after it was stopped

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from zwidth.device import address, build
 from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, dotted, one_line, quote
+from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, one_line, quote
 from zwidth.device.load import device_of_point, from_document
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.schema import device_file as schema
@@ -23,6 +23,7 @@ from zwidth.device.schema.operator import OperatorSection
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import Spelling, as_argument
+from zwidth.model.operator import ABOUT_AN_AXIS
 from zwidth.model.plant import Plant
 from zwidth.study.advice import Advice
 from zwidth.study.designs.built_designs import BuiltDesigns, build_at_point
@@ -218,6 +219,15 @@ class Family:
         if list(operator_inconsistencies(document)):
             return None
         return replace(self.operating_point, operator=build.operator(section))
+
+    def check_operators(self) -> None:
+        """Raise DeviceError for hands about an axis, before members are charted that only would have no chart."""
+        if not self.operating_point.turns:
+            return
+        names = ("operator",) if not self.operators else self.operators
+        held = zip(names, self.held_documents, strict=True)
+        if faults := [Fault(name, "operator", ABOUT_AN_AXIS) for name, document in held if "operator" in document]:
+            raise DeviceError(faults)
 
     def path_faults(self) -> list[RangeFault]:
         """What is wrong with each range by itself."""

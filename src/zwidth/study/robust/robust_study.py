@@ -50,12 +50,16 @@ class RobustError(ValueError):
 class RobustStudy(Result):
     """A robust chart with its members and the evidence that it holds for the whole family.
 
-    chart        of all members
+    Nothing is known of members that could not be built or charted, be they of the chart, of the search or among
+    those tried afterwards: with one of them nothing is claimed for the whole family, and `decided` is False.
+
+    chart        of all members that could be charted
     members      path -> value of each; those in `chart.failed` could not be built or charted
     sampled      number of members before the search; it found the others
     rounds       number of rounds of the search
     area_change  share of the area by which the last round moved the edge; 0 if it found no member
     settled      whether the search ended because no member that it found moves the edge by more than the tolerance
+    unknown_searched  number of members that the search came to and that could not be built
     violation    random members tried; None for a list without ranges, which is charted whole, and where no wall
                  is stable
     """
@@ -67,6 +71,35 @@ class RobustStudy(Result):
     area_change: float
     settled: bool
     violation: Violation | None
+    unknown_searched: int = 0
+
+    @property
+    def unknown_members(self) -> int:
+        """Number of members of which nothing is known: of the chart, of the search, and tried afterwards."""
+        unseen = 0 if self.violation is None else self.violation.unknown
+        return self.chart.unknown_members + self.unknown_searched + unseen
+
+    @property
+    def decided(self) -> bool:
+        """Whether the chart holds for all members that were looked at."""
+        return not self.doubt
+
+    @property
+    def doubt(self) -> str:
+        """What is in doubt, in a sentence; "" where the chart holds for all members that were looked at."""
+        doubts = [self.chart.doubt] if self.chart.doubt else []
+        if self.unknown_searched:
+            doubts.append(
+                f"nothing is known of {self.unknown_searched} members that the search for worse cases came to: "
+                "they cannot be built"
+            )
+        if self.violation is not None and self.violation.unknown:
+            tried = self.violation.unseen + self.violation.unknown
+            doubts.append(
+                f"nothing is known of {self.violation.unknown} of {tried} members tried afterwards: they cannot "
+                "be built"
+            )
+        return "; ".join(doubts)
 
     @property
     def edge_shares(self) -> dict[int, float]:
@@ -90,9 +123,22 @@ class RobustStudy(Result):
             "rounds": self.rounds,
             "moved_share": self.area_change,
             "settled": self.settled,
+            "unknown": self.unknown_searched,
         }
+        doubt: dict[str, Any] = {"unknown_members": self.unknown_members, "decided": self.decided}
+        if self.doubt:
+            held = self.chart.stiffness_max_is
+            doubt |= {
+                "reason": f"this is undecided: {self.doubt}",
+                "numbers_hold_for": "charted members" if self.unknown_members else "all members",
+                "stiffness_max_is": "at most" if held in ("exact", "at most") else None,
+            }
         violation = None if self.violation is None else self.violation.document()
-        return self.chart.document() | {"members": list(self.members), "search": search, "violation": violation}
+        return (
+            self.chart.document()
+            | doubt
+            | {"members": list(self.members), "search": search, "violation": violation}
+        )
 
     def table(self) -> dict[str, list[Any]]:
         """The robust set's edge as columns, its arcs one after another and counted from 0."""
@@ -100,10 +146,12 @@ class RobustStudy(Result):
 
     def __repr__(self) -> str:
         chart, violation = self.chart, self.violation
-        lines = [f"{len(self.members)} members, {len(chart.binding)} of which bind"]
+        lines = [f"in doubt: {self.doubt}"] if self.doubt else []
+        lines.append(f"{len(self.members)} members, {len(chart.binding)} of which bind")
         if chart.members_at_stiffness_max:
             stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m"
-            lines.append(f"largest stiffness stable for all {stiffest}")
+            of_whom = "the charted members" if self.unknown_members else "all"
+            lines.append(f"largest stiffness stable for {of_whom} {stiffest}")
             lines.append(
                 f"{chart.lost_stiffness_share:.2%} less than the best member has, {chart.lost_share:.2%} less area"
             )
@@ -152,6 +200,7 @@ def robust_study(
     if family.operating_point.response is not None:
         return _measured_study(family, members or MEASURED_MEMBERS, unseen or MEASURED_UNSEEN, seed, progress)
     members, unseen = members or MEMBERS, unseen or UNSEEN
+    family.check_operators()
     if faults := family.faults():
         raise RangeError(faults)
     charted = _Members(family, progress)
@@ -178,6 +227,7 @@ def robust_study(
         area_change=area_change,
         settled=settled,
         violation=_violation(charted, chart, unseen, seed),
+        unknown_searched=radii.unknown,
     ).about(family.operating_point)
 
 
@@ -267,8 +317,10 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
         raise RobustError(str(error)) from None
     rounds, area_change, settled = 0, 0.0, not family.free
     tried = list(random_measured_members(measured, unseen, [seed, 2], AT_ENDS)) if family.free else []
+    unknown = 0
     while not settled and chart.regions:
         deep = {place: one.depth for place, one in intrusions(measured, chart, tried, progress).items()}
+        unknown += len(tried) - len(deep)
         tried = [one for place, one in enumerate(tried) if deep.get(place, 0.0) > DEPTH]
         if not tried:
             area_change, settled = 0.0, True
@@ -291,6 +343,7 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
         area_change=area_change,
         settled=settled,
         violation=violation,
+        unknown_searched=unknown,
     ).about(family.operating_point)
 
 

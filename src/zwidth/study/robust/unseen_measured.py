@@ -136,7 +136,9 @@ def violation_of_measured(
     tried = intrusions(family, chart, members, progress)
     violating = [place for place, one in tried.items() if one.depth > DEPTH]
     if not violating:
-        return Violation(len(tried), 0, nan, 0.0, {})
+        return Violation(len(tried), 0, nan, 0.0, {}, len(members) - len(tried))
     worst = max(violating, key=lambda place: (tried[place].softer, tried[place].depth))
     share = tried[worst].softer / chart.stiffness_max if chart.stiffness_max > 0.0 else 0.0
-    return Violation(len(tried), len(violating), nan, share, family.values(members[worst]))
+    return Violation(
+        len(tried), len(violating), nan, share, family.values(members[worst]), len(members) - len(tried)
+    )

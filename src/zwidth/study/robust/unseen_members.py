@@ -36,6 +36,7 @@ class Violation:
     """Random members, not used for the chart, tried on the robust walls.
 
     unseen                 number of members tried, without those that could not be built
+    unknown                number of those that could not be built: nothing is known of them
     violating              number of them for which one of the walls is unstable
     worst_spectral_radius  largest over all of them and all walls; at most 1 if none violates
     worst_stiffness_share  the largest share of the largest stiffness by which a robust wall (K > 0, B >= 0) must
@@ -48,11 +49,13 @@ class Violation:
     worst_spectral_radius: float
     worst_stiffness_share: float
     worst_member: dict[str, Any]
+    unknown: int = 0
 
     def document(self) -> dict[str, Any]:
         """The numbers by key."""
         return {
             "unseen": self.unseen,
+            "unknown": self.unknown,
             "violating": self.violating,
             "worst_spectral_radius": self.worst_spectral_radius,
             "worst_stiffness_share": self.worst_stiffness_share,
@@ -74,11 +77,11 @@ def try_unseen_members(
     tested, violating = int(np.count_nonzero(np.isfinite(radius))), np.flatnonzero(radius > 1.0)
     if not len(violating):
         largest = max(float(np.max(spectral_radius(chart.members[k], *walls.T))) for k in chart.binding)
-        return Violation(tested, 0, largest, 0.0, {})
+        return Violation(tested, 0, largest, 0.0, {}, unseen - tested)
     worst = int(violating[np.argmax(softer[violating])])
     share = float(softer[worst]) / chart.stiffness_max if softer[worst] > 0.0 else 0.0
     largest = float(radius[violating].max())
-    return Violation(tested, len(violating), largest, share, family.values(members[worst]))
+    return Violation(tested, len(violating), largest, share, family.values(members[worst]), unseen - tested)
 
 
 def _random_members(family: Family, count: int, seed: int) -> Iterator[FamilyMember]:

@@ -56,6 +56,11 @@ class MemberRadii:
             self._radii[member, wall] = float(radius)
         return self._radii[member, wall]
 
+    @property
+    def unknown(self) -> int:
+        """Number of members looked at that cannot be built."""
+        return sum(loop is None for loop in self._loops.values())
+
     def _loop(self, member: FamilyMember) -> Loop | None:
         if member not in self._loops:
             try:

@@ -83,7 +83,7 @@ def what_if(device: Device, point: OperatingPoint | None = None) -> list[Variant
     """
     require("device", device, Device)
     point = point or device.at()
-    variants = [Variant(BASE, "as described", point.loop, stability_chart(point.loop))]
+    variants = [Variant(BASE, "as described", point.loop, stability_chart(point.loop).drawn())]
     steps = [*_changes(device, point), *_models(point)]
     return variants + [_variant(*step) for step in steps]
 
@@ -116,7 +116,7 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
         return Variant(key, label, None, None, obstacle)
     try:
         loop = make()
-        return Variant(key, label, loop, stability_chart(loop, decay=False))
+        return Variant(key, label, loop, stability_chart(loop, decay=False).drawn())
     except (ModelError, LoadError, ChartError) as error:
         return Variant(key, label, None, None, str(error))
 

@@ -44,6 +44,11 @@ ASKED: Final = (
     WITHOUT_WALL,
     STATUS[UNDECIDED],
 )  # outcomes of devices that could be asked
+# why no tolerance is named that is to be tightened first
+NO_WALL_WANTED: Final = "no wall is wanted"
+ALL_STABLE: Final = "every drawn device renders the wall"
+MIDDLE_NOT_STABLE: Final = "the wall is not known to be stable in the middle of the tolerances"
+NOT_TOLD_APART: Final = "the drawn devices do not tell that half of any tolerance would help"
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,6 +63,7 @@ class ToleranceStudy(Result):
     uncharted  number of drawn devices without a chart; in the bands they count as not stable
     tightened  what half of each tolerance does for the wanted wall, the largest gain first; () where there is no
                wall, or every device renders it
+    middle     outcome of the device in the middle of all tolerances, as in `outcomes`; None: not computed
     """
 
     question: ToleranceQuestion
@@ -67,6 +73,7 @@ class ToleranceStudy(Result):
     bands: tuple[Band, ...] = ()
     uncharted: int = 0
     tightened: tuple[Tightened, ...] = ()
+    middle: str | None = None
 
     def __repr__(self) -> str:
         question = self.question
@@ -128,7 +135,7 @@ class ToleranceStudy(Result):
         study = self.question.study
         try:
             point = study.device.at(study.at, study.direction, assembly=study.assembly, model=study.model)
-            return chart_at(point, decay=False)
+            return chart_at(point, decay=False).drawn()
         except (ChartError, ValueError):
             return None
 
@@ -156,9 +163,28 @@ class ToleranceStudy(Result):
     def best_to_tighten(self) -> tuple[Tightened, ...]:
         """The tolerances of which half the width would gain most: several that cannot be told apart, or ().
 
-        A narrower tolerance that does not raise the share for certain is not among them.
+        A narrower tolerance that does not raise the share for certain is not among them. Where the wall is not
+        known to be stable in the middle there are none: whatever is tightened leads there.
         """
+        if not self.middle_is_stable:
+            return ()
         return tuple(one for one in self.tightened if one.gain.low > 0.0 and one.may_be_best)
+
+    @property
+    def middle_is_stable(self) -> bool:
+        """Whether the device in the middle of the tolerances renders the wanted wall, or any if none is wanted."""
+        return self.middle in (STABLE, WITH_WALL)
+
+    @property
+    def no_advice(self) -> str | None:
+        """Why no tolerance is named that is to be tightened first; None where one is."""
+        if self.best_to_tighten:
+            return None
+        if not self.question.has_wall:
+            return NO_WALL_WANTED
+        if self.outcomes.get(STABLE, 0) == self.question.samples:
+            return ALL_STABLE
+        return NOT_TOLD_APART if self.middle_is_stable else MIDDLE_NOT_STABLE
 
     def dataset(self) -> xr.Dataset:
         """The drawn devices: their numbers, measures and status along the dimension `design`."""
@@ -185,7 +211,9 @@ class ToleranceStudy(Result):
             "bands": [one.document() for one in self.bands],
             "indices": [one.document() for one in self.indices],
             "narrower": [one.document() for one in self.tightened],
+            "middle": self.middle,
             "tighten_first": [one.key for one in self.best_to_tighten],
+            "tighten_first_reason": self.no_advice,
             "notes": self.reasons,
         }
 

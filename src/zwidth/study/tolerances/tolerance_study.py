@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 
 from zwidth.device.device import Device
-from zwidth.measures.definition import OK, Measure
+from zwidth.measures.definition import NO_VALUE, OK, STATUS, Measure
 from zwidth.progress import Progress
 from zwidth.study.designs.sampling import Axis
-from zwidth.study.designs.sweep_job import SweepJob, sweep_job
+from zwidth.study.designs.sweep_job import MissingMeasures, SweepJob, sweep_job
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.series import JobSeries
 from zwidth.study.tolerances.band import Band, Coverage, refined_dampings
@@ -28,7 +28,7 @@ from zwidth.study.tolerances.draws import UNSEEN, drawn_values
 from zwidth.study.tolerances.edge_job import MOST_INTERVALS, EdgeJob, highest_damping
 from zwidth.study.tolerances.indices import Indices, sampled_shares
 from zwidth.study.tolerances.intervals import count_bounds, share_interval
-from zwidth.study.tolerances.outcomes import all_indices, stable_marks
+from zwidth.study.tolerances.outcomes import STIFFNESS, all_indices, outcome_counts, stable_marks
 from zwidth.study.tolerances.question import ToleranceQuestion, read_question
 from zwidth.study.tolerances.question_arguments import question_over
 from zwidth.study.tolerances.result import ToleranceStudy
@@ -133,7 +133,8 @@ def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
         return found
     bands, uncharted = _bands(question, values, compute)
     narrower = _tightened(question, values, cells, compute)
-    return replace(found, bands=bands, uncharted=uncharted, tightened=narrower)
+    middle = _middle(question, compute)
+    return replace(found, bands=bands, uncharted=uncharted, tightened=narrower, middle=middle)
 
 
 def _axes(question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]]) -> list[Axis]:
@@ -174,6 +175,18 @@ def _tightened(
     found = compute("narrower", job, "computing devices of narrower tolerances")
     after = stable_marks([WALL_IS_STABLE], found).reshape(len(values), question.samples)
     return tightened([one.key for one in question.tolerances], before, after)
+
+
+def _middle(question: ToleranceQuestion, compute: Compute) -> str:
+    """The outcome of the device in the middle of all tolerances, to which they lead as they are tightened."""
+    axes = _axes(question, [np.array([one.distribution.middle]) for one in question.tolerances])
+    columns = [one for one in question.columns if one.name in (STIFFNESS, WALL_IS_STABLE.name)]
+    try:
+        job = sweep_job(question.study_of(axes, columns))
+    except MissingMeasures:
+        return STATUS[NO_VALUE]
+    (outcome,) = outcome_counts(columns, compute("middle", job, "computing the device in the middle"))
+    return outcome
 
 
 def _bands(

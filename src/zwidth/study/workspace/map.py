@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.device.device import Device
+from zwidth.loop.linear_omissions import load_omissions
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import NO_POSTURE, STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
@@ -343,7 +344,8 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "sampling_period_s": device.controller.sampling_period,
         "delay_samples": float(device.controller.delay),
         "left_out": ", ".join(
-            device.linear_omissions if any(one.linear for one in job.requested_measures) else ()
+            (device.linear_omissions if any(one.linear for one in job.requested_measures) else ())
+            + load_omissions(device.mechanism, device.load, job.model)
         ),
         **{key: value for key, value in wanted.items() if value is not None},
         "zwidth": __version__,
