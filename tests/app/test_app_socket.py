@@ -80,7 +80,7 @@ HAND = {
 }
 
 
-@pytest.mark.parametrize("device", ["five-bar", "stamper-delta", "openwrist"])
+@pytest.mark.parametrize("device", ["five-bar", "stamper-delta"])
 @pytest.mark.parametrize("hand", [None, HAND], ids=["free", "held"])
 def test_modes_move_the_drawn_handle_as_they_move_the_plant(client, device, hand) -> None:
     state = {"device": device, **({} if hand is None else {"hand": hand})}
@@ -92,11 +92,20 @@ def test_modes_move_the_drawn_handle_as_they_move_the_plant(client, device, hand
     point = zwidth.load(device).at(operator=operator)
     modes = undamped_modes(point.plant.mass, point.plant.stiffness)[1]
     assert arrays["touch.coordinates"] == pytest.approx(modes, rel=1e-9, abs=1e-9 * np.abs(modes).max())
-    if point.turns:
-        assert not moved.any(), "the handle of a wrist stays where it is"
-    else:
-        expected = point.plant.handle @ modes
-        assert arrays["scene.direction"] @ moved == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    expected = point.plant.handle @ modes
+    assert arrays["scene.direction"] @ moved == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("hand", [None, HAND], ids=["free", "held"])
+def test_the_mouse_holds_no_wrist_and_its_chart_is_the_one_held_by_nobody(client, hand) -> None:
+    state = {"device": "openwrist", **({} if hand is None else {"hand": hand})}
+    head, arrays = client.ask("view", state=state, layers=["chart", "scene", "touch"])
+    assert head["moments"]
+    assert "about an axis" in head["touch"]["reason"]
+    assert "touch.numbers" not in arrays
+    assert not arrays["scene.handle_rates"].any(), "the handle of a wrist stays where it is"
+    free = zwidth.load("openwrist").at(operator="none").chart()
+    assert head["chart"]["stiffness_max"] == pytest.approx(free.stiffness_max, rel=1e-12)
 
 
 def test_vibration_is_sent_where_there_is_one_to_draw(client) -> None:

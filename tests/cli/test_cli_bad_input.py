@@ -239,6 +239,20 @@ def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, comma
     assert ran.document["reason"] == "this is undecided: the edge could not be closed"
 
 
+def test_a_chart_that_is_in_doubt_once_it_is_drawn_is_undecided(monkeypatch):
+    """Its numbers are read before its edge is drawn and judged."""
+    from zwidth.chart.edge_by_eigenvalues import ChartError
+
+    def doubted(*_):
+        raise ChartError("walls on the edge are off the circle")
+
+    monkeypatch.setattr("zwidth.chart.loop_edge._judged", doubted)
+    ran = run_command("chart", TWO_MASS, "--json")
+    assert ran.code == 1
+    assert ran.document["decided"] is False
+    assert ran.document["reason"] == "this is undecided: walls on the edge are off the circle"
+
+
 @pytest.mark.parametrize("name", ["chart.svg", "chart.csv"])
 def test_an_interruption_is_one_line_and_leaves_nothing_half_written(tmp_path, monkeypatch, name):
     file = tmp_path / name

@@ -16,6 +16,7 @@ from zwidth.show.safe_walls.header import header_text
 from zwidth.study import safe_walls
 
 SMALL = ("--x", "-0.05,0.05", "--y", "0.2,0.25", "--cells", "2,1", "--levels", 4, "--workers", 1)
+SMOOTHED = "loop.velocity.filter={type='first-order', time_constant_s=0.1}"
 FEW = ("--cells", "4,3", "--levels", 4, "--workers", 1)
 
 
@@ -108,6 +109,16 @@ def test_a_measured_response_has_no_table(here):
         (
             (MECHANISM, "--arduino", "no/such/folder"),
             "--arduino: no/such/folder is no folder and cannot be made one",
+        ),
+        (
+            (
+                MECHANISM,
+                "--arduino",
+                "wall",
+                "--set",
+                SMOOTHED,
+            ),
+            "--arduino: five-bar: the sketch computes a wall by the backward difference",
         ),
         ((TWO_MASS, "--cells", "3,3"), "no workspace; its walls are the same everywhere"),
         ((TWO_MASS, "--directions", 2), "got 2 parts of directions; leave out --directions"),

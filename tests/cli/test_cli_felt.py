@@ -47,6 +47,7 @@ def test_people_read_the_same():
     ):
         assert " ".join(row.split()) in " ".join(out.split())
     assert "no wall is felt above" not in run_command("felt", ONE_MASS, *WALL).out
+    assert document_of("felt", ONE_MASS, *WALL)["static_stiffness_limit_kind"] == "infinite"
 
 
 def test_an_unstable_wall_is_no_answer_and_leaves_no_file(tmp_path):

@@ -23,7 +23,7 @@ def test_a_contact_is_simulated_from_a_start_beside_the_circle(file):
     assert document_of("simulate", file, *WALL, "--wall", "one-sided", "--duration", 0.2)["behaviour"]
     (line,) = refusal_lines("simulate", file, *WALL, "--start-position", 0.05)
     assert "--start-position" in line
-    assert "the nearest position it reaches is (0.0437079, 0.0786742, 0) m" in line
+    assert "an answered position is (0.0437079, 0.0786742, 0) m" in line
 
 
 def test_a_motion_that_leaves_the_handles_range_is_said_to(file):
@@ -52,7 +52,7 @@ def test_a_position_beside_the_circle_is_projected_and_said_to_be(file):
     assert "requested" not in run_command("chart", file).out
     ran = run_command("chart", file, "--at", "0,0.1", "--json")
     assert ran.code == 1
-    assert "the nearest position it reaches is (0, 0.09, 0) m, 10 mm away" in ran.document["reason"]
+    assert "an answered position is (0, 0.09, 0) m, 10 mm away" in ran.document["reason"]
     assert ran.document["position_m"] == [0.0, 0.1, 0.0]
 
 

@@ -244,7 +244,7 @@ def test_the_same_command_goes_on_from_what_is_kept(folder):
     whole = document_of("tolerance", path)
     first = document_of("tolerance", path, "--resume", "kept")
     stores = {one.name for one in Path("kept").iterdir()}
-    assert stores == {"devices", "edges-0", "edges-1", "narrower", "unseen"}
+    assert stores == {"devices", "edges-0", "edges-1", "middle", "narrower", "unseen"}
     values = Path("kept/devices/values").stat().st_mtime_ns
     again = document_of("tolerance", path, "--resume", "kept")
     assert whole == first == again

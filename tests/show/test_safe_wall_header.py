@@ -5,12 +5,17 @@ from __future__ import annotations
 import shutil
 import struct
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from zwidth.device.load import load
-from zwidth.show.safe_walls.header import HEADER_NAME, header_text, sketch_text, write_sketch
+from zwidth.loop.controller import Butterworth, FirstOrder
+from zwidth.loop.estimators import BackwardDifference, WindowedDifference
+from zwidth.loop.fixed_feedback import ForceSensor
+from zwidth.show.output import OutputError
+from zwidth.show.safe_walls.header import HEADER_NAME, header_text, sketch_obstacle, sketch_text, write_sketch
 from zwidth.study import safe_walls
 
 STRICT = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow", "-Wundef", "-O1")
@@ -203,6 +208,63 @@ def test_the_sketch_compiles_and_clamps_its_gains(tmp_path, cpp_compiler, table)
     assert f"PERIOD_US = {round(1e6 * table.device.controller.sampling_period)}UL" in sketch_text(table)
 
 
+OTHER_LOOPS = {
+    "filter of the velocity": {"velocity_filter": FirstOrder(0.002)},
+    "filter of the force": {"force_filter": Butterworth(2, 100.0)},
+    "estimator": {"velocity": WindowedDifference(4)},
+    "force sensor": {"force_sensor": ForceSensor(0.5)},
+}
+
+
+@pytest.fixture(scope="module")
+def small():
+    return safe_walls(load("published-two-mass"), levels=3, workers=1)
+
+
+@pytest.mark.parametrize("parts", OTHER_LOOPS.values(), ids=OTHER_LOOPS)
+def test_no_sketch_is_written_for_a_loop_that_it_does_not_compute(tmp_path, small, parts):
+    other = replace(small, device=replace(small.device, controller=replace(small.device.controller, **parts)))
+    with pytest.raises(OutputError, match="another loop"):
+        write_sketch(tmp_path / "my-wall", other)
+    assert not (tmp_path / "my-wall").exists()
+    assert header_text(other) != header_text(small), "which names what the table is about"
+
+
+def test_a_lag_behind_the_computer_is_no_part_of_the_sketch(small):
+    controller = replace(small.device.controller, actuator_time_constant=0.001, delay=0.5)
+    assert sketch_obstacle(controller) == ""
+    assert sketch_obstacle(replace(controller, velocity=BackwardDifference())) == ""
+
+
+@pytest.mark.parametrize(("size", "compiles"), [(63_000, True), (66_000, False)])
+def test_tables_beyond_16_bit_addresses_together_refuse_to_compile(tmp_path, compiler, small, size, compiles):
+    """Each array of them is small enough for itself."""
+    text = header_text(small)
+    own = f"#define ZWIDTH_BYTES {small.size}UL"
+    assert own in text
+    (tmp_path / HEADER_NAME).write_text(text.replace(own, f"#define ZWIDTH_BYTES {size}UL"))
+    (tmp_path / "avr").mkdir()
+    (tmp_path / "avr" / "pgmspace.h").write_text(FLASH)
+    (tmp_path / "program.c").write_text(PROGRAM)
+    for avr, expected_to in ((True, compiles), (False, True)):
+        options = ["-D__AVR__"] if avr else []
+        done = subprocess.run(
+            [compiler, "-std=c99", *options, f"-I{tmp_path}", "-fsyntax-only", str(tmp_path / "program.c")],
+            capture_output=True,
+            text=True,
+        )
+        assert (done.returncode == 0) is expected_to, done.stderr
+
+
+def test_the_size_of_the_tables_is_that_of_their_arrays(tmp_path, compiler, table):
+    (tmp_path / HEADER_NAME).write_text(header_text(table))
+    arrays = " + ".join(f"sizeof(zwidth_{name})" for name in ("level", "top", "low", "high"))
+    program = f'#include "safe_walls.h"\nint main(void) {{ return ({arrays}) == ZWIDTH_BYTES ? 0 : 1; }}\n'
+    (tmp_path / "size.c").write_text(program)
+    subprocess.run([compiler, "-std=c99", "-o", str(tmp_path / "size"), str(tmp_path / "size.c")], check=True)
+    assert subprocess.run([tmp_path / "size"]).returncode == 0
+
+
 def test_two_files_may_include_it(tmp_path, compiler, table):
     (tmp_path / HEADER_NAME).write_text(header_text(table))
     (tmp_path / "other.c").write_text('#include "safe_walls.h"\nint other(void);\nint other(void) { return 1; }\n')
@@ -217,8 +279,6 @@ def test_two_files_may_include_it(tmp_path, compiler, table):
 
 
 def test_names_cannot_end_a_comment(table):
-    from dataclasses import replace
-
     named = replace(table, device=replace(table.device, name="Evil */ int x; /* ä\n??/"), hands=("*/",))
     text = header_text(named)
     assert "Evil * / int x; / * \\xe4\\n? ?/" in text

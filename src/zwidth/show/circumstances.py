@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from zwidth.show.moment_units import spoken_unit
+from zwidth.show.moment_units import speaks_of_moments, spoken_unit
 from zwidth.show.output import printable
 from zwidth.show.units import as_written, typed
 
@@ -28,20 +28,35 @@ def load_text(load: Load) -> str:
 
 
 def omission_text(left_out: Sequence[str]) -> str:
-    """Parts of a device that a linear answer leaves out."""
-    return f"linear: leaves out {', '.join(left_out)}"
+    """What an answer leaves out: parts that are not linear, and what a load does to links that bend."""
+    from zwidth.loop.linear_omissions import STRAIGHT
+
+    nonlinear = [text for text in left_out if text != STRAIGHT]
+    parts = [f"linear: leaves out {', '.join(nonlinear)}"] if nonlinear else []
+    return "; ".join(parts + [text for text in left_out if text == STRAIGHT])
 
 
 def computer_text(controller: Controller) -> str:
     """Computer and amplifier in one line."""
-    from zwidth.loop.estimators import METHODS, BackwardDifference
-
     period = _given(controller.sampling_period, "s")
     samples = "sample" if controller.delay == 1.0 else "samples"
     delay = f"{_given(controller.delay)} {samples} of delay" if controller.delay else "no delay"
     known = math.isfinite(controller.sampling_period)
     parts = [f"sampled every {period}" if known else "sampling period not known", delay]
+    return ", ".join([*parts, *wall_law_parts(controller)])
+
+
+def wall_law_parts(controller: Controller, *, spell_out: bool = False) -> list[str]:
+    """Estimator, filters, lag and further feedback of a computer in words.
+
+    spell_out  whether the backward difference, which is the estimator where none is chosen, is named as well
+    """
+    from zwidth.loop.estimators import METHODS, BackwardDifference
+
+    parts = []
     estimate = "velocity"
+    if spell_out and isinstance(controller.velocity, BackwardDifference):
+        estimate = "velocity by the backward difference"
     if not isinstance(controller.velocity, BackwardDifference):
         name = next(name for name, method in METHODS.items() if isinstance(controller.velocity, method))
         parameters = ", ".join(
@@ -55,15 +70,14 @@ def computer_text(controller: Controller) -> str:
         )
         estimate = f"velocity by {name}" + (f" ({parameters})" if parameters else "")
     if controller.velocity_filter is None:
-        parts.append(f"{estimate} not filtered" if estimate == "velocity" else estimate)
+        parts.append(f"{estimate} not filtered" if spell_out or estimate == "velocity" else estimate)
     else:
         parts.append(f"{estimate} through {_filter(controller.velocity_filter)}")
     if controller.force_filter is not None:
         parts.append(f"force through {_filter(controller.force_filter)}")
     if controller.actuator_time_constant:
         parts.append(f"force lagging by {_given(controller.actuator_time_constant, 's')}")
-    parts += [f"with {name}" for name in controller.feedback_names]
-    return ", ".join(parts)
+    return parts + [f"with {name}" for name in controller.feedback_texts(speaks_of_moments())]
 
 
 def _filter(low_pass: FirstOrder | Butterworth) -> str:

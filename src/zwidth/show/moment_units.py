@@ -74,6 +74,11 @@ def speaking_of_moments(moments: bool) -> Iterator[None]:
         _moments.reset(token)
 
 
+def speaks_of_moments() -> bool:
+    """Whether texts and figures have the units of moments now."""
+    return _moments.get()
+
+
 def spoken_unit(unit: str) -> str:
     """A unit as texts and figures write it now."""
     return unit_of_moments(unit) if _moments.get() else unit

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from zwidth.study.tolerances.result import ToleranceStudy
     from zwidth.study.tolerances.tolerance import Tolerance
 
+UNDECIDED: Final = "undecided"  # an outcome
 MUCH_CUT: Final = 0.01  # share of a distribution that is cut off, and said to be
 
 WORDS = {
@@ -171,17 +172,17 @@ def advice_sentence(result: ToleranceStudy) -> str:
             f"every one of {result.question.samples} devices renders the wall: nothing is to be tightened for it"
         )
     best = result.best_to_tighten
-    if not best and result.undecided:
+    if not best and (result.undecided or result.middle == UNDECIDED):
         return (
             "which tolerance to tighten first is not known, for the wall lies on the stability limit: want one "
             "that lies away from it"
         )
+    if not result.middle_is_stable:
+        return (
+            f"no narrower tolerance helps this wall, for {_middle_text(result)}: tightening leads there; change "
+            "the design, or want less of the wall"
+        )
     if not best:
-        if result.tightened[0].gain.high < 0.0 or all(one.gain.value <= 0.0 for one in result.tightened):
-            return (
-                "no narrower tolerance helps this wall, for it is unstable in the middle of the tolerances or "
-                "nearly so: change the design, or want less of the wall"
-            )
         return f"{result.question.samples} devices do not tell that half of any tolerance would help; draw more"
     first = best[0]
     change = f"{typed(percent(share.value))} to {share_text(first.share)}, by {_gain(first.gain)}"
@@ -194,6 +195,16 @@ def advice_sentence(result: ToleranceStudy) -> str:
     )
 
 
+def _middle_text(result: ToleranceStudy) -> str:
+    """What the device in the middle of the tolerances is, if it does not render the wall."""
+    from zwidth.study.tolerances.outcomes import UNSTABLE, WITHOUT_WALL
+
+    if result.middle == UNSTABLE:
+        return "it is unstable in the middle of the tolerances"
+    what = "has no stable wall" if result.middle == WITHOUT_WALL else f"is {result.middle or 'not known'}"
+    return f"the device in the middle of the tolerances {what}"
+
+
 def _gain(gain: Interval) -> str:
     """A gain in percentage points, with its interval."""
     value, low, high = (number(100.0 * one) for one in (gain.value, gain.low, gain.high))
@@ -201,6 +212,8 @@ def _gain(gain: Interval) -> str:
 
 
 def _advice_without_wall(result: ToleranceStudy) -> str:
+    if not result.middle_is_stable:
+        return f"which tolerance to tighten first is not known, for {_middle_text(result)}"
     outcome = next((one for one in result.indices if one.name == "stiffness_max" and one.indices), None)
     certain = [one for one in outcome.indices if one.total_is_certain] if outcome is not None else []
     if not certain:

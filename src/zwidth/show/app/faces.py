@@ -11,6 +11,7 @@ from zwidth.chart.nyquist import terms_along
 from zwidth.chart.verdict import eigenvalues
 from zwidth.guarantees.disks import response_disks
 from zwidth.guarantees.port import port
+from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.operating_point import OperatingPoint
@@ -52,6 +53,9 @@ def nyquist(point: OperatingPoint, wall: Wall) -> Contents:
     handle = free.plant.handle
     if handle is None:
         return {"no_disks": "the plant has no handle, at which an operator could hold it"}, arrays
+    alone = stable_alone(free)
+    if alone.fails or point.load_omissions:
+        return {"no_disks": alone.reason or point.load_omissions[0]}, arrays
     every = angles[:: max(1, ANGLES // DISKS)]
     disks = response_disks(free, port(free.plant, handle), every)
     A, AP, APw = terms_along(circle_factors(table_of_loops(free)), every).T

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.chart.chart_base import BoundaryArc, Chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
 from zwidth.device.read import DEVICES, OPERATORS, bundled, bundled_names
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import MissingNumbersError
 from zwidth.measures.catalogue import MEASURES
+from zwidth.model.operator import ABOUT_AN_AXIS
 from zwidth.model.posture_failure import OutOfReach
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
@@ -69,9 +71,17 @@ def view(opened: OpenedDevices, state: State, layers: Sequence[str], nearest: bo
     Without a chart there is no view, but of a device whose file leaves out numbers that a chart needs: that one's
     geometry is shown.
 
-    nearest  take the nearest position where the handle cannot be at that of the state: `position` of the head
+    nearest  take an answered position where the handle cannot be at that of the state: `position` of the head
     """
     device = opened.device(state)
+    if (
+        state.hand is not None
+        and device.mechanism is not None
+        and device.renders_moments(state.direction, state.axis)
+    ):
+        # the mouse cannot hold it about an axis, which its layer says; the chart is the one held by nobody
+        state = state.model_copy(update={"hand": None, "operator": "none"})
+        device = opened.device(state)
     point, position = _point(opened, state, device, nearest)
     head: dict[str, Any] = {"moments": point.turns}
     if position is not None:
@@ -86,11 +96,11 @@ def view(opened: OpenedDevices, state: State, layers: Sequence[str], nearest: bo
             if name == "scene" and "touch" in layers:  # the page draws it vibrating, with the modes of that layer
                 still, rates = scene_rates(point)
                 found, more = found | still, more | rates
-        except (ArithmeticError, ValueError, NotImplementedError) as error:
+        except (ArithmeticError, ValueError, NotImplementedError, ChartError) as error:
             missing = isinstance(error, MissingNumbersError)
             if name == "chart" and not missing:
                 raise
-            head[name] = {"reason": f"{'It ' if missing else ''}{error}"}
+            head[name] = {"reason": f"{'It ' if missing else ''}{_said(error)}"}
             continue
         head[name] = found
         arrays |= {f"{name}.{key}": value for key, value in more.items()}
@@ -118,7 +128,8 @@ def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
         "damping_max": chart.damping_max,
         "stable_area": chart.stable_area,
         "unobserved_modes": list(chart.unobserved_modes),
-        "left_out": list(point.linear_omissions),
+        "left_out": [*point.linear_omissions, *point.load_omissions],
+        "caveats": list(point.load_omissions),
         "box": list(chart.box),
     }
     if state.wall is not None:
@@ -128,6 +139,7 @@ def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
             "verdict": verdict.names[0],
             "frequency": float(verdict.frequency),
             "spectral_radius": None if radius is None else float(radius),
+            "unheld_positions": int(getattr(verdict, "unheld", 0)),
         }
     period = point.controller.sampling_period
     numbers["sampling_period"] = float(period)
@@ -212,22 +224,32 @@ def _several(wanted: Mapping[str, Callable[[], Chart]]) -> Contents:
     for name, compute in wanted.items():
         try:
             chart = compute()
-        except (ArithmeticError, ValueError) as error:
-            head[name] = {"reason": str(error)}
+            outline = rings(chart.regions)
+        except (ArithmeticError, ValueError, ChartError) as error:
+            head[name] = {"reason": _said(error)}
             continue
         head[name] = {"stiffness_max": chart.stiffness_max}
-        arrays |= {f"{name}.{key}": value for key, value in rings(chart.regions).items()}
+        arrays |= {f"{name}.{key}": value for key, value in outline.items()}
     return {"charts": head}, arrays
+
+
+def _said(error: Exception) -> str:
+    """Why there is nothing to show, in a sentence."""
+    return f"this is undecided: {error}" if isinstance(error, ChartError) else str(error)
 
 
 def _guarantees(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
     """The walls with each guarantee."""
     head: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
-    for one in point.guarantees().guarantees:
+    found = point.guarantees()
+    for one in found.guarantees:
         head[one.name] = {"stiffness_max": one.region.stiffness_max}
+        if one.region.reason is not None:
+            head[one.name]["reason"] = one.region.reason
         arrays |= {f"{one.name}.{key}": value for key, value in rings(one.region.rings).items()}
-    return {"regions": head}, arrays
+    caveats = [premise.reason for premise in found.premises if premise.reason]
+    return {"regions": head, "caveats": caveats, "premises": [one.document() for one in found.premises]}, arrays
 
 
 def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
@@ -336,6 +358,8 @@ def _face(name: str) -> Layer:
 
 
 def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    if point.turns:
+        raise ValueError(f"the mouse {ABOUT_AN_AXIS}")
     return touch_blocks(point)
 
 

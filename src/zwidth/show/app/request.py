@@ -102,7 +102,7 @@ class OpenRequest(Request):
 class ViewRequest(Request):
     """What is drawn while a number is dragged.
 
-    nearest  take the nearest position where the handle cannot be at that of the state
+    nearest  take an answered position where the handle cannot be at that of the state
     """
 
     kind: Literal["view"]

@@ -90,22 +90,19 @@ class ChartCommand(Command):
         return wall_law.circumstances(case)
 
     def compute(self, case: CommandLine) -> Chart:
-        return wall_law.operating_point(case).chart()
+        return wall_law.operating_point(case).chart().drawn()
 
     def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
         from zwidth.chart.measured.chart import MeasuredChart
-        from zwidth.chart.several_directions.chart import MultiChart
 
         more: dict[str, Any] = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
-        if isinstance(result, MultiChart):
-            more = {"decided": not result.doubt}
         return result.document() | more
 
     def reason(self, case: CommandLine, result: Chart) -> str | None:
-        if doubt := getattr(result, "doubt", ""):
-            return f"this is undecided: {doubt}"
         if result.stiffness_max == result.stiffness_max:
             return None
+        if doubt := getattr(result, "doubt", ""):
+            return f"no stable wall with K > 0 and B >= 0 was found; this is undecided: {doubt}"
         from zwidth.chart.measured.chart import MeasuredChart
 
         return no_measured_wall(result) if isinstance(result, MeasuredChart) else NO_WALL
@@ -113,6 +110,8 @@ class ChartCommand(Command):
     def pages(self, case: CommandLine, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
         if document.get("warning"):
             yield f"warning: {document['warning']}"
+        if document.get("decided") is False and result.regions:
+            yield f"warning: {document['reason']}"
         from zwidth.chart.measured.chart import MeasuredChart
 
         last = measured_rows(result) if isinstance(result, MeasuredChart) else ()
@@ -128,9 +127,10 @@ class ChartCommand(Command):
 
 
 def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
-    yield "largest stiffness", _stiffest(chart)
-    yield "largest damping", _most_damped(chart)
-    yield "stable area", amount(chart.stable_area, "N²s/m²")
+    found = " found" if getattr(chart, "doubt", "") else ""
+    yield f"largest stiffness{found}", _stiffest(chart)
+    yield f"largest damping{found}", _most_damped(chart)
+    yield f"stable area{found}", amount(chart.stable_area, "N²s/m²")
     yield from _decays(chart.fastest_decay_in_first_quadrant, chart.fastest_decay)
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"

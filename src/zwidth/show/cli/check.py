@@ -72,6 +72,8 @@ class CheckCommand(Command):
             yield two_columns(law)
         frequency = "nearest edge at" if case.point.charted_by_response else "its frequency"
         yield table(["stiffness", "damping", "verdict", "spectral radius", frequency], rows)
+        if any(point.get("unheld_positions") for point in points[:SHOWN]):
+            yield "with K = 0 the device stays wherever it is left: the root z = 1 of that position is set aside"
         if len(points) > SHOWN:
             yield f"and {len(points) - SHOWN} more; --json or --output holds them all"
 

@@ -218,9 +218,9 @@ class Command:
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
         """What a figure states of itself: the circumstances, and the wall where the answer is about one."""
-        from zwidth.show.figures.caption import wall_of_document
+        from zwidth.show.figures.caption import doubt_of_document, wall_of_document
 
-        return self.circumstances(case) | wall_of_document(document)
+        return self.circumstances(case) | wall_of_document(document) | doubt_of_document(document)
 
     def unanswered(self, case: CommandLine, none: NoAnswer) -> Answer:
         """The answer where there is none: every key null, and why."""
@@ -252,11 +252,19 @@ class Command:
             case.question.point(case.device)  # refuses options that need a model for a [response]
             none = self.unanswered(case, NoAnswer(self.no_response))
             return replace(none, document=case.question.linear_circumstances(case.device) | none.document)
+        from zwidth.chart.edge_by_eigenvalues import ChartError
+
         try:
             with translate_errors(case.question):
                 result = self.compute(case)
+            return self._stated(case, result)
         except NoAnswer as none:
             return self.unanswered(case, none)
+        except ChartError as error:  # of a chart that is drawn only as it is stated
+            return self.unanswered(case, NoAnswer(f"this is undecided: {error}", decided=False))
+
+    def _stated(self, case: CommandLine, result: Any) -> Answer:
+        """The answer that a result gives; writes the output file where one is named."""
         reason = self.reason(case, result)
         document = self.circumstances(case) | self.document(case, result)
         if self.answers_by_fit and case.device.response is not None:

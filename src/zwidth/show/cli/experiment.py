@@ -182,7 +182,7 @@ class ExperimentCommand(Command):
         return {"measured": () if measured is None else read_points(measured), "plan": _plan(case)}
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return super().circumstances(case) | {"left_out": []}
+        return {"left_out": []} | super().circumstances(case)
 
     def compute(self, case: CommandLine) -> Experiment:
         from zwidth.contact.boundary_experiment import NoStableWallError

@@ -12,6 +12,7 @@ import click
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.show.cli.heading import omissions
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
 from zwidth.show.cli.resumable import (
@@ -25,6 +26,7 @@ from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
+    from zwidth.device.device import Device
     from zwidth.study.safe_walls.table import SafeWalls
 
 HEADER: Final = ".h"
@@ -203,6 +205,8 @@ class ExportCommand(Command):
         from zwidth.study.workspace.plane_grid import PlaneError
 
         question, device = case.question, case.device
+        if case["arduino"] is not None:
+            _check_sketch(question.name, device)
         try:
             job = safe_walls_job(
                 device,
@@ -284,7 +288,7 @@ class ExportCommand(Command):
     def pages(self, case: CommandLine, result: SafeWalls, document: Mapping[str, Any]) -> Iterator[Any]:
         yield f"{printable(result.device.name)}: walls that are stable {_for_whom(result)}"
         if document["left_out"]:
-            yield f"linear: leaves out {', '.join(document['left_out'])}; `zwidth simulate` has them"
+            yield from omissions(case.device, case.question.model)
         yield two_columns(list(_rows(result)))
         yield from (printable(reason) for reason in result.reasons)
 
@@ -298,6 +302,14 @@ def _check_folder(folder: Path) -> None:
         )
     if not os.access(where, os.W_OK):
         raise BadInput(f"--arduino: {printable(str(where))} cannot be written into; name a folder elsewhere")
+
+
+def _check_sketch(name: str, device: Device) -> None:
+    """Raise BadInput for a device whose loop the sketch does not compute."""
+    from zwidth.show.safe_walls.header import sketch_obstacle
+
+    if obstacle := sketch_obstacle(device.controller):
+        raise BadInput(f"--arduino: {printable(name)}: {obstacle}")
 
 
 def _for_whom(table: SafeWalls) -> str:

@@ -33,6 +33,7 @@ class FeltCommand(Command):
         "stiffness_max_N_per_m",
         "static_stiffness_at_stiffness_max_N_per_m",
         "static_stiffness_limit_N_per_m",
+        "static_stiffness_limit_kind",
         "frequency_Hz",
         "impedance_real_Ns_per_m",
         "impedance_imag_Ns_per_m",
@@ -75,6 +76,8 @@ class FeltCommand(Command):
 
 
 def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
+    from zwidth.measures.felt import LIMIT_HEADINGS, LIMIT_WORDS
+
     wall = f"{amount(felt_wall.wall_stiffness, 'N/m')}, {amount(felt_wall.wall_damping, 'Ns/m')}"
     yield "wall", f"{wall}: {felt_wall.verdict}"
     if felt_wall.static_stiffness is not None:
@@ -86,5 +89,5 @@ def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
     if felt_wall.stiffness_max is not None:
         hardest = amount(felt_wall.static_stiffness_at_stiffness_max, "N/m")
         yield "hardest felt contact", f"{hardest}, of a wall of {amount(felt_wall.stiffness_max, 'N/m')}"
-    if felt_wall.static_stiffness_limit < float("inf"):
-        yield "no wall is felt above", amount(felt_wall.static_stiffness_limit, "N/m")
+    kind = felt_wall.static_stiffness_limit_kind
+    yield LIMIT_HEADINGS[kind], LIMIT_WORDS.get(kind) or amount(felt_wall.static_stiffness_limit, "N/m")

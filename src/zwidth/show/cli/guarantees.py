@@ -73,11 +73,16 @@ class GuaranteesCommand(Command):
         return case.point.guarantees(coupling=case["coupling"], wall=wall, progress=case.progress)
 
     def reason(self, case: CommandLine, result: Guarantees) -> str | None:
-        return NOTHING if result.is_empty else None
+        return result.refusal or (NOTHING if result.is_empty else None)
 
     def pages(self, case: CommandLine, result: Guarantees, document: Mapping[str, Any]) -> Iterator[Any]:
-        rows = [(one.name, _largest(one.region), one.meaning) for one in result.guarantees]
+        withheld = result.refusal
+        rows = [
+            (one.name, "none" if one.region.reason == withheld is not None else _largest(one.region), one.meaning)
+            for one in result.guarantees
+        ]
         yield table(["guarantee", "largest stiffness", "what it means"], rows)
+        yield from (premise.reason for premise in result.premises if premise.holds is None)
         coupled = result.couplings
         if coupled is None:
             return

@@ -34,10 +34,15 @@ def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     held = f", held by {operator_text(facts['operator'])}" if facts["operator"] else ""
     held += "" if device.load is None else f", under {load_text(device.load)}"
     lines = [f"{printable(device.name)}: {place}{held}", computer_text(device.controller)]
-    return "\n".join(lines + ([omission(device)] if linear and device.linear_omissions else []))
+    return "\n".join([*lines, *omissions(device, question.model, linear=linear)])
 
 
-def omission(device: Device) -> str:
-    """Parts of a device that a linear answer leaves out."""
-    simulated = "" if device.response is not None else "; `zwidth simulate` has them"
-    return omission_text(device.linear_omissions) + simulated
+def omissions(device: Device, model: str | None = None, *, linear: bool = True) -> list[str]:
+    """Lines on what an answer leaves out: parts that are not linear, and what a load does to links that bend."""
+    from zwidth.loop.linear_omissions import load_omissions
+
+    lines = []
+    if linear and device.linear_omissions:
+        simulated = "" if device.response is not None else "; `zwidth simulate` has them"
+        lines.append(omission_text(device.linear_omissions) + simulated)
+    return lines + list(load_omissions(device.mechanism, device.load, model))

@@ -129,6 +129,10 @@ class IdentifyCommand(Command):
         )
         return found
 
+    def document(self, case: CommandLine, result: Identification) -> dict[str, Any]:
+        of_load = self.circumstances(case).get("left_out", [])
+        return result.document() | {"left_out": [*of_load, *result.left_out]}
+
     def reason(self, case: CommandLine, result: Identification) -> str | None:
         return result.reason
 
@@ -145,7 +149,10 @@ class IdentifyCommand(Command):
         explained = f"{100.0 * share:.6g} % of the variance explained, " if share == share else ""
         yield f"validation: {explained}{result.validated_on}"
         yield from result.remarks
-        if result.settings and not case["write"] and Path(case.question.name).is_file():
+        yield from result.left_out
+        if result.not_written:
+            yield result.not_written
+        elif result.settings and not case["write"] and Path(case.question.name).is_file():
             yield f"to write them into {printable(case.question.name)}, comments kept: add --write"
 
     def write(
@@ -158,7 +165,7 @@ class IdentifyCommand(Command):
 
     def write_others(self, case: CommandLine, result: Identification) -> dict[str, Path]:
         """The device file with the numbers, where that is wanted and there are some."""
-        if not case["write"] or not result.settings:
+        if not case["write"] or result.not_written or not result.settings:
             return {}
         from zwidth.device.edit_file import edited_text
         from zwidth.identify.identification import interval, written_value
@@ -167,10 +174,12 @@ class IdentifyCommand(Command):
         sources = {
             one.path: f"measured ({', '.join(case['files'])}): {interval(one)} {one.unit} with 95 %"
             for one in result.estimates
-            if one.path
+            if one.path in result.settings
         }
         path = destination(case.question.name, (".toml",))
-        values = result.settings | {one.path: written_value(one) for one in result.estimates if one.path}
+        values = result.settings | {
+            one.path: written_value(one) for one in result.estimates if one.path in sources
+        }
         write_text(path, edited_text(path, values, sources))
         return {"written": path}
 
@@ -339,7 +348,7 @@ class ArmCommand(IdentifyCommand):
     summary = "Inertia, friction and effective mass of a mechanism, from its joints."
     examples = (
         "zwidth identify arm moved.csv --device my-device.toml --gravity 0,-9.81",
-        "zwidth identify arm moved.csv --device my-device.toml --torque commanded --write",
+        "zwidth identify arm moved.csv --device my-device.toml --torque commanded",
     )
     options = (
         click.option(
@@ -366,6 +375,13 @@ class ArmCommand(IdentifyCommand):
         ),
     )
     takes_point = True
+
+    def check(self, case: CommandLine) -> None:
+        super().check(case)
+        if case["write"]:
+            from zwidth.identify.arm.identify import NOT_WRITTEN
+
+            raise BadInput(f"--write: {NOT_WRITTEN}")
 
 
 class ModesCommand(IdentifyCommand):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +22,11 @@ if TYPE_CHECKING:
 
     from zwidth.contact.friction_quantisation_plane import DevicePlane
     from zwidth.contact.harmonic_balance import LimitCycle
-    from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration
+    from zwidth.contact.limit_cycle_prediction import (
+        LimitCycleAnswer,
+        LimitCyclePrediction,
+        SimulatedVibration,
+    )
 
 FRICTION_KEYS: Final = ("friction.coulomb_N", "mechanism.drives.*.coulomb_Nm")  # of a [plant], of a [mechanism]
 ENCODER_KEYS: Final = ("loop.encoder.resolution_m", "mechanism.drives.*.encoder_counts_per_rev")
@@ -66,6 +71,7 @@ class LimitCyclesCommand(Command):
         "nonlinear",
         "predicted_by",
         "limit_cycles",
+        "contradicted",
         "otherwise",
         "largest_motion_m",
         "leaves_range",
@@ -120,10 +126,9 @@ class LimitCyclesCommand(Command):
     def pages(self, case: CommandLine, result: LimitCyclePrediction, document: Mapping[str, Any]) -> Iterator[Any]:
         yield two_columns(list(_circumstances(case, result)))
         if result.cycles:
-            headings = ["limit cycle", "frequency", "speed", "commanded force", "kind", "simulated"]
-            yield table(headings, list(_rows(result)))
+            yield table(_headings(result), list(_rows(result)))
         else:
-            yield "no limit cycle is predicted"
+            yield result.none_found
         yield from _remarks(result)
 
     def write_others(self, case: CommandLine, result: LimitCyclePrediction) -> dict[str, Path]:
@@ -177,18 +182,43 @@ def _up_to(stiffness: float | None) -> str:
     return f"on walls up to {amount(stiffness, 'N/m')}" if stiffness else "on no wall"
 
 
+def _says_source(prediction: LimitCyclePrediction) -> bool:
+    """Whether the table has a column of what each cycle is from: not where all are from the prediction."""
+    return any(answer.source == "simulation" for answer in prediction.answers)
+
+
+def _headings(prediction: LimitCyclePrediction) -> list[str]:
+    source = ["from"] if _says_source(prediction) else []
+    return ["limit cycle", "frequency", *source, "speed", "commanded force", "kind", "simulated"]
+
+
 def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
     from zwidth.contact.limit_cycle_prediction import cycle_speed
 
-    for cycle, simulated in zip(prediction.cycles, prediction.simulated, strict=True):
+    for answer in prediction.answers:
+        cycle = answer.cycle
+        source = ["simulation" if answer.source == "simulation" else "prediction"]
         yield (
             amount(cycle.amplitude, "m"),
             amount(cycle.frequency_Hz, "Hz"),
+            *(source if _says_source(prediction) else []),
             amount(cycle_speed(cycle), "m/s"),
-            amount(cycle.force_amplitude, "N"),
+            "" if isnan(cycle.force_amplitude) else amount(cycle.force_amplitude, "N"),
             _kind(cycle),
-            _vibration_text(simulated) if simulated else "",
+            _simulated_text(answer),
         )
+
+
+def _simulated_text(answer: LimitCycleAnswer) -> str:
+    """What the simulation says of a cycle."""
+    if answer.simulated is None:
+        return "" if not answer.cycle.stable or not answer.cycle.within_range else "not confirmed: not simulated"
+    if answer.source == "simulation":
+        predicted = answer.predicted
+        if predicted is None:
+            return "none is predicted"
+        return f"predicted: {amount(predicted.amplitude, 'm')} at {amount(predicted.frequency_Hz, 'Hz')}"
+    return ("" if answer.confirmed else "not confirmed: ") + _vibration_text(answer.simulated)
 
 
 def _kind(cycle: LimitCycle) -> str:
@@ -199,7 +229,7 @@ def _kind(cycle: LimitCycle) -> str:
 
 
 def _vibration_text(simulated: SimulatedVibration) -> str:
-    if simulated.behaviour == "converged":
+    if simulated.behaviour in ("converged", "decaying"):
         return "comes to rest"
     return f"{simulated.behaviour}, {amount(simulated.amplitude, 'm')} at {amount(simulated.frequency, 'Hz')}"
 
@@ -210,9 +240,13 @@ def _remarks(prediction: LimitCyclePrediction) -> Iterator[str]:
         yield f"simulated from {amount(small.start, 'm')}: {_vibration_text(small)}"
     if prediction.simulation_disagrees:
         yield (
-            "the simulation disagrees with the prediction; trust the simulation: several vibrations are possible "
-            "here, and the prediction follows one of them"
+            "the simulation disagrees with the prediction, which is an approximation; what is simulated is "
+            "given in its place"
         )
+    for answer in prediction.contradicted:
+        if answer.simulated is not None:
+            gone = f"{amount(answer.cycle.amplitude, 'm')} at {amount(answer.cycle.frequency_Hz, 'Hz')}"
+            yield f"predicted, and not there when simulated: {gone} ({_vibration_text(answer.simulated)})"
     if prediction.leaves_range:
         yield "vibrations that grow leave this range: what stops them is not modelled"
     yield f"predicted by {prediction.predicted_by}"

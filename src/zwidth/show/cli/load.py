@@ -107,10 +107,12 @@ class LoadCommand(Command):
         return result.reason
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return case.question.linear_circumstances(_unpushed(case))
+        facts = case.question.linear_circumstances(_unpushed(case))
+        return facts | {"left_out": [*case.device.linear_omissions, *_of_push(case)]}
 
     def heading(self, case: CommandLine) -> str:
-        return heading(case.question, _unpushed(case))
+        shown, of_push = heading(case.question, _unpushed(case)), _of_push(case)
+        return "\n".join([shown, *(text for text in of_push if text not in shown)])
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
         return super().caption_facts(case, document) | {"varied": ["the hand's push"]}
@@ -140,6 +142,14 @@ def _bare(case: CommandLine) -> Device:
     from zwidth.device.load import device_without_load
 
     return device_without_load(case.device)
+
+
+def _of_push(case: CommandLine) -> tuple[str, ...]:
+    """What the charts under a push leave out of it: of links that bend."""
+    from zwidth.loop.linear_omissions import load_omissions
+    from zwidth.model.load import Load
+
+    return load_omissions(case.device.mechanism, Load(push=case["push"]), case.question.model)
 
 
 def _unpushed(case: CommandLine) -> Device:

@@ -202,7 +202,7 @@ class MapCommand(Command):
         facts = super().circumstances(case)
         del facts["position_m"]
         linear = any(measure.linear for measure in case["measures"])
-        facts |= {} if linear else {"left_out": []}
+        facts |= {} if linear else {"left_out": case.question.circumstances(case.device).get("left_out", [])}
         return facts if case["extreme"] is None else facts | {"direction": case["extreme"]}
 
     def compute(self, case: CommandLine) -> MapResult:

@@ -10,7 +10,7 @@ import numpy as np
 from zwidth.measures.definition import OK, STATUS
 from zwidth.show.circumstances import computer_text, load_text
 from zwidth.show.cli.answer import two_columns
-from zwidth.show.cli.heading import omission
+from zwidth.show.cli.heading import omissions
 from zwidth.show.output import printable
 from zwidth.show.units import amount, area_text, percent, typed, vector
 
@@ -58,7 +58,7 @@ def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
     which = f"{way + ', ' if along else ''}assembly {about['assembly']}, model {about['model']}{held}"
     lines = [f"{printable(device.name)}: {plane}, {which}", computer_text(device.controller)]
     linear = any(dataset[name].attrs["linear"] for name in names)
-    return "\n".join(lines + ([omission(device)] if linear and device.linear_omissions else []))
+    return "\n".join([*lines, *omissions(device, str(about["model"]), linear=linear)])
 
 
 def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Iterator[tuple[str, str]]:

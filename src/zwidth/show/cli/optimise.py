@@ -1,4 +1,4 @@
-"""`zwidth optimise`: the best designs of a study, and what cannot be had together."""
+"""`zwidth optimise`: the best designs found of a study, and what cannot be had together."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.device.faults import comma_list
+from zwidth.show.circumstances import omission_text
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
@@ -41,14 +42,15 @@ def _designs_option(command: Callback) -> Callback:
 
 
 class OptimiseCommand(Command):
-    """Find the best designs of a device for a task: variables, objectives and demands, described in STUDY.toml.
+    """Look for the best designs of a device for a task: variables, objectives and demands, from STUDY.toml.
 
-    The front holds designs of which none is better in every objective. With --resume a run can be stopped, and the
+    The front holds those of the designs tried of which none is better than another in every objective; whether a
+    better one lies within the bounds is not known. With --resume a run can be stopped, and the
     same command continues it.
     """
 
     name = "optimise"
-    summary = "Find the best designs, described by a study file."
+    summary = "Look for the best designs, described by a study file."
     examples = (
         "zwidth optimise my-study.toml",
         "zwidth optimise my-study.toml --output before-and-after.html --designs better",
@@ -69,7 +71,8 @@ class OptimiseCommand(Command):
             _check_designs(Path(case["designs"]), case.question.study)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return circumstances_of_study(case)
+        assert isinstance(case.question, StudyQuestion)
+        return circumstances_of_study(case, case.question.study)
 
     def compute(self, case: CommandLine) -> Optimisation:
         from zwidth.measures.definition import MeasureError
@@ -98,7 +101,7 @@ class OptimiseCommand(Command):
         said = [printable(typed(sentence)) for sentence in sentences(result)]
         yield f"{printable(document['name'])}: {said[0]}"
         if document["left_out"]:
-            yield f"linear: leaves out {', '.join(document['left_out'])}"
+            yield omission_text(document["left_out"])
         if len(result.front):
             yield table(*front_table(result))
         yield from said[1:]
@@ -183,10 +186,9 @@ def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
     if found.baseline is not None:
         own = [axis_value_text(value) for value in own_values(problem)]
         rows.append(["as it is", *own, *(typed(number(value)) for value in found.baseline.values[0].tolist())])
-    word = "best" if len(problem.objectives) == 1 else "knee"
     for place in range(len(found.front)):
         design = found.design(place)
         settings = [axis_value_text(design[axis.key]) for axis in problem.variables]
         values = [typed(number(value)) for value in found.values[place].tolist()]
-        rows.append([f"{place + 1} {word}" if place == found.knee else str(place + 1), *settings, *values])
+        rows.append([f"{place + 1} {found.word}" if place == found.knee else str(place + 1), *settings, *values])
     return headings, rows

@@ -110,7 +110,7 @@ class Question:
 
     def linear_circumstances(self, device: Device) -> dict[str, Any]:
         """What a linear result states first: its circumstances, and what of the device it leaves out."""
-        return self.circumstances(device) | {"left_out": list(device.linear_omissions)}
+        return self.circumstances(device) | {"left_out": list(device.omissions(self.model))}
 
     def _where(self, device: Device) -> tuple[Floats | None, float | None]:
         """Position of the handle [m], and how far it was projected; as typed, and None, if out of reach."""
@@ -126,7 +126,10 @@ class Question:
 
     def circumstances(self, device: Device) -> dict[str, Any]:
         """Name, place and sampling as a result states them; null where inapplicable."""
+        from zwidth.loop.linear_omissions import load_omissions
+
         mechanism = device.mechanism is not None
+        of_load = load_omissions(device.mechanism, device.load, self.model)
         position, projected = self._where(device) if mechanism else (None, None)
         return {
             "name": device.name,
@@ -140,6 +143,7 @@ class Question:
             **({} if device.load is None else {"load": device.document["load"]}),
             "sampling_period_s": device.controller.sampling_period,
             "delay_samples": device.controller.delay,
+            **({"left_out": list(of_load)} if of_load else {}),
         }
 
     def _rendered(self, device: Device) -> dict[str, Any]:

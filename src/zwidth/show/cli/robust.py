@@ -99,6 +99,8 @@ class RobustCommand(Command):
         "fastest_decay_in_first_quadrant",
         "unobserved_modes",
         "members",
+        "unknown_members",
+        "numbers_hold_for",
         "failed",
         "binding",
         "best_by_area",
@@ -134,7 +136,7 @@ class RobustCommand(Command):
             faults = (fault.spelled(lambda name, _: ARGUMENT_NAMES[name]) for fault in error.faults)
             raise BadInput(*(f"--range: {fault}" for fault in faults)) from None
         except RobustError as error:
-            raise NoAnswer(str(error)) from None
+            raise NoAnswer(str(error), decided=False) from None
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
         from zwidth.show.figures.caption import facts_of_members
@@ -151,6 +153,8 @@ class RobustCommand(Command):
         return f"no wall with K > 0 and B >= 0 is stable for every member; {group}: {'; '.join(names)}"
 
     def pages(self, case: CommandLine, result: RobustStudy, document: Mapping[str, Any]) -> Iterator[Any]:
+        if result.doubt:
+            yield f"warning: this is undecided: {printable(result.doubt)}"
         if not result.chart.members_at_stiffness_max:
             return
         yield two_columns(list(_rows(result)))
@@ -215,8 +219,9 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     chart = study.chart
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     members = " and ".join(_member(study, member) for member in chart.members_at_stiffness_max)
+    of_whom = " (charted members)" if study.unknown_members else " (in doubt)" if study.doubt else ""
     yield (
-        "largest stiffness",
+        f"largest stiffness{of_whom}",
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
         f"at this limit {members} oscillates at {frequencies}",
     )
@@ -228,15 +233,15 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
             f"{typed(percent(chart.lost_share))} of its area ({widest})"
         ),
     )
-    yield "largest damping", amount(chart.damping_max, "Ns/m")
-    yield "stable area", amount(chart.stable_area, "N²s/m²")
+    yield f"largest damping{of_whom}", amount(chart.damping_max, "Ns/m")
+    yield f"stable area{of_whom}", amount(chart.stable_area, "N²s/m²")
     yield "members", _members_text(study)
     if chart.failed:
         first = next(iter(chart.failed))
         yield (
             "not charted",
             (
-                f"{len(chart.failed)} members, of which nothing is claimed; the first, "
+                f"{len(chart.failed)} members, of which nothing is known; the first, "
                 f"{member_text(first, study.members[first])}: {printable(chart.failed[first])}"
             ),
         )
@@ -263,7 +268,11 @@ def _member(study: RobustStudy, member: int) -> str:
 def _members_text(study: RobustStudy) -> str:
     count, edge_change = len(study.members), f"{typed(uncertain(100 * study.area_change))} %"
     if study.violation is None:
-        return f"{count}, the whole list"
+        return (
+            f"{count}, the whole list"
+            if not study.chart.failed
+            else f"{count}, {len(study.chart.charted)} charted"
+        )
     if study.settled:
         end = f"the search converged: its last round moved the edge by {edge_change} of the area"
     else:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 BEHAVIOUR_VERDICTS: Final = {
     "converged": "stable: it comes to rest",
     "decaying": "stable: the vibration dies away",
+    "drifting": "stable: it moves on steadily under the push, as no stiffness holds a position",
     "growing": "not stable: the vibration grows",
     "limit cycle": "not stable: a limit cycle, which neither grows nor dies away",
     "bouncing": "not stable: it bounces in and out without an end",

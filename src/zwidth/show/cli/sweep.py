@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.circumstances import load_text
+from zwidth.show.circumstances import load_text, omission_text
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
@@ -71,7 +71,18 @@ def about_a_study(command: Callback, *, bounds: bool = False) -> Callback:
     return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
 
 
-def circumstances_of_study(case: CommandLine) -> dict[str, Any]:
+def _omissions_of_study(device: Device, study: Study) -> tuple[str, ...]:
+    """What the answers about a study leave out; a load may be what its designs differ in."""
+    from zwidth.loop.linear_omissions import STRAIGHT, load_omissions
+
+    of_load = load_omissions(device.mechanism, device.load, study.model)
+    varies = any(axis.key.split(".")[0] == "load" for axis in study.sampling.axes)
+    if varies and device.mechanism is not None and device.mechanism.flexible and study.model != "rigid":
+        of_load = (STRAIGHT,)
+    return device.linear_omissions + of_load
+
+
+def circumstances_of_study(case: CommandLine, study: Study) -> dict[str, Any]:
     """What an answer about a study states first; designs may differ in posture, direction, model and delay."""
     device = case.device
     return {
@@ -81,7 +92,7 @@ def circumstances_of_study(case: CommandLine) -> dict[str, Any]:
         "operator": device.operator_name,
         **({} if device.load is None else {"load": device.document["load"]}),
         "sampling_period_s": device.controller.sampling_period,
-        "left_out": list(device.linear_omissions),
+        "left_out": list(_omissions_of_study(device, study)),
     }
 
 
@@ -115,7 +126,8 @@ class SweepCommand(Command):
         check_workers(case.options)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return circumstances_of_study(case)
+        assert isinstance(case.question, StudyQuestion)
+        return circumstances_of_study(case, case.question.study)
 
     def compute(self, case: CommandLine) -> Sweep:
         from zwidth.measures.definition import MeasureError
@@ -168,7 +180,7 @@ class SweepCommand(Command):
         under = "" if load is None or varied else f", under {load_text(load)}"
         yield f"{printable(document['name'])}: {over} over {axes}{under}"
         if document["left_out"]:
-            yield f"linear: leaves out {', '.join(document['left_out'])}"
+            yield omission_text(document["left_out"])
         if result.study.document.get("optimise"):
             yield "[optimise] is not used: a sweep computes the designs that the axes name"
         if result.study.document.get("tolerance"):

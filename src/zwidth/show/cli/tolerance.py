@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.circumstances import omission_text
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
@@ -110,7 +111,8 @@ class ToleranceCommand(Command):
         return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
-        return circumstances_of_study(case)
+        assert isinstance(case.question, ToleranceFile)
+        return circumstances_of_study(case, case.question.asked.study)
 
     def check(self, case: CommandLine) -> None:
         check_workers(case.options)
@@ -141,7 +143,7 @@ class ToleranceCommand(Command):
         devices = f"{question.samples} device{'s' * (question.samples != 1)} drawn"
         yield f"{printable(document['name'])}: {devices}, seed {question.seed}"
         if document["left_out"]:
-            yield f"linear: leaves out {', '.join(document['left_out'])}"
+            yield omission_text(document["left_out"])
         asked = case.question
         if isinstance(asked, ToleranceFile) and asked.aside:
             yield f"{' and '.join(asked.aside)} is not used: the devices are those of the device file"

@@ -65,6 +65,7 @@ def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) ->
 
     facts  under the keys with which a result states its circumstances; a key that is missing or None is left out
     """
+    doubt = f"In doubt: {printable(str(facts['doubt']))}" if facts.get("doubt") else ""
     first = [part for part in _place(facts) if part]
     name = printable(str(facts.get("name") or ""))
     about = f"{name}: {', '.join(first)}" if name and first else name or ", ".join(first)
@@ -73,7 +74,7 @@ def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) ->
         last.append(f"varied: {', '.join(map(printable, varied))}")
     if left_out := facts.get("left_out"):
         last.append(omission_text(left_out))
-    return [paragraph for paragraph in (about, "; ".join(last)) if paragraph]
+    return [paragraph for paragraph in (doubt, about, "; ".join(last)) if paragraph]
 
 
 def caption_of_result(result: Any) -> list[str]:
@@ -81,7 +82,7 @@ def caption_of_result(result: Any) -> list[str]:
     at = result.operating_point or getattr(result, "point", None)
     linear = type(result).__name__ not in NONLINEAR
     if at is not None:
-        facts = facts_of_point(at, linear=linear) | facts_of_wall(result)
+        facts = facts_of_point(at, linear=linear) | facts_of_wall(result) | facts_of_doubt(result)
         facts |= {"directions": None} if type(result).__name__ in ROUND_A_PLANE else {}
         facts |= facts_of_members(getattr(result, "members", ()))
         return caption_of_facts(facts, at.controller)
@@ -89,17 +90,19 @@ def caption_of_result(result: Any) -> list[str]:
         return caption_of_facts(facts_of_study(study), study.device.controller)
     if (circumstances := getattr(result, "circumstances", None)) is not None:
         return caption_of_facts(circumstances, None)
+    doubt = facts_of_doubt(result)
     loop = getattr(result, "loop", None) or getattr(getattr(result, "chart", None), "loop", None)
     if loop is None:
-        return []
+        return caption_of_facts(doubt, None)
     nonlinear = getattr(loop, "nonlinear", None)
     left_out = nonlinear.kinds if linear and nonlinear is not None else ()
-    return caption_of_facts({"left_out": left_out} | facts_of_wall(result), loop.controller)
+    return caption_of_facts({"left_out": left_out} | facts_of_wall(result) | doubt, loop.controller)
 
 
 def facts_of_point(at: OperatingPoint, *, linear: bool = True) -> dict[str, Any]:
     """Facts of an operating point for a caption; without position and direction where there are many."""
-    facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": at.linear_omissions if linear else ()}
+    omitted = (at.linear_omissions if linear else ()) + at.load_omissions
+    facts: dict[str, Any] = {"name": at.name, "model": at.model, "left_out": omitted}
     if at.model != "motor-mass" and (at.operator is not None or at.arm is not None):
         facts["operator"] = at.operator_name or AS_GIVEN
     if at.load is not None:
@@ -135,7 +138,7 @@ def facts_of_study(study: Any) -> dict[str, Any]:
         facts["operator"] = ", ".join(task.operators) or facts["operator"]
     varied_facts = {"at": "position_m"}
     fixed = {key: value for key, value in facts.items() if key not in {varied_facts.get(k, k) for k in keys}}
-    return fixed | {"varied": keys, "left_out": device.linear_omissions}
+    return fixed | {"varied": keys, "left_out": device.omissions(study.model)}
 
 
 def wall_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -144,6 +147,18 @@ def wall_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
         return {key: document.get(key) for key in ("environment", "parameters")}
     values = {name: document.get(f"wall_{name}_{unit}") for name, unit in WALL_UNITS.items()}
     return {} if values["stiffness"] is None else {"environment": "wall", "parameters": values}
+
+
+def doubt_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What is in doubt about a result, from its document; {} where it is decided."""
+    reason = document.get("reason")
+    return {"doubt": reason} if document.get("decided") is False and reason else {}
+
+
+def facts_of_doubt(result: Any) -> dict[str, Any]:
+    """What is in doubt about a chart, or a study of charts; {} where nothing is."""
+    doubt = getattr(result, "doubt", "")
+    return {"doubt": doubt} if isinstance(doubt, str) and doubt else {}
 
 
 def facts_of_wall(result: Any) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def draw_decay_contours(
     draw_level(ax, chart, "1 (edge of stability)", 0, 1)
     for n, radius in enumerate(levels):
         try:
-            level = stability_chart(loop, radius, decay=False)
+            level = stability_chart(loop, radius, decay=False).drawn()
         except ChartError:  # a sliver too fine to close: this level is left out of the drawing, and its legend
             continue
         draw_level(ax, level, _meaning(radius, loop.period), n + 1, len(levels) + 1)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from zwidth.measures.felt import LIMIT_HEADINGS
 from zwidth.measures.felt_chart import FeltChart
 from zwidth.show.figures.style import (
     BLACK,
@@ -61,8 +62,8 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
     if isfinite(chart.stiffness_max):
         text = f"hardest felt contact: {quantity(chart.stiffness_max, 'N/m')}"
         ax.axvline(chart.stiffness_max, color=VERMILION, linewidth=0.9, linestyle=":", label=text)
-    if isfinite(chart.limit) and chart.limit < 4.0 * widest:
-        text = f"no wall is felt above {quantity(chart.limit, 'N/m')}"
+    if 0.0 < chart.limit < 4.0 * widest:
+        text = f"{LIMIT_HEADINGS[chart.limit_kind]} {quantity(chart.limit, 'N/m')}"
         ax.axvline(chart.limit, color=GREY, linestyle=(0, (6, 3)), linewidth=0.9, label=text)
         widest = max(widest, chart.limit)
     walls = np.vstack(chart.regions) if chart.regions else np.array([[0.0, 0.0], [1.0, 1.0]])

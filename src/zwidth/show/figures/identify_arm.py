@@ -49,4 +49,6 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
     ax.set_yticklabels(["0"] * len(measured))
     label(ax.xaxis, "Time", "s")
     ax.set_ylabel("Torque over its largest")
+    for text in identification.left_out[:1]:
+        ax.text(0.01, 0.01, text.partition(":")[0], transform=ax.transAxes, fontsize=6.5)
     legend_above(ax, columns=2)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from zwidth.contact.friction_quantisation_plane import DevicePlane
-from zwidth.contact.harmonic_balance import HarmonicBalance
+from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle
+from zwidth.contact.limit_cycle_prediction import LimitCycleAnswer, LimitCyclePrediction
 from zwidth.show.figures.style import BLACK, BLUE, GREY, STABLE, VERMILION, legend_above, number_logarithmic
 from zwidth.show.units import as_written, quantity
 
@@ -18,30 +21,47 @@ RESOLVED = 1e-3  # of the largest growth, below which the axis is linear
 LINEAR = 0.03  # of the largest growth: where half of the others are smaller, the axis is logarithmic
 
 
-def draw_balance(ax: Axes, balance: HarmonicBalance) -> None:
+def draw_limit_cycles(ax: Axes, prediction: LimitCyclePrediction) -> None:
+    """The growth of vibrations, with the limit cycles that are the answer: a square where it is a simulated
+    one."""
+    draw_balance(ax, prediction.balance, prediction.answers)
+
+
+def draw_balance(ax: Axes, balance: HarmonicBalance, answers: Sequence[LimitCycleAnswer] | None = None) -> None:
     """How fast vibrations grow or die over their amplitude; limit cycles where the line crosses zero.
 
     A full dot is a stable limit cycle, a hollow one the edge of what is recovered from; grey is what lies beyond
     the range of the device, and is drawn as far as twice that. Growth rates that differ much have an axis that is
     logarithmic on both sides of zero.
+
+    answers  the limit cycles that are drawn; None: those of the balance
     """
+    if answers is None:
+        answers = [LimitCycleAnswer(cycle, "describing function", None, None, cycle) for cycle in balance.cycles]
+    cycles = [answer.cycle for answer in answers]
     growth = np.where(np.isfinite(balance.growth), balance.growth, np.nan)
     ax.semilogx(balance.amplitude, growth, color=BLACK, label="growth of a vibration")
     ax.axhline(0.0, color=GREY, linewidth=0.6)
-    for cycle in balance.cycles:
-        kind = "stable limit cycle" if cycle.stable else "larger ones grow, smaller ones die"
+    for answer in answers:
+        cycle = answer.cycle
+        simulated = answer.source == "simulation"
+        kind = (
+            ("simulated limit cycle" if simulated else "stable limit cycle")
+            if cycle.stable
+            else "larger ones grow, smaller ones die"
+        )
         kind, color = (kind, VERMILION) if cycle.within_range else ("predicted beyond the range", GREY)
         ax.plot(
             cycle.amplitude,
             0.0,
-            "o",
+            "s" if simulated else "o",
             markerfacecolor=color if cycle.stable else "white",
             markeredgecolor=color,
             linestyle="none",
             label=f"{kind}: {quantity(cycle.amplitude, 'm')}, {quantity(cycle.frequency_Hz, 'Hz')}",
         )
     ax.set_ylabel("Growth rate [1/s]")
-    low, high = _amplitude_range(balance)
+    low, high = _amplitude_range(balance, cycles)
     ax.set_xlim(low, high)
     number_logarithmic(ax.xaxis, low, high, "m")
     ax.set_xlabel("Amplitude")
@@ -49,8 +69,8 @@ def draw_balance(ax: Axes, balance: HarmonicBalance) -> None:
         text = f"farther than the device moves, {quantity(balance.largest_motion, 'm')}"
         ax.axvspan(max(low, balance.largest_motion), high, color=GREY, alpha=0.2, linewidth=0.0, label=text)
     visible = growth[(balance.amplitude >= low) & (balance.amplitude <= high) & np.isfinite(growth)]
-    _scale_growth(ax, visible, crossings=bool(balance.cycles))
-    if not balance.cycles:
+    _scale_growth(ax, visible, crossings=bool(cycles))
+    if not cycles:
         ax.plot([], [], linestyle="none", label="no limit cycle")
     legend_above(ax)
 
@@ -72,10 +92,10 @@ def _scale_growth(ax: Axes, visible: NDArray[np.float64], *, crossings: bool) ->
     ax.yaxis.set_major_formatter(lambda value, _: as_written(float(f"{value:.6g}")))
 
 
-def _amplitude_range(balance: HarmonicBalance) -> tuple[float, float]:
+def _amplitude_range(balance: HarmonicBalance, cycles: Sequence[LimitCycle]) -> tuple[float, float]:
     """Amplitudes that are drawn."""
     at, farthest = balance.amplitude, BEYOND * balance.largest_motion
-    amplitudes = [cycle.amplitude for cycle in balance.cycles if cycle.within_range]
+    amplitudes = [cycle.amplitude for cycle in cycles if cycle.within_range]
     swings = at[np.isfinite(balance.growth)]
     low, high = (float(swings[0]), float(swings[-1])) if len(swings) > 1 else (float(at[0]), float(at[-1]))
     if amplitudes:

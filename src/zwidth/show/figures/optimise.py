@@ -1,4 +1,4 @@
-"""The front of an optimisation: what cannot be had together; or how the best value was approached."""
+"""The front of an optimisation: what cannot be had together; or how the best value found was approached."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def front_figure(found: Optimisation, width: float = 5.6, height: float = 3.9) -
 
 
 def draw_optimisation(ax: Axes, found: Optimisation) -> None:
-    """The front of the first two objectives; of a single one, the best value by the number of designs tried."""
+    """The front of the first two objectives; of a single one, the best value found by designs tried."""
     if not len(found.front):
-        draw_empty(ax, "no design keeps the demands")
+        draw_empty(ax, "no design tried keeps the demands")
     elif len(found.problem.objectives) == 1:
         _draw_approach(ax, found)
     else:
@@ -113,7 +113,7 @@ def _draw_approach(ax: Axes, found: Optimisation) -> None:
     best = np.minimum.accumulate(np.where(kept, costs, np.inf)) * objective.sign
     known = np.isfinite(best)
     tried = np.arange(1, len(best) + 1)
-    ax.step(tried[known], best[known], where="post", color=BLUE, label="best so far")
+    ax.step(tried[known], best[known], where="post", color=BLUE, label="best found so far")
     if found.polished:
         ax.axvline(found.searched, color=GREY, linestyle=":", linewidth=1.0, label="polish begins")
     if found.baseline is not None and np.isfinite(own := found.baseline.values[0, objective.column]):

@@ -198,9 +198,9 @@ def _experiment(ax: Axes, experiment: Any) -> None:
 
 
 def _limit_cycles(ax: Axes, result: Any) -> None:
-    from zwidth.show.figures.limit_cycles import draw_balance
+    from zwidth.show.figures.limit_cycles import draw_limit_cycles
 
-    draw_balance(ax, result.balance)
+    draw_limit_cycles(ax, result)
 
 
 def _couplings(ax: Axes, result: Any) -> None:

@@ -37,7 +37,7 @@ def draw_robust(
     outlines = [outline for index in list(chart.outlines)[:DRAWN_MEMBERS] for outline in chart.outlines[index]]
     ax.add_collection(LineCollection(outlines, colors=LIGHT, linewidths=0.4, zorder=1.2, label="a member's edge"))
     for n, ring in enumerate(chart.regions):
-        text = "" if n else "stable for every member"
+        text = "" if n else _claim(chart)
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=text, zorder=1.1))
     for n, outline in enumerate(chart.outlines[chart.best_by_area]):
         text = "" if n else f"best member by area: {_words(members, chart.best_by_area)}"
@@ -45,6 +45,14 @@ def draw_robust(
     _draw_edge(ax, chart, members, view)
     frame(ax, view, empty=not chart.regions)
     legend_above(ax)
+
+
+def _claim(chart: CommonChart) -> str:
+    """What the filled set is, for the legend."""
+    if chart.failed:
+        known = len(chart.charted)
+        return f"stable for {known} of {known + chart.unknown_members} members; of the others nothing is known"
+    return "stable for every member" + (" (in doubt)" if chart.doubt else "")
 
 
 def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:

@@ -26,8 +26,10 @@ def draw_chart(ax: Axes, chart: StabilityChart, window: Window | None = None) ->
 
     window  what to show; left out: the regions' box and 5 %
     """
+    in_doubt = bool(getattr(chart, "doubt", ""))
     for n, ring in enumerate(chart.regions):
-        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable walls"))
+        text = "stable walls found; there may be others" if in_doubt else "stable walls"
+        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else text))
     for arc in chart.boundary:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
     if not isnan(chart.stiffness_max):
@@ -91,7 +93,7 @@ def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
         markeredgewidth=1.6,
         linestyle="none",
         zorder=5.0,
-        label=f"stiffest: {numbers}; oscillates at {vibration}",
+        label=f"stiffest{' found' if getattr(chart, 'doubt', '') else ''}: {numbers}; oscillates at {vibration}",
     )
 
 

@@ -102,6 +102,9 @@ def draw_worth(ax: Axes, result: ToleranceStudy) -> None:
     if not bars:
         draw_empty(ax, "no tolerance to be tightened")
         return
+    if result.question.has_wall and not result.middle_is_stable:
+        draw_empty(ax, "no tolerance to be tightened: the wall is\nnot stable in the middle of them")
+        return
     for n, (key, interval, certain) in enumerate(reversed(bars)):
         value, low, high = (100.0 * one for one in (interval.value, interval.low, interval.high))
         face = BLUE if certain else "white"

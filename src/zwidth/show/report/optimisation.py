@@ -1,4 +1,4 @@
-"""The report on an optimisation: before and after side by side, the front, and what holds it back."""
+"""The report on an optimisation: before and after side by side, the front, and how it was found."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from zwidth._version import __version__
 from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.faults import DeviceError
 from zwidth.show.figures.caption import caption_of_facts, facts_of_point, facts_of_study
 from zwidth.show.figures.optimise import front_figure
@@ -34,7 +35,7 @@ def optimisation_page(found: Optimisation) -> str:
         return page_template("optimisation.html.j2").render(
             found=found,
             problem=found.problem,
-            word="best" if len(found.problem.objectives) == 1 else "knee",
+            word=found.word,
             said=sentences(found),
             before_and_after=_before_and_after(found),
             demands=_demands(found),
@@ -110,13 +111,12 @@ def _charts(found: Optimisation) -> str:
     cases: list[tuple[str, dict[str, Any], Any]] = []
     if found.baseline is not None:
         cases.append(("as it is", {}, found.baseline.cells[0]))
-    word = "best" if len(found.problem.objectives) == 1 else "knee"
-    cases.append((word, found.settings(found.knee), found.judgement.cells[found.front[found.knee]]))
+    cases.append((found.word, found.settings(found.knee), found.judgement.cells[found.front[found.knee]]))
     for name, design, cells in cases:
         try:
             point = worst_point(found.problem, design, cells)
-            charts[name] = stability_chart(point.loop, decay=False)
-        except (DeviceError, ValueError):
+            charts[name] = stability_chart(point.loop, decay=False).drawn()
+        except (DeviceError, ValueError, ChartError):
             continue
         caption = caption_of_facts(facts_of_point(point) | {"position_m": None, "directions": None}, None)
     if not any(chart.regions for chart in charts.values()):

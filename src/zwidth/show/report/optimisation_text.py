@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
@@ -19,8 +18,8 @@ SMALL: Final = 5e-4  # share of a value that is said to be no change
 
 
 def sentences(found: Optimisation) -> list[str]:
-    """Sentences on the front: how it was found, what the chosen design gains, what holds designs back, and what a
-    finer grid and simulation say. Where no design keeps the demands, why not."""
+    """Sentences on the front: how it was found, what the chosen design gains, what it is conditional on, and
+    what a finer grid and simulation say. Where no design keeps the demands, why not."""
     tried = plural(len(found.shares), "design")
     if not len(found.front):
         return [f"{tried} tried: {found.reason}", *_not_judged(found)]
@@ -28,7 +27,7 @@ def sentences(found: Optimisation) -> list[str]:
         _how_found(found, tried),
         _gain(found),
         *_not_judged(found),
-        *_held_back(found),
+        *(premise["reason"] for premise in found.premises),
         *_finer(found),
         *_produced(found),
         *_contacts(found),
@@ -38,7 +37,7 @@ def sentences(found: Optimisation) -> list[str]:
 
 def _how_found(found: Optimisation, tried: str) -> str:
     if len(found.problem.objectives) == 1:
-        return f"the best of {tried} tried"
+        return f"the best found of {tried} tried"
     return f"{plural(len(found.front), 'design')} of the front, of {tried} tried"
 
 
@@ -46,7 +45,7 @@ def _gain(found: Optimisation) -> str:
     """The chosen design beside the device as it is."""
     problem, knee = found.problem, found.knee
     assert knee is not None
-    chosen = "the best design" if len(problem.objectives) == 1 else "the knee"
+    chosen = "the best design found" if len(problem.objectives) == 1 else "the knee"
     parts = []
     for objective in problem.objectives:
         one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
@@ -68,20 +67,6 @@ def _not_judged(found: Optimisation) -> list[str]:
     ]
     own = [] if found.baseline is None else found.baseline.status[0].tolist()
     return said + [f"the device as it is {verb}" for status, verb in WITHOUT.items() if status in own]
-
-
-def _held_back(found: Optimisation) -> list[str]:
-    """What holds designs of the front back: variables at their bounds, demands kept exactly."""
-    counts = Counter(text for place in range(len(found.front)) for text in found.active(place))
-    if not counts:
-        return ["no variable is at a bound, and no demand is kept with nothing to spare"]
-    many = len(found.front)
-    return [
-        f"{text} in {'all designs' if count == many else plural(count, 'design')} of the front"
-        if many > 1
-        else text
-        for text, count in counts.most_common()
-    ]
 
 
 def _finer(found: Optimisation) -> list[str]:
@@ -112,7 +97,7 @@ def _produced(found: Optimisation) -> list[str]:
     bars, knee, problem = found.bars, found.knee, found.problem
     if bars is None or knee is None:
         return []
-    chosen = "the best design" if len(problem.objectives) == 1 else "the knee"
+    chosen = "the best design found" if len(problem.objectives) == 1 else "the knee"
     kept = percent(float(bars.kept[knee]))
     said = [f"{kept} of {bars.devices} devices within the tolerances of {chosen} keep all demands"]
     if not problem.demands:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from math import isfinite, isnan
+from math import isclose, isfinite, isnan
 from typing import Final
 
 import numpy as np
@@ -21,6 +21,7 @@ from zwidth.loop.motion_names import listed_names
 from zwidth.model.mechanism import Floats
 from zwidth.show.circumstances import load_text
 from zwidth.show.figures.decay import tenfold_time
+from zwidth.show.moment_units import speaks_of_moments
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, way
 from zwidth.study.sensitivity.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
@@ -239,11 +240,10 @@ def unobserved(facts: Facts) -> str:
 
 
 def left_out(facts: Facts) -> str:
-    """Which nonlinear parts of the device the report leaves out; "" where it has none."""
-    words = facts.point.linear_omissions
-    if not words:
-        return ""
-    return f"All of this is linear and leaves out {join_words(words)}, which zwidth simulate includes."
+    """Which nonlinear parts of the device the report leaves out, and what of a load; "" for nothing."""
+    words, of_load = facts.point.linear_omissions, facts.point.load_omissions
+    linear = f"All of this is linear and leaves out {join_words(words)}, which zwidth simulate includes."
+    return " ".join([*([linear] if words else []), *(f"All of this is {text}." for text in of_load)])
 
 
 def outside(facts: Facts) -> str:
@@ -421,13 +421,15 @@ def felt(facts: Facts) -> str:
     if facts.felt is None or not facts.renders:
         return ""
     stiffest, limit = facts.felt.stiffness_max, facts.felt.limit
-    if not isfinite(limit):
+    if not isfinite(limit) and isclose(stiffest, facts.base.stiffness_max, rel_tol=1e-6):
         return "Nothing between wall and handle is flexible: at rest a wall is felt as stiff as it is commanded."
     share = percent(stiffest / facts.base.stiffness_max)
-    return (
-        f"At rest the stiffest wall is felt as {quantity(stiffest, 'N/m')}, {share} of its stiffness; "
-        f"whatever is commanded, nothing stiffer than {quantity(limit, 'N/m')} can be felt."
-    )
+    ends = {
+        "bound": f"whatever is commanded, nothing stiffer than {quantity(limit, 'N/m')} can be felt",
+        "infinite": "nothing between wall and handle bounds what can be felt",
+    }
+    end = ends.get(facts.felt.limit_kind, f"a wall without end would be felt as {quantity(limit, 'N/m')}")
+    return f"At rest the stiffest wall is felt as {quantity(stiffest, 'N/m')}, {share} of its stiffness; {end}."
 
 
 def which_model(facts: Facts) -> str:
@@ -503,7 +505,7 @@ def velocity_and_force_text(controller: Controller) -> str:
         parts.append(f"force through {filter_name(controller.force_filter)}")
     if controller.actuator_time_constant:
         parts.append(f"force lagging by {as_written(controller.actuator_time_constant, 's')}")
-    parts += [f"with {name}" for name in controller.feedback_names]
+    parts += [f"with {name}" for name in controller.feedback_texts(speaks_of_moments())]
     return ", ".join(parts)
 
 

@@ -142,6 +142,7 @@ def document(facts: Facts) -> dict[str, Any]:
         "unobserved_modes": list(chart.unobserved_modes),
         "static_stiffness_at_stiffness_max_N_per_m": facts.felt and facts.felt.stiffness_max,
         "static_stiffness_limit_N_per_m": facts.felt and facts.felt.limit,
+        "static_stiffness_limit_kind": facts.felt and facts.felt.limit_kind,
         "sensitivities": [
             {
                 "path": number.path,

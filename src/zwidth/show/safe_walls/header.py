@@ -10,17 +10,26 @@ that.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from zwidth._version import __version__
+from zwidth.device.faults import comma_list
+from zwidth.loop.controller import Controller
+from zwidth.show.circumstances import wall_law_parts
 from zwidth.show.output import OutputError, printable, write_text
 from zwidth.study.safe_walls.table import EVERYWHERE, SafeWalls
 
 WIDTH: Final = 110  # letters of a line of numbers
-AVR_REACH: Final = 32767  # bytes of one table that 8-bit boards read from their program memory
+AVR_REACH: Final = 32767  # bytes of one array that compilers of 8-bit boards allow
+# Bytes that 16-bit addresses of program memory reach. Beyond them a board reads other cells than it is asked for,
+# and says nothing.
+ADDRESSES: Final = 65536
+# Of these, what else lies before the tables: vectors, jumps, and tables of the board's own library (Mega: 1 kB).
+BESIDE: Final = 2048
 HEADER_NAME: Final = "safe_walls.h"
 
 
@@ -34,11 +43,17 @@ def header_text(table: SafeWalls) -> str:
 
 
 def sketch_text(table: SafeWalls) -> str:
-    """An Arduino sketch that includes the header and clamps the gains of a wall by it."""
+    """An Arduino sketch that includes the header and clamps the gains of a wall by it.
+
+    Raises  OutputError  where it would compute another loop than the table is about, see `sketch_obstacle`
+    """
+    if obstacle := sketch_obstacle(table.device.controller):
+        raise OutputError(obstacle)
     text = (_TEMPLATES / "sketch.ino.txt").read_text(encoding="utf-8")
     coordinates = max(table.grid.dimensions, 1)
     fields = {
         "NAME": _comment(table.device.name),
+        "TIMING": _timing(table.device.controller),
         "COORDINATES": str(coordinates),
         "PERIOD_US": f"{round(1e6 * float(table.device.controller.sampling_period))}UL",
         "STIFFNESS": _double(_round_number(table)),
@@ -49,11 +64,29 @@ def sketch_text(table: SafeWalls) -> str:
     return text
 
 
+def sketch_obstacle(controller: Controller) -> str:
+    """Why no sketch can be written for a computer: a sketch has the backward difference, and nothing else.
+
+    Returns  "" where that is the loop of the file; a lag of the actuator lies behind the computer
+    """
+    computed = Controller(controller.sampling_period, controller.delay, force_limit=controller.force_limit)
+    own = replace(controller, actuator_time_constant=0.0)
+    if own == computed:
+        return ""
+    parts = wall_law_parts(own, spell_out=True)
+    return (
+        "the sketch computes a wall by the backward difference, not filtered, and the file has "
+        f"{comma_list(parts)}: its walls are those of another loop; export the header alone and compute that loop "
+        "yourself, or take the parts out of the file with --set"
+    )
+
+
 def write_sketch(folder: Path, table: SafeWalls) -> None:
     """Write the sketch, named as its folder as Arduino wants it, and the header beside it.
 
-    Raises  OutputError  where the folder cannot be made or written to
+    Raises  OutputError  where the folder cannot be made or written to, and what `sketch_text` raises
     """
+    sketch = sketch_text(table)
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
@@ -61,7 +94,7 @@ def write_sketch(folder: Path, table: SafeWalls) -> None:
         raise OutputError(
             f"{printable(str(folder))}: cannot be made: {reason[:1].lower() + reason[1:]}; name another folder"
         ) from None
-    write_text(folder / f"{folder.name}.ino", sketch_text(table))
+    write_text(folder / f"{folder.name}.ino", sketch)
     write_text(folder / HEADER_NAME, header_text(table))
 
 
@@ -77,7 +110,7 @@ def _fields(table: SafeWalls) -> dict[str, str]:
         "VERSION": __version__,
         "NAME": _comment(table.device.name),
         "HANDS": _comment(", ".join(table.hands)),
-        "TIMING": _comment(loop.timing_text),
+        "TIMING": _timing(loop),
         "MARGIN": f"{question.margin:g}",
         "BYTES": str(table.size),
         "WHERE": _where(table),
@@ -89,6 +122,7 @@ def _fields(table: SafeWalls) -> dict[str, str]:
         "PARTS": f"{table.sectors.parts}UL",
         "OUTSIDE": ", ".join(map(_double, (table.outside.stiffness, table.outside.low, table.outside.high))),
         "TOO_LARGE": _too_large(max(table.top.size, low.size) * 4),
+        "MOST_BYTES": f"{ADDRESSES - BESIDE}UL",
         "GRID": "" if d == 0 else _grid(table),
         "CELL": _ONE_CELL if d == 0 else _CELL,
         "SECTOR": _SECTOR if question.slots > 1 else _NO_SECTOR,
@@ -97,6 +131,11 @@ def _fields(table: SafeWalls) -> dict[str, str]:
         "LOW": _array("float", "zwidth_low", map(_single, low)),
         "HIGH": _array("float", "zwidth_high", map(_single, most)),
     }
+
+
+def _timing(controller: Controller) -> str:
+    """Sampling, delay, estimator, filters and further feedback, for a comment."""
+    return _comment(", ".join([controller.timing_text, *wall_law_parts(controller, spell_out=True)]))
 
 
 def _where(table: SafeWalls) -> str:

@@ -213,10 +213,10 @@ export class App {
       this.drawSoon();
       this.unreached = false;
       this.reached = frame.head.position ?? state.position ?? null;
-      // a handle that is dragged beyond its reach slides along its edge
+      // a handle that is dragged beyond its reach slides along what is answered
       if (frame.head.position && this.state === state) this.store.correct({ position: frame.head.position });
     } catch (error) {
-      // one that has no nearest position goes back to where it was last
+      // one without an answered position goes back to where it was last
       this.unreached = error instanceof Refusal && this.deviceView.held === "handle";
       if (error instanceof Refusal && error.status !== "stopped" && this.shown !== this.opened) this.showNothing();
       this.fail(error);
@@ -306,11 +306,21 @@ export class App {
     }
     this.deviceView.draw();
     this.writeHeadline();
+    this.writeCaveats();
     writeLegend(byId("legend"), this.chart, () => {
       this.chart.follow();
       this.drawSoon();
     });
     this.writeWall();
+  }
+
+  /** What the chart leaves out under load, and why guarantees are withheld or rest on what is not known. */
+  writeCaveats() {
+    const guarantees = this.chart.layers.has("guarantees") ? this.chart.more?.head.guarantees : null;
+    const texts = [...(this.view?.head.chart.caveats ?? []), ...(guarantees?.caveats ?? [])];
+    const line = byId("caveats");
+    line.textContent = texts.map((text) => `${text[0].toUpperCase()}${text.slice(1)}.`).join(" ");
+    line.hidden = !texts.length;
   }
 
   writeHeadline() {

@@ -260,7 +260,7 @@ export class ChartView {
       if (this.layers.has("decay")) (decay?.radii ?? []).forEach((/** @type {number} */ radius, /** @type {number} */ n) => add(frame, `|z| < ${radius.toFixed(4)}`, `decay.${n}`));
       if (this.layers.has("models")) Object.keys(models?.charts ?? {}).forEach((name) => add(frame, `${name} model`, `models.${name}`));
       if (this.layers.has("hands")) Object.keys(hands?.charts ?? {}).forEach((name) => add(frame, name, `hands.${name}`));
-      if (this.layers.has("guarantees")) Object.keys(guarantees?.regions ?? {}).forEach((name) => add(frame, GUARANTEES[name] ?? name, `guarantees.${name}`));
+      if (this.layers.has("guarantees")) Object.keys(guarantees?.regions ?? {}).forEach((name) => add(frame, `${GUARANTEES[name] ?? name}${guarantees.regions[name].reason ? ": none" : ""}`, `guarantees.${name}`));
     }
     return found;
   }

@@ -57,9 +57,9 @@ export class WallFields {
   }
 }
 
-/** @param {{verdict: string, frequency: number, spectral_radius: number | null}} found */
-function sentenceOf({ verdict, frequency, spectral_radius: radius }) {
+/** @param {{verdict: string, frequency: number, spectral_radius: number | null, unheld_positions: number}} found */
+function sentenceOf({ verdict, frequency, spectral_radius: radius, unheld_positions: unheld }) {
   const stable = verdict === "stable";
   const motion = verdict === "undecided" ? "on the edge" : frequency > 0 ? `${stable ? "slowest motion" : "oscillates"} at ${quantity(frequency, "Hz")}` : `${stable ? "slowest motion" : "moves away"} without oscillation`;
-  return `${verdict}, ${motion}${radius === null ? "" : `, |z| ${number(radius, 5)}`}`;
+  return `${verdict}, ${motion}${radius === null ? "" : `, |z| ${number(radius, 5)}`}${unheld ? "; K = 0 holds no position: that root is set aside" : ""}`;
 }
