@@ -27,12 +27,12 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from functools import partial
 from math import isclose
 from pathlib import Path
 from typing import Any
 
+from benchmarks._cases import is_selected
 from benchmarks._timing import machine, print_table, seconds
 from tests import revisions
 from tests.frozen.commits import commit_sources as sources_of
@@ -224,11 +224,6 @@ def document(timings: Timings) -> dict[str, object]:
         else {"base_s": timing.base, "new_s": timing.new, "quartiles_of_ratio": timing.ratios}
         for name, timing in timings.items()
     }
-
-
-def is_selected(name: str, patterns: list[str]) -> bool:
-    """Whether a case matches one of the patterns; without patterns every case does."""
-    return not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def print_progress(line: str) -> None:

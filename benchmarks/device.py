@@ -67,7 +67,8 @@ def cases() -> Cases:
 
     changes = {f"with_ {key}": change(key, value) for key, value in NUMBERS.items()}
     there = TimedCase(lambda n: len(DEVICE.at(handle_position(n), (0.0, 1.0)).loop.plant.mass), numbers.__next__)
-    return changes | {"an operating point and its loop": there}
+    alone = TimedCase(lambda n: len(DEVICE.at(handle_position(n), (0.0, 1.0)).shape), numbers.__next__)
+    return changes | {"an operating point": alone, "an operating point and its loop": there}
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -71,17 +72,25 @@ int main(void)
 
 def query_times(table: SafeWalls) -> tuple[float, float, float]:
     """Seconds of a query of a rectangle and of a range of damping, the best of five runs, and the share inside."""
+    with TemporaryDirectory() as folder:
+        binary = compile_queries(table, Path(folder))
+        runs = [ask(binary) for _ in range(5)]
+    return min(one[0] for one in runs), min(one[1] for one in runs), int(runs[0][2]) / QUERIES
+
+
+def compile_queries(table: SafeWalls, folder: Path) -> Path:
+    """The program that asks a table, compiled in a folder."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     assert compiler is not None, "this needs a C compiler"
-    with TemporaryDirectory() as folder:
-        (Path(folder) / HEADER_NAME).write_text(header_text(table), encoding="ascii")
-        (Path(folder) / "query.c").write_text(PROGRAM % QUERIES, encoding="ascii")
-        binary = str(Path(folder) / "query")
-        subprocess.run([compiler, "-std=c99", "-O2", "-o", binary, "query.c"], cwd=folder, check=True)
-        runs = [
-            subprocess.run([binary], capture_output=True, text=True, check=True).stdout.split() for _ in range(5)
-        ]
-    return min(float(one[0]) for one in runs), min(float(one[1]) for one in runs), int(runs[0][2]) / QUERIES
+    (folder / HEADER_NAME).write_text(header_text(table), encoding="ascii")
+    (folder / "query.c").write_text(PROGRAM % QUERIES, encoding="ascii")
+    subprocess.run([compiler, "-std=c99", "-O2", "-o", "query", "query.c"], cwd=folder, check=True)
+    return folder / "query"
+
+
+def ask(binary: Path) -> list[float]:
+    """What the program tells: seconds of both queries, the number of positions inside, the sum of all answers."""
+    return [float(word) for word in subprocess.check_output([binary], text=True).split()]
 
 
 def by_eigenvalues(table: SafeWalls, damping: float = 5.0, steps: int = 20) -> float:
@@ -97,19 +106,31 @@ def by_eigenvalues(table: SafeWalls, damping: float = 5.0, steps: int = 20) -> f
 
 
 def cases() -> Cases:
-    """Our own part: a table of few cells."""
-    device = load("five-bar")
+    """Our own part: a table of few cells, and a C program that asks it."""
+
+    def program() -> Path:
+        if "binary" not in made:
+            made["folder"] = TemporaryDirectory()
+            made["binary"] = compile_queries(small_table(), Path(made["folder"].name))
+        return made["binary"]
+
+    made: dict[str, Any] = {}
+    return {
+        "safe walls, 2 cells of the five-bar": TimedCase(lambda: small_table().outside.stiffness),
+        f"{2 * QUERIES} queries of the C header": TimedCase(lambda binary: ask(binary)[3], program, tool="cc"),
+    }
+
+
+def small_table() -> SafeWalls:
+    """A table of two cells, by one process."""
     small = {"x": (-0.05, 0.05), "y": (0.2, 0.25), "cells": (2, 1), "levels": 6, "workers": 1}
-
-    def stiffness() -> float:
-        return safe_walls(device, **small).outside.stiffness
-
-    return {"safe walls, 2 cells of the five-bar": TimedCase(stiffness)}
+    return safe_walls(load("five-bar"), **small)
 
 
 def main() -> None:
     """Time both functions over both tables and print the results."""
     print(machine("numpy", "numba"))
+    small_table()  # compiles
     rows = []
     for name, (parts, cells) in TABLES.items():
         began = perf_counter()

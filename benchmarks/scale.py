@@ -9,7 +9,7 @@ other programs take for a batch, in processor time: on a computer that is busy w
 Memory. `zwidth sweep` of a one-mass device with a store and a zarr folder as output, 1e5, 1e6 and 1e7 designs of a
 Latin hypercube: the largest resident memory of the command's process, and of its workers, and designs per second.
 
-Run `python benchmarks/scale.py`.
+Run `python benchmarks/scale.py`; with `--short` no more than a million designs.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import tomllib
 from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter, sleep
+from typing import Any
 
 import numpy as np
 
@@ -191,21 +193,30 @@ def children(process: int) -> list[int]:
 
 
 def cases() -> Cases:
-    """Cheap cells through the executor, and many of them through a store."""
+    """Designs of five-bars and of one mass, batch by batch through a store."""
 
-    def stored() -> float:
-        job = sweep_job(study_of({**FIVE_BAR, "count": 400}))
+    def stored(document: dict[str, Any], batch: int) -> float:
+        job = sweep_job(study_of(document))
         with tempfile.TemporaryDirectory() as folder:
-            return float(np.nanmean(run_job(job, Store(Path(folder) / "cells", job), workers=1, batch=50).values))
+            store = Store(Path(folder) / "cells", job)
+            return float(np.nanmean(run_job(job, store, workers=1, batch=batch).values))
 
-    return {"400 five-bars through a store, 50 in a batch": TimedCase(stored)}
+    masses = tomllib.loads(ONE_MASS.format(count=20_000))
+    return {
+        "400 five-bars through a store, 50 in a batch": TimedCase(lambda: stored({**FIVE_BAR, "count": 400}, 50)),
+        "20000 one-mass designs through a store": TimedCase(lambda: stored(masses, 1000)),
+    }
 
 
-def main() -> None:
-    """Print what processes and a cluster cost, and how much memory many designs take."""
+def main(short: bool = False) -> None:
+    """Print what processes and a cluster cost, and how much memory many designs take.
+
+    short  leaves out the largest number of designs
+    """
     print(machine("numpy", "numba", "zarr", "distributed"))
     speed()
-    memory(COUNTS)
+    sweep_in_a_process(100)  # compiles
+    memory(COUNTS[:-1] if short else COUNTS)
 
 
 if __name__ == "__main__":

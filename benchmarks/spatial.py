@@ -22,6 +22,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -199,11 +200,16 @@ def shortest(work: Callable[[], object], rounds: int = ROUNDS) -> tuple[float, f
     return min(wall_times), min(processor_times)
 
 
+def moved(name: str, times: int) -> Mechanism:
+    """A mechanism whose handle is some nanometres elsewhere, so that its roadmap is not known yet."""
+    mechanism = mechanism_of(name)
+    return replace(mechanism, handle_point=mechanism.handle_point + np.array([0.0, 0.0, 1e-9 * times]))
+
+
 def roadmap_time(name: str, at: np.ndarray) -> float:
     """Processor seconds that the first batch of a device takes longer than its second; its handle is moved by a
     nanometre, so that its roadmap is not known yet."""
-    mechanism = mechanism_of(name)
-    other = replace(mechanism, handle_point=mechanism.handle_point + np.array([0.0, 0.0, 1e-9]))
+    other = moved(name, 1)
     began = time.process_time()
     solve_posture(other, at)
     middle = time.process_time()
@@ -285,9 +291,17 @@ def postures_of(name: str, reach: float) -> TimedCase:
 
 
 def cases() -> Cases:
-    """Postures of both devices, the map and the import; a report takes too long to be repeated often."""
+    """Postures of both devices, the roadmap, the map, the report and the import."""
     postures = {f"{POSTURES} postures of {name}": postures_of(name, reach) for name, reach in (SERIAL, DELTA)}
+    few = positions(*DELTA, ENGINE_POSTURES)
+    moves = count(1)
+
+    def roadmap(mechanism: Mechanism) -> float:
+        return solve_posture(mechanism, few).angles.sum()
+
     return postures | {
+        "roadmap of a delta": TimedCase(roadmap, fresh=lambda: moved(DELTA[0], next(moves))),
+        "report on a delta": TimedCase(report_on_delta),
         f"map of a delta, {CELLS} x {CELLS}": TimedCase(lambda: map_of_delta(CELLS)),
         f"import of {LINKS * (1 + COVERS)} bodies": TimedCase(import_robot),
     }

@@ -49,10 +49,19 @@ def run_natively(device: TouchNumbers, ports: np.ndarray) -> np.ndarray:
 
 
 def cases() -> Cases:
-    """A call of many periods."""
+    """A call of many periods, and several such in Node."""
     device, ports = device_and_ports("five-bar")
     name = f"{PERIODS} periods of {SUBSTEPS} substeps"
-    return {name: TimedCase(lambda: float(run_natively(device, ports)[-1, 0]))}
+
+    def in_node() -> float:
+        noise = np.zeros(PERIODS * len(device.noise))
+        outputs, _, _ = run_in_node(device, ports, noise, PERIODS, repeats=REPEATS)
+        return float(outputs[-1, 0])
+
+    return {
+        name: TimedCase(lambda: float(run_natively(device, ports)[-1, 0])),
+        f"{name}, {REPEATS} times in Node": TimedCase(in_node, tool="node"),
+    }
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from importlib import import_module
+from inspect import signature
 from itertools import count
 from math import isfinite
 from pathlib import Path
@@ -15,8 +16,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks import _cases
-from benchmarks._cases import TimedCase, answer_requests, run, time_case
-from benchmarks._pairs import Timing, document, fault, is_selected, main, row
+from benchmarks._cases import TimedCase, answer_requests, is_selected, run, time_case
+from benchmarks._check import read_kept
+from benchmarks._pairs import Timing, document, fault, main, row
 from tests import revisions
 from tests.frozen import commits
 
@@ -33,6 +35,7 @@ def test_every_benchmark_states_its_own_cases(script):
     assert cases
     assert all(isinstance(case, TimedCase) for case in cases.values())
     assert not any("\n" in name or ": " in name for name in cases)
+    assert {name.partition(": ")[2] for name in read_kept() if name.startswith(f"{script}: ")} <= set(cases)
     assert "sys.exit(run(main, cases))" in (ROOT / "benchmarks" / f"{script}.py").read_text(encoding="utf-8")
 
 
@@ -81,6 +84,23 @@ def test_a_script_runs_as_a_whole_or_its_own_part_only(capsys, monkeypatch):
     assert {name: case["answer"] for name, case in found.items()} == {"one": 1.5, "two": 2.0}
     assert run(lambda: 3, lambda: cases, ["--ours"]) == 0
     assert [line.split()[-2:] for line in capsys.readouterr().out.splitlines()] == [["ms", "one"], ["ms", "two"]]
+
+
+def test_a_benchmark_that_takes_long_has_a_short_form(capsys):
+    assert run(lambda short=False: 5 if short else 3, dict, ["--short"]) == 5
+    with pytest.raises(SystemExit):
+        run(lambda: 3, dict, ["--short"])
+    with pytest.raises(SystemExit):
+        run(lambda short=False: 3, dict, ["--short", "--ours"])
+    capsys.readouterr()
+    for script in ("identify", "scale"):
+        assert "short" in signature(import_module(f"benchmarks.{script}").main).parameters
+
+
+def test_a_case_whose_program_is_missing_is_left_out(capsys):
+    cases = {"one": TimedCase(lambda: 1.5), "two": TimedCase(lambda: 2.0, tool="no-such-program")}
+    assert run(lambda: 3, lambda: cases, ["--ours", "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)) == ["one"]
 
 
 def test_requests_are_answered_one_by_one(capsys, monkeypatch):
