@@ -12,11 +12,11 @@ import control
 import mujoco
 import numpy as np
 import pytest
-from model_engines import mass_matrix
 from scipy.signal import chirp, lfilter
 from scipy.spatial.transform import Rotation
 
 import zwidth
+from tests.model.model_engines import mass_matrix
 from tests.pages import sections
 from zwidth.device.schema import device_file
 from zwidth.measures.catalogue import MEASURES

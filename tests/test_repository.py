@@ -203,15 +203,15 @@ def test_a_stiffer_drive_helps_where_the_readme_says(period, helps):
     assert (reached[1] > reached[0]) == helps
 
 
+TARGETS = ("help", "affected", "slow", "lint", "stubs", "bench", "docs", "record", "structure", "bench-pairs")
+
+
 @needs_make
 @pytest.mark.parametrize(
     "line",
     [
         *readme_commands("make"),
-        *(
-            f"make {name}"
-            for name in ("help", "slow", "lint", "bench", "docs", "record", "structure", "bench-pairs")
-        ),
+        *(f"make {name}" for name in TARGETS),
     ],
 )
 def test_make_knows_the_target(line):
@@ -290,7 +290,7 @@ def test_a_skip_is_a_failure_where_asked(tmp_path, value, code, workers):
         "import pytest\n\ndef test_runs(): pass\n\ndef test_skips(): pytest.skip('no tool')\n"
     )
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-n", workers, "--rootdir", "."]
-    environment = clean_environment(ZWIDTH_NO_SKIPS=value)
+    environment = clean_environment(ZWIDTH_NO_SKIPS=value, PYTHONPATH=str(ROOT / "tests"))
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == code, done.stdout
     assert "1 passed, 1 skipped" in done.stdout

@@ -1,0 +1,77 @@
+"""Fast verdicts on a change, from a record of what each test file costs and covers.
+
+    python -m tests.verdict quick                 a choice of tests over all packages, within a minute
+    python -m tests.verdict affected BASE         the tests that cover what has changed since a commit
+    python -m tests.verdict record [FILE ...]     run test files, each in a process of its own, and record them
+    python -m tests.verdict choose                write the choice of `quick` from what was recorded here
+
+Words after `--` go to pytest. `record` of all files takes as long as the suite on one core and half as much
+again; a record of a few files replaces theirs and keeps the others. Moved and new files need no record to be
+covered: they go by name.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+
+from tests.verdict.executed import ROOT
+from tests.verdict.recording import files_of_tests, read_raw, read_recorded, record_files, write_recorded
+from tests.verdict.selection import (
+    QUICK,
+    affected_tests,
+    changed_files,
+    existing_tests,
+    quick_choice,
+    read_quick,
+)
+
+# Processor time of the tests that `quick` chooses, and of importing and collecting one more file, in seconds
+# on a core that does nothing else. Two cores take a minute of wall time for it, with starting pytest's
+# processes; with more of it the verdict is no quick one, with less it catches fewer faults.
+QUICK_SECONDS = 60.0
+FILE_SECONDS = 0.15
+HEADER = "# Tests of the quick verdict; written by `python -m tests.verdict choose`.\n"
+
+
+def run_pytest(names: list[str], arguments: list[str]) -> int:
+    """Run tests by name; pytest reads the names from a file, as they may be too long for a command line."""
+    if not names:
+        print("no test covers what has changed")
+        return 0
+    with tempfile.NamedTemporaryFile("w", suffix=".txt") as stream:
+        stream.write("\n".join(names))
+        stream.flush()
+        return subprocess.run([sys.executable, "-m", "pytest", *arguments, f"@{stream.name}"], cwd=ROOT).returncode
+
+
+def main() -> int:
+    words = sys.argv[1:]
+    cut = words.index("--") if "--" in words else len(words)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["quick", "affected", "record", "choose"])
+    parser.add_argument("names", nargs="*", help="a commit; test files")
+    options = parser.parse_args(words[:cut])
+    arguments = words[cut + 1 :] or ["-n", "auto", "--dist", "worksteal"]
+    if options.what == "quick":
+        return run_pytest(existing_tests(read_quick()), arguments)
+    if options.what == "affected":
+        (base,) = options.names or ["main"]
+        changed = changed_files(base)
+        names = affected_tests(changed, read_recorded(), files_of_tests())
+        print(f"{len(changed)} files changed since {base}, covered by {len(names)} test files", flush=True)
+        return run_pytest(names, arguments)
+    if options.what == "record":
+        record_files(options.names or files_of_tests())
+        write_recorded(read_recorded() | read_raw())
+        return 0
+    chosen = quick_choice(read_raw(), QUICK_SECONDS, FILE_SECONDS)
+    QUICK.write_text(HEADER + "\n".join(chosen) + "\n", encoding="utf-8")
+    print(f"{len(chosen)} tests")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

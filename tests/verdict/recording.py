@@ -1,0 +1,114 @@
+"""Run each test file in a process of its own and keep what it costs and covers, in `recorded.json`.
+
+A process for each file, because helpers of tests keep results that several files ask for: in one process only the
+first file would be seen to compute them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from tests.verdict.executed import ROOT
+from tests.verdict.recorder import RECORD
+
+RAW: Final = ROOT / "out" / "verdict"  # every test with its functions; too large for the repository
+RECORDED: Final = Path(__file__).parent / "recorded.json"
+
+
+@dataclass
+class RecordedFile:
+    """What is known of a test file.
+
+    seconds  processor time of all its tests, alone in a process, kernels compiled
+    covers   files of the project whose functions it executes or that it reads
+    tests    of each test its seconds and functions; empty where only `recorded.json` is at hand
+    """
+
+    seconds: float = 0.0
+    covers: set[str] = field(default_factory=set)
+    tests: dict[str, tuple[float, set[str]]] = field(default_factory=dict)
+
+
+def files_of_tests() -> list[str]:
+    """All test files, as pytest finds them."""
+    return sorted(str(path.relative_to(ROOT)) for path in (ROOT / "tests").rglob("test_*.py"))
+
+
+def record_files(files: Iterable[str], processes: int = 2) -> None:
+    """Run test files one by one and keep their lines in RAW; a file whose tests fail is named and kept all the
+    same."""
+
+    def run(file: str) -> str:
+        folder = RAW / file.replace("/", ".")
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.verdict.recorder", "-p", "no:xdist", file]
+        environment = os.environ | {RECORD: str(folder)}
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 5):
+            return f"{file}: {done.stdout[-2000:]}"
+        (folder / "complete").touch()
+        return ""
+
+    with ThreadPoolExecutor(processes) as pool:
+        files = list(files)
+        for count, (file, fault) in enumerate(zip(files, pool.map(run, files), strict=True), 1):
+            print(f"{count}/{len(files)} {file} {fault}".rstrip(), flush=True)
+
+
+def read_raw() -> dict[str, RecordedFile]:
+    """What lies in RAW, by test file."""
+    found = {}
+    for file in files_of_tests():
+        folder = RAW / file.replace("/", ".")
+        lines = [json.loads(line) for path in folder.glob("*.jsonl") for line in path.read_text().splitlines()]
+        if lines:
+            found[file] = _merged(lines)
+    return found
+
+
+def _merged(lines: list[dict[str, Any]]) -> RecordedFile:
+    """One test file from the lines of its processes."""
+    result = RecordedFile()
+    for line in lines:
+        functions = set(line["functions"])
+        result.covers |= {name.partition(":")[0] for name in functions} | set(line["files"])
+        if line["test"] is not None:
+            seconds, known = result.tests.get(line["test"], (0.0, set()))
+            result.tests[line["test"]] = (seconds + line["seconds"], known | functions)
+            result.seconds += line["seconds"]
+    return result
+
+
+def write_recorded(found: dict[str, RecordedFile]) -> None:
+    """Write `recorded.json`: a line for each test file, with the numbers of the files that it covers."""
+    paths = sorted(set().union(*(one.covers for one in found.values())))
+    number = {path: k for k, path in enumerate(paths)}
+    rows = [
+        json.dumps(file) + ": " + json.dumps([round(one.seconds, 2), sorted(number[path] for path in one.covers)])
+        for file, one in sorted(found.items())
+    ]
+    RECORDED.write_text(
+        '{"paths": [\n' + ",\n".join(map(json.dumps, paths)) + '],\n"tests": {\n' + ",\n".join(rows) + "}}\n"
+    )
+
+
+def read_recorded() -> dict[str, RecordedFile]:
+    """What `recorded.json` says, by test file; empty where there is none."""
+    if not RECORDED.exists():
+        return {}
+    data = json.loads(RECORDED.read_text())
+    paths = data["paths"]
+    return {
+        file: RecordedFile(seconds, {paths[k] for k in covers})
+        for file, (seconds, covers) in data["tests"].items()
+    }

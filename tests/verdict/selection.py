@@ -1,0 +1,159 @@
+"""Which tests to run: those that cover changed files, and a choice over all packages that takes a minute."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Final
+
+from tests.verdict.executed import PACKAGE, ROOT
+from tests.verdict.recording import RecordedFile
+
+QUICK: Final = Path(__file__).parent / "quick.txt"
+# What one more test of the same function is worth beside the one before: a second test catches some of the
+# faults that the first leaves. At 0 each function would be run once; at 1 a few functions that every test runs
+# would fill the choice.
+WORTH_OF_ANOTHER: Final = 0.5
+
+
+def changed_files(base: str) -> list[str]:
+    """Files that differ between a commit and the working tree, new and deleted ones included."""
+    commands = (
+        ["git", "diff", "--name-only", "--no-renames", base],
+        ["git", "ls-files", "--others", "--exclude-standard"],
+    )
+    found: set[str] = set()
+    for command in commands:
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise SystemExit(f"{' '.join(command)}: {done.stderr.strip()}")
+        found |= set(done.stdout.split("\n")) - {""}
+    return sorted(found)
+
+
+def affected_tests(
+    changed: Iterable[str], recorded: Mapping[str, RecordedFile], existing: Iterable[str]
+) -> list[str]:
+    """Test files that cover any of the changed files.
+
+    changed   paths from the project's root
+    recorded  what each test file was seen to execute and read
+    existing  the test files that there are
+
+    A changed test file is run itself. A changed file that no record knows (it is new, or has moved) is covered
+    by the tests that name its module and by its package's folder of tests. What a file defines outside functions,
+    such as a constant, acts in the files that import it: the tests that cover these are taken, too. Of a test
+    file that is not recorded nothing is known, so that it is run whenever anything of the package has changed.
+    """
+    existing = list(existing)
+    changed = list(changed)
+    own = [path for path in changed if path.startswith(PACKAGE)]
+    widened = set(changed).union(*(direct_importers(path) for path in own if path.endswith(".py")))
+    found = {path for path in changed if path in existing}
+    found |= {file for file in existing if file in recorded and recorded[file].covers & widened}
+    if own:
+        found |= {file for file in existing if file not in recorded}
+    known = set().union(*(one.covers for one in recorded.values())) if recorded else set()
+    for path in own:
+        if path not in known:
+            found |= files_that_name(path, existing)
+    return sorted(found)
+
+
+def direct_importers(path: str) -> set[str]:
+    """Files of the package that import a module, by its full name."""
+    module = re.escape(path.removeprefix("src/").removesuffix(".py").removesuffix("/__init__").replace("/", "."))
+    package, _, name = module.rpartition(r"\.")
+    imports = re.compile(
+        rf"^\s*(?:from {module} import|import {module}\b|from {package} import .*\b{name}\b)", re.M
+    )
+    files = (ROOT / PACKAGE).rglob("*.py")
+    return {str(file.relative_to(ROOT)) for file in files if imports.search(file.read_text(encoding="utf-8"))}
+
+
+def files_that_name(path: str, existing: Iterable[str]) -> set[str]:
+    """Test files that name a module of the package, or lie in the folder of tests of its package."""
+    parts = Path(path).with_suffix("").parts
+    module, package = re.compile(rf"{re.escape('.'.join(parts[1:]))}\b"), parts[2]
+    return {
+        file
+        for file in existing
+        if file.startswith(f"tests/{package}/") or module.search((ROOT / file).read_text(encoding="utf-8"))
+    }
+
+
+def quick_choice(recorded: Mapping[str, RecordedFile], seconds: float, per_file: float) -> list[str]:
+    """Names of tests that together take at most so many seconds of processor time and cover as many functions
+    as can be.
+
+    recorded  test files with their tests
+    seconds   processor time of all tests that are chosen
+    per_file  seconds that one more test file takes to be imported and collected
+
+    Greedy: always the test with the most new functions for its time. A function is worth 1 at first and a factor
+    WORTH_OF_ANOTHER less with each test that executes it. Ties go by name, so that a choice hangs on the
+    record alone.
+    """
+    tests = {
+        name: (taken, functions, file)
+        for file, one in recorded.items()
+        for name, (taken, functions) in one.tests.items()
+    }
+    worth: dict[str, float] = {}
+    chosen: list[str] = []
+    opened: set[str] = set()
+    left = seconds
+
+    def gain(name: str) -> float:
+        taken, functions, file = tests[name]
+        cost = max(taken, 1e-3) + (0.0 if file in opened else per_file)
+        return sum(worth.get(one, 1.0) for one in functions) / cost if cost <= left else 0.0
+
+    candidates = sorted(tests)
+    gains = {name: gain(name) for name in candidates}
+    while gains:
+        # a gain only falls while functions are taken; it rises where a file has been opened, and is then made anew
+        best = max(gains, key=lambda name: (gains[name], name))
+        again = gain(best)
+        if again < gains[best]:
+            gains[best] = again
+            if again == 0.0:
+                del gains[best]
+            continue
+        if again == 0.0:
+            break
+        taken, functions, file = tests[best]
+        left -= max(taken, 1e-3) + (0.0 if file in opened else per_file)
+        chosen.append(best)
+        del gains[best]
+        for one in functions:
+            worth[one] = worth.get(one, 1.0) * WORTH_OF_ANOTHER
+        if file not in opened:
+            opened.add(file)
+            gains |= {name: gain(name) for name in gains if tests[name][2] == file}
+    return sorted(chosen)
+
+
+def read_quick() -> list[str]:
+    """The tests of the quick verdict, of those files that still exist."""
+    lines = [line for line in QUICK.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    return [line for line in lines if (ROOT / line.partition("::")[0]).exists()]
+
+
+def existing_tests(names: Iterable[str]) -> list[str]:
+    """Of tests by name those whose function still stands in its file, so that a renamed test ends no run."""
+    functions: dict[str, set[str]] = {}
+    kept = []
+    for name in names:
+        file, _, inside = name.partition("::")
+        if file not in functions:
+            tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+            functions[file] = {
+                node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)
+            }
+        if all(part.partition("[")[0] in functions[file] for part in inside.split("::")):
+            kept.append(name)
+    return kept

@@ -1,0 +1,227 @@
+"""Which tests a change runs, on records and commits where the right choice is known."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from tests.verdict import selection
+from tests.verdict.executed import ROOT, ExecutionRecord
+from tests.verdict.recorder import RECORD
+from tests.verdict.recording import RecordedFile, read_recorded, write_recorded
+from tests.verdict.selection import affected_tests, existing_tests, files_that_name, quick_choice
+from tests.verdict.slowest import slowest_lines
+from tests.verdict.studies import choose_studies, run_studies
+
+AREA, ARCS, PEAK = (f"src/zwidth/chart/{name}.py" for name in ("area", "arcs", "peak"))
+TESTS = ["tests/chart/test_a.py", "tests/chart/test_b.py", "tests/loop/test_c.py"]
+KNOWN = {
+    TESTS[0]: RecordedFile(1.0, {AREA, ARCS}),
+    TESTS[1]: RecordedFile(1.0, {PEAK}),
+    TESTS[2]: RecordedFile(1.0, {ARCS, "docs/chart.md"}),
+}
+
+
+@pytest.fixture
+def no_importers(monkeypatch):
+    monkeypatch.setattr(selection, "direct_importers", lambda path: set())
+
+
+# --- what covers a change ---------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("no_importers")
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ([PEAK], TESTS[1:2]),
+        ([ARCS], [TESTS[0], TESTS[2]]),
+        (["docs/chart.md"], TESTS[2:]),
+        (["docs/other.md"], []),
+        ([TESTS[1]], TESTS[1:2]),
+        (["docs/chart.md", PEAK], TESTS[1:]),
+    ],
+)
+def test_tests_that_cover_a_changed_file_are_run(changed, expected):
+    assert affected_tests(changed, KNOWN, TESTS) == expected
+
+
+@pytest.mark.usefixtures("no_importers")
+def test_a_test_file_that_was_never_recorded_is_run_with_any_change_of_the_package():
+    assert affected_tests([PEAK], {TESTS[1]: KNOWN[TESTS[1]]}, TESTS) == TESTS
+    assert affected_tests(["docs/other.md"], {}, TESTS) == []
+
+
+def test_what_a_module_defines_reaches_those_that_import_it(monkeypatch):
+    monkeypatch.setattr(selection, "direct_importers", lambda path: {PEAK} if path == ARCS else set())
+    assert affected_tests([ARCS], KNOWN, TESTS) == TESTS
+
+
+def test_a_new_file_is_covered_by_name_and_by_its_package():
+    existing = ["tests/verdict/test_verdict_of_changes.py", "tests/chart/test_arcs.py", "tests/loop/test_hold.py"]
+    assert files_that_name("src/zwidth/chart/unheard_of.py", existing) == {"tests/chart/test_arcs.py"}
+    assert "tests/loop/test_hold.py" in files_that_name("src/zwidth/loop/unheard_of.py", existing)
+
+
+def test_importers_are_found_by_the_full_name_of_a_module():
+    importers = selection.direct_importers(AREA)
+    assert importers
+    assert all("zwidth.chart.area" in (ROOT / path).read_text() or "area" in path for path in importers)
+    assert AREA not in importers
+
+
+# --- the quick choice -------------------------------------------------------------------------------
+
+
+def test_quick_covers_most_functions_for_its_time():
+    tests = {
+        "f.py::slow": (5.0, {"a", "b", "c"}),
+        "f.py::first": (1.0, {"a", "b"}),
+        "f.py::second": (1.0, {"c"}),
+        "f.py::again": (1.0, {"a"}),
+    }
+    record = {"f.py": RecordedFile(8.0, set(), tests)}
+    assert quick_choice(record, seconds=2.5, per_file=0.1) == ["f.py::first", "f.py::second"]
+    assert quick_choice(record, seconds=0.5, per_file=0.1) == []
+    assert quick_choice(record, seconds=100.0, per_file=0.1) == sorted(tests)
+
+
+def test_one_more_file_costs_its_import():
+    record = {
+        "f.py": RecordedFile(1.0, set(), {"f.py::one": (0.1, {"a", "b"}), "f.py::two": (0.1, {"c"})}),
+        "g.py": RecordedFile(1.0, set(), {"g.py::other": (0.1, {"d"})}),
+    }
+    assert quick_choice(record, seconds=0.75, per_file=0.5) == ["f.py::one", "f.py::two"]
+
+
+def test_names_of_tests_that_are_gone_are_left_out():
+    own = "tests/verdict/test_verdict_of_changes.py"
+    here = f"{own}::test_names_of_tests_that_are_gone_are_left_out"
+    assert existing_tests([here, f"{own}::test_that_never_was[1]"]) == [here]
+
+
+# --- the longer studies -----------------------------------------------------------------------------
+
+STUDIES = ["tests/chart/test_a.py", "tests/loop/test_b.py", "tests/model/test_c.py", "tests/study/test_d.py"]
+SECONDS = dict.fromkeys(STUDIES, 100.0)
+
+
+def test_studies_of_changed_packages_come_first():
+    assert choose_studies(STUDIES, SECONDS, {"study"}, 0, 250.0) == [STUDIES[3], STUDIES[0]]
+
+
+def test_the_others_have_their_turn():
+    chosen = [choose_studies(STUDIES, SECONDS, set(), turn, 100.0) for turn in range(4)]
+    assert [one for (one,) in chosen] == STUDIES
+
+
+def test_a_study_that_takes_too_long_leaves_its_place_to_others():
+    assert choose_studies(STUDIES, SECONDS | {STUDIES[0]: 500.0}, {"chart"}, 0, 200.0) == STUDIES[1:3]
+
+
+@pytest.mark.parametrize(
+    ("body", "seconds", "outcome"),
+    [
+        ("pass", 300.0, "passed"),
+        ("assert False", 300.0, "failed"),
+        ("import time; time.sleep(600)", 0.1, "not finished"),
+        ("pass", 0.0, "not begun"),
+    ],
+)
+def test_a_study_without_a_verdict_is_not_a_failed_one(tmp_path, body, seconds, outcome):
+    file = tmp_path / "test_study.py"
+    file.write_text(f"import pytest\n@pytest.mark.slow\ndef test_one():\n    {body}\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow\n")
+    assert run_studies([str(file)], seconds) == {str(file): outcome}
+
+
+def test_a_long_run_names_its_slowest_files_and_tests():
+    reports = {
+        "passed": [
+            SimpleNamespace(nodeid="a.py::one", duration=50.0),
+            SimpleNamespace(nodeid="b.py::t", duration=8.0),
+        ],
+        "": [SimpleNamespace(nodeid="a.py::one", duration=4.0)],
+        "warnings": [SimpleNamespace(nodeid=None)],
+    }
+    files, tests = slowest_lines(reports)
+    assert files == "slowest files of 62 s: a.py 54, b.py 8"
+    assert tests == "slowest tests of 62 s: a.py::one 54, b.py::t 8"
+    assert slowest_lines({"passed": reports["passed"]}) == []
+
+
+# --- recording --------------------------------------------------------------------------------------
+
+SCRIPT = """
+import json
+from tests.verdict.executed import ExecutionRecord
+record = ExecutionRecord()
+record.start()
+import zwidth.chart.arcs
+own = set()
+record.swap(own)
+from zwidth.device.load import load
+load("five-bar")
+record.swap(set())
+print(json.dumps([sorted(record.functions(own)), sorted(record.read_files)]))
+"""
+
+
+def test_functions_that_ran_and_files_that_were_read_are_recorded():
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")])}
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+    )
+    functions, files = json.loads(done.stdout)
+    assert any(name.startswith("src/zwidth/device/load.py:load") for name in functions)
+    assert not any("chart/arcs.py" in name for name in functions)
+    assert "src/zwidth/device/zoo/five-bar.toml" in files
+
+
+def test_kernels_that_a_function_names_count_as_executed():
+    from zwidth.chart.arcs import sample_arcs
+
+    names: dict[str, object] = {"kernel": SimpleNamespace(py_func=sample_arcs)}
+    exec("def caller(): kernel()", names)
+    code = names["caller"].__code__
+    record = ExecutionRecord()
+    record._places[id(code)] = (code, names)
+    assert "src/zwidth/chart/arcs.py:sample_arcs" in record.functions({id(code)})
+
+
+def test_each_test_is_recorded_with_its_time(tmp_path):
+    test = tmp_path / "test_one.py"
+    test.write_text("from zwidth.device.load import load\ndef test_load(): assert load('five-bar').name\n")
+    environment = os.environ | {
+        RECORD: str(tmp_path),
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")]),
+    }
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "tests.verdict.recorder",
+        "-p",
+        "no:cacheprovider",
+        test,
+    ]
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True)
+    lines = [json.loads(line) for file in tmp_path.glob("*.jsonl") for line in file.read_text().splitlines()]
+    (line,) = [line for line in lines if line["test"] is not None]
+    assert line["test"].endswith("test_one.py::test_load")
+    assert line["seconds"] > 0.0
+    assert any("device/load.py" in name for name in line["functions"])
+
+
+def test_a_record_is_read_as_it_was_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("tests.verdict.recording.RECORDED", tmp_path / "recorded.json")
+    assert read_recorded() == {}
+    write_recorded(KNOWN)
+    assert read_recorded() == KNOWN
