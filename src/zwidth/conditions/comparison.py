@@ -140,7 +140,7 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
     loop = point.loop
     chart, undecided = None, ""
     try:
-        chart = stability_chart(loop, decay=False)
+        chart = stability_chart(loop, decay=False).drawn()
     except ChartError as error:
         undecided = str(error)
     if damping is None:
