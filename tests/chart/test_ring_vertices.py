@@ -34,7 +34,7 @@ from zwidth.model.plant import Plant
 
 BAND = 1e-9
 # Relative: where two roots nearly coalesce, a corner in double precision has no more digits than this.
-WALL_DIGITS = 1e-13
+WALL_DIGITS = 1e-12
 LONGEST_DELAY = 60.0
 # Walls of an arc that an everyday test judges, both corners among them: of a delay of 60 samples each takes
 # milliseconds.

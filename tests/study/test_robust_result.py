@@ -33,6 +33,11 @@ KEYS = {
     "search",
     "violation",
     "excluding",
+    "decided",
+    "edge_walls_in_doubt",
+    "numbers_hold_for",
+    "stiffness_max_is",
+    "unknown_members",
 }
 
 

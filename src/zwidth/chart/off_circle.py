@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 # How exactly a wall of an edge is known, relative. Less would call corners off at which two roots meet: these part
 # with the square root of it, already by 1e-8 for the last digit of K.
-WALL_ROUNDING: Final = 1e-13
+WALL_ROUNDING: Final = 1e-12
 AT_ONCE: Final = 4000  # walls judged in one batch of transition matrices
 
 
@@ -29,16 +29,20 @@ def sides_of_circle(loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damp
 
 
 def distances_from_circle(
-    loop: Loop | MultiLoop, wall_stiffness: ArrayLike, wall_damping: ArrayLike, radius: float = 1.0
+    loop: Loop | MultiLoop,
+    wall_stiffness: ArrayLike,
+    wall_damping: ArrayLike,
+    radius: float = 1.0,
+    band: float = BAND,
 ) -> Floats:
     """How far outside the circle |z| = radius the largest root of walls K, B (k,) is, negative inside; 0 for one
-    that is there, but for rounding."""
+    that is there, but for rounding, or within a band of it."""
     K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
     away = np.zeros(len(K))
     for first in range(0, len(K), AT_ONCE):
         L = loop.transition_matrix(K[first : first + AT_ONCE], B[first : first + AT_ONCE])
         some = np.abs(np.linalg.eigvals(L)).max(axis=-1) - radius
-        for k in np.flatnonzero(np.abs(some) > BAND).tolist():
+        for k in np.flatnonzero(np.abs(some) > band).tolist():
             if abs(some[k]) > MOST_ROUNDING or abs(some[k]) > rounding_of_roots(L[k], rounding=WALL_ROUNDING):
                 away[first + k] = some[k]
     return away

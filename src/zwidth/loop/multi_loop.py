@@ -225,8 +225,7 @@ class MultiLoop:
             return open_, enters, position, velocity
         readings = [rows / np.abs(rows).max(initial=np.finfo(float).tiny) for rows in (position[sprung], velocity)]
         _, size, axes = np.linalg.svd(np.vstack([open_ - np.eye(len(open_)), *readings]))
-        rest = axes[size > UNSEEN].T
-        return rest.T @ open_ @ rest, rest.T @ enters, position @ rest, velocity @ rest
+        return _without_motions((open_, enters, position, velocity), axes[size <= UNSEEN].T)
 
     @cached_property
     def _whole_affine(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -269,3 +268,25 @@ class MultiLoop:
         feedback = K[..., None, None] * (along.stiffness[:, None] * position)
         feedback = feedback + B[..., None, None] * (along.damping[:, None] * velocity)
         return np.asarray(open_ - enters @ feedback)
+
+
+def _without_motions(
+    affine: tuple[Floats, Floats, Floats, Floats], motions: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """A system without motions (N, d) that stay as they are and that nothing reads.
+
+    One state each is left out, and what it says of its motion is taken off the others: x_i - x_p n_i / n_p. An
+    orthogonal basis of the other motions would mix forces with positions, 1e8 times smaller, and no scaling of
+    states could bring back the digits that roots lose by it.
+    """
+    from scipy.linalg import qr
+
+    open_, enters, position, velocity = affine
+    left_out = qr(motions.T, mode="r", pivoting=True)[1][: motions.shape[1]]
+    kept = np.setdiff1d(np.arange(len(open_)), left_out)
+    along = np.linalg.solve(motions[left_out].T, motions[kept].T).T
+
+    def rows(matrix: Floats) -> Floats:
+        return np.asarray(matrix[kept] - along @ matrix[left_out])
+
+    return rows(open_)[:, kept], rows(enters), position[:, kept], velocity[:, kept]

@@ -25,6 +25,7 @@ import scipy.linalg
 import shapely
 from numpy.typing import NDArray
 
+from zwidth.chart.off_circle import WALL_ROUNDING, distances_from_circle
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.raster import ON_EDGE
 from zwidth.chart.several_directions.stable_polygons import FAR, ON_CIRCLE
@@ -114,4 +115,8 @@ def _on_edge(loop: MultiLoop, thetas: Floats, walls: Floats) -> NDArray[np.bool_
         z = np.linalg.eigvals(loop.transition_matrix(K, B))
         away = np.abs(z - np.exp(1j * thetas[part])[:, None]).min(axis=-1)
         found[part] = (np.abs(z).max(axis=-1) < 1.0 + ON_CIRCLE) & (away < AT_ANGLE)
+    # A slow motion may be outside by less than that all along a curve: it is, where rounding is still less.
+    at = np.flatnonzero(found)
+    K, B = (walls[at] / (loop.period, 1.0)).T
+    found[at] = distances_from_circle(loop, K, B, band=WALL_ROUNDING) <= 0.0
     return found
