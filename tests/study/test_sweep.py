@@ -335,12 +335,11 @@ def test_a_hypercube_and_lists_as_a_dataset():
     assert np.allclose(ratio, -0.04565 / 0.147, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("count", "measure"), [(5, "rigid_mass"), (60, "rigid_mass")])
-def test_designs_that_are_measured_together_are_not_cut_apart(monkeypatch, count, measure):
+def test_designs_that_are_measured_together_are_not_cut_apart(monkeypatch):
     """To cut one design's point out of those of many takes far longer than to measure it."""
     cuts, cut = [], OperatingPoint.__getitem__
     monkeypatch.setattr(OperatingPoint, "__getitem__", lambda self, at: (cuts.append(at), cut(self, at))[1])
-    lengths = np.linspace(0.14, 0.155, count).tolist()
-    found = sweep(load("five-bar"), {"links.upper-right.length_m": lengths}, measure, workers=1)
-    assert np.isfinite(found[measure].values).all()
-    assert len(cuts) < 5
+    lengths = np.linspace(0.14, 0.155, 60).tolist()
+    found = sweep(load("five-bar"), {"links.upper-right.length_m": lengths}, "rigid_mass", workers=1)
+    assert np.isfinite(found["rigid_mass"].values).all()
+    assert [at for at in cuts if np.ndim(at) == 0] == []

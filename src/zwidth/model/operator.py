@@ -18,8 +18,8 @@ class OperatorError(ValueError):
 
 ABOUT_AN_AXIS: Final = (
     "is a hand in N/m, N s/m and kg, which holds the handle along a direction; about an axis it would have to be "
-    "in N m/rad, N m s/rad and kg m^2, which an operator cannot be given in. Use --operator none "
-    '(operator="none" in Python), or render a direction'
+    'in N m/rad, N m s/rad and kg m^2, which an operator cannot be given in. Name "none" as the '
+    "operator, or render a direction"
 )
 
 

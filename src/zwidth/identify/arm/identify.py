@@ -73,7 +73,7 @@ POSITION_NOISE: Final = (
 )
 NOT_WRITTEN: Final = (
     "noise in the positions is not in the intervals of 'identify arm', so that its numbers are not put into a "
-    "device file; compare them with other records, and set by --set or by hand what you trust"
+    "device file; compare them with other records, and write by hand what you trust"
 )
 LAGS: Final = 16  # of the errors' autocovariances
 
