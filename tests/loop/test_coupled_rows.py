@@ -28,23 +28,39 @@ def test_walls_of_the_edge_have_a_root_on_the_circle(seed, number):
 
 
 @pytest.mark.parametrize(("seed", "number"), LONG)
-def test_rows_apart_keep_digits_that_a_chain_loses(seed, number, monkeypatch):
+def test_decimals_keep_digits_that_a_chain_loses_and_rows_apart_some(seed, number, monkeypatch):
+    """What a chain of doubles misses of the response, and what is taken in its place; without decimals, too."""
     loop = loop_of_every_kind(seed, number)
-    plant, T = loop.plant, loop.period
-    form = without_hidden_poles(first_order_form(plant, T))
-    states = sample_form(form, T, loop.fractional_delay, loop.controller.actuator_time_constant)
-    rows = separate_rows(form, T, loop.fractional_delay, loop.controller.actuator_time_constant)
-    taken = loop.sections.rows[-len(rows) :]
-    np.testing.assert_array_equal(taken[:, :8], rows)
-    assert not taken[:, 8].any()
+    form, states = form_and_states(loop)
+    count = len(separate_rows(form, loop.period, loop.fractional_delay, loop.controller.actuator_time_constant))
+
+    def taken_rows():
+        return loop_of_every_kind(seed, number).sections.rows[-count:]
+
+    exact = taken_rows()
+    assert rows_error(exact, states) < 1e-10
+    monkeypatch.setattr(sections, "exact_rows", lambda form, sampled, period: np.zeros((0, 8)))
+    apart = taken_rows()
+    assert not apart[:, 8].any()
     monkeypatch.setattr(sections, "FEW_DIGITS", np.inf)
     monkeypatch.setattr(sections, "LOST_DIGITS", np.inf)
-    chain = loop_of_every_kind(seed, number).sections.rows[-len(rows) :]
+    chain = taken_rows()
     assert chain[1:, 8].all()
-    assert rows_error(taken, states) < 0.1 * rows_error(chain, states)
+    assert rows_error(exact, states) < rows_error(apart, states) < 0.1 * rows_error(chain, states)
 
 
-def test_what_rounding_hides_is_refused():
+def form_and_states(loop):
+    form = without_hidden_poles(first_order_form(loop.plant, loop.period))
+    lag = loop.controller.actuator_time_constant
+    return form, sample_form(form, loop.period, loop.fractional_delay, lag)
+
+
+def test_what_rounding_hides_is_answered_in_decimals_and_refused_without(monkeypatch):
     """Force and sensor at two masses that share a hundred-millionth of their motion."""
+    K, B, _, edge = boundary_points(loop_of_every_kind(20260, 9795), 200)
+    roots = ApartLoop(loop_of_every_kind(20260, 9795)).roots(K[edge], B[edge])
+    assert edge.any()
+    assert np.abs(np.abs(roots) - 1.0).min(axis=1).max() < 1e-9
+    monkeypatch.setattr(sections, "exact_rows", lambda form, sampled, period: np.zeros((0, 8)))
     with pytest.raises(UnresolvedError, match=r"two ways to compute the response differ by \d"):
         _ = loop_of_every_kind(20260, 9795).sections

@@ -6,7 +6,7 @@ where `check` would find walls stable, or unstable, all round it within `WALL_RO
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,12 @@ from zwidth.loop.multi_loop import MultiLoop
 
 Floats = NDArray[np.float64]
 
-# How exactly a wall of an edge is known, relative. Less would call corners off at which two roots meet: these part
-# with the square root of it, already by 1e-8 for the last digit of K.
+# How exactly a wall of an edge is known, relative. Less would call walls off whose root has a neighbour that moves
+# it: where two nearly coalesce they part with the square root of it.
 WALL_ROUNDING: Final = 1e-12
+# Two roots closer than this are judged by their mean: where they meet, at a corner, the last digits of a wall set
+# them apart by 1e-8 to 1e-6, and their mean not at all. Larger, and roots that differ pass as one.
+TOGETHER: Final = 1e-5
 AT_ONCE: Final = 4000  # walls judged in one batch of transition matrices
 
 
@@ -41,8 +44,23 @@ def distances_from_circle(
     away = np.zeros(len(K))
     for first in range(0, len(K), AT_ONCE):
         L = loop.transition_matrix(K[first : first + AT_ONCE], B[first : first + AT_ONCE])
-        some = np.abs(np.linalg.eigvals(L)).max(axis=-1) - radius
+        z = np.linalg.eigvals(L)
+        some = np.abs(z).max(axis=-1) - radius
         for k in np.flatnonzero(np.abs(some) > band).tolist():
+            if abs(_joined(z[k], radius)) <= band:
+                continue
             if abs(some[k]) > MOST_ROUNDING or abs(some[k]) > rounding_of_roots(L[k], rounding=WALL_ROUNDING):
                 away[first + k] = some[k]
     return away
+
+
+def _joined(z: NDArray[Any], radius: float) -> float:
+    """How far outside the circle the largest of roots z (n,) is, where it and a neighbour are taken as their mean."""
+    top = int(np.argmax(np.abs(z)))
+    beside = np.abs(z - z[top])
+    beside[top] = np.inf
+    other = int(np.argmin(beside))
+    if not beside[other] <= TOGETHER:
+        return float(np.abs(z[top]) - radius)
+    rest = np.abs(np.delete(z, [top, other])).max(initial=0.0)
+    return float(max(rest, np.abs(z[top] + z[other]) / 2.0) - radius)
