@@ -74,7 +74,7 @@ def test_without_a_handle_no_coupling_is_judged():
 
 def test_keys_and_columns(coupled):
     document = coupled.document()
-    assert document.keys() == {"guarantees", "coupling"}
+    assert document.keys() == {"guarantees", "coupling", "premises"}
     assert [entry["name"] for entry in document["guarantees"]] == [one.name for one in coupled.guarantees]
     assert document["guarantees"][0].keys() == {
         "name",

@@ -55,7 +55,7 @@ def distances_from_circle(
 
 
 def _joined(z: NDArray[Any], radius: float) -> float:
-    """How far outside the circle the largest of roots z (n,) is, where it and a neighbour are taken as their mean."""
+    """How far outside the circle the largest of roots z (n,) is, it and a neighbour taken as their mean."""
     top = int(np.argmax(np.abs(z)))
     beside = np.abs(z - z[top])
     beside[top] = np.inf

@@ -31,7 +31,7 @@ from zwidth.identify.joint.fit import (
 from zwidth.identify.joint.force_balance import ForceBalance, force_balance
 from zwidth.identify.joint.joint import Joint, joint_of
 from zwidth.identify.joint.record import Motion, read_motion, windows_of
-from zwidth.identify.joint.reversed_sense import reason_of_misfit
+from zwidth.identify.joint.reversed_sense import groups_of, reason_of_misfit
 from zwidth.identify.joint.start import first_starts, search_guess
 from zwidth.identify.plausible import check_periods
 from zwidth.identify.records.record import Record
@@ -160,7 +160,7 @@ def fitted_joint(
     windows = windows_of(motion)
     checks += checks_of(motion, windows, joint)
     if motion.driven and all(check.passed or check.warning for check in checks):
-        checks += check_dependence(force_balance(windows, motion.resolution), motion)
+        checks += check_dependence(_balance_before(windows, motion, records), motion)
     if any(not (check.passed or check.warning) for check in checks):
         return tuple(checks), None
     mass = 1.0
@@ -206,6 +206,16 @@ def fitted_joint(
         checks += check_dependence(balance, motion)
     fitted = replace(fitted, checks=tuple(checks))
     return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
+
+
+def _balance_before(windows: Windows, motion: Motion, records: Sequence[Record]) -> ForceBalance:
+    """The balance of all windows, which depends where that of a part does: a sign that flips may hide it."""
+    whole = force_balance(windows, motion.resolution)
+    if whole.depends is not False:
+        return whole
+    parts = groups_of(windows, motion, records).values()
+    depends = any(force_balance(windows.chosen(which), motion.resolution).depends for which in parts)
+    return replace(whole, depends=depends)
 
 
 def balance_of(fit: JointFit, motion: Motion) -> ForceBalance:

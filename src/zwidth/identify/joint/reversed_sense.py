@@ -34,7 +34,7 @@ def reason_of_misfit(windows: Windows, motion: Motion, numbers: Numbers, records
     if not motion.driven:
         return ""
     name, reversed_ = motion.force_name, replace(windows, force=-windows.force)
-    groups = _groups(windows, motion, records)
+    groups = groups_of(windows, motion, records)
     seen = {group: force_balance(windows.chosen(which), motion.resolution) for group, which in groups.items()}
     along, against, own = list[str](), list[str](), list[str]()
     for group, which in groups.items():
@@ -104,7 +104,7 @@ def _some(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(which)), kept)
 
 
-def _groups(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, NDArray[np.bool_]]:
+def groups_of(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, NDArray[np.bool_]]:
     """Windows of each record, or of parts of a single one, by their names."""
     record_of_run = {one.run: one.record for one in motion.sections}
     owner = np.array([record_of_run[int(run)] for run in windows.run])
