@@ -1,4 +1,5 @@
-"""One running workbench for the tests of a process, a client of its socket, and a browser."""
+"""One running workbench for the tests of a process, a client of its socket, and a browser; they end with the last of
+these tests, because a browser takes a tenth of a core as long as it is there."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ import pytest
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def workbench() -> Iterator[int]:
     """Port of a workbench that runs as the command runs it."""
     command = [sys.executable, "-m", "zwidth", "app", "--no-browser", "--port", "0"]
@@ -28,7 +29,7 @@ def workbench() -> Iterator[int]:
         process.wait(20)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     """A browser without a window."""
     if BROWSER is None:
