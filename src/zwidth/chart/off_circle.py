@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from zwidth.chart.verdict import BAND, MOST_ROUNDING, rounding_of_roots
+from zwidth.chart.verdict import BAND, rounding_of_roots
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 
@@ -49,7 +49,7 @@ def distances_from_circle(
         for k in np.flatnonzero(np.abs(some) > band).tolist():
             if abs(_joined(z[k], radius)) <= band:
                 continue
-            if abs(some[k]) > MOST_ROUNDING or abs(some[k]) > rounding_of_roots(L[k], rounding=WALL_ROUNDING):
+            if abs(some[k]) > rounding_of_roots(L[k], rounding=WALL_ROUNDING):
                 away[first + k] = some[k]
     return away
 

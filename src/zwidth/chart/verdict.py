@@ -21,9 +21,9 @@ Floats = NDArray[np.float64]
 BAND = 1e-9
 # Rounding of an eigenvalue in units of its own condition number.
 ROUNDING = 1e-15
-# What rounding moves an eigenvalue by at most: a pair that coalesces moves with its square root, which bounds what
-# 1/0 cannot.
-MOST_ROUNDING = 1e-6
+# What rounding moves an eigenvalue by at most that has a neighbour within COALESCING: a pair that coalesces moves
+# with the square root of rounding, which bounds what 1/0 cannot. Of one that stands alone its condition tells.
+MOST_ROUNDING, COALESCING = 1e-6, 1e-4
 NEAR = 1e-4  # distance from the unit circle within which an eigenvalue's own error may decide
 UNSTABLE, UNDECIDED, STABLE = -1, 0, 1
 BATCH_SIZE = 20_000  # walls judged in one batch of transition matrices
@@ -187,10 +187,11 @@ def rounding_of_roots(L: Floats, radius: float | None = None, rounding: float = 
     z, left, right = eig(balanced, left=True, right=True)
     with np.errstate(divide="ignore"):
         condition = 1.0 / np.abs(np.sum(left.conj() * right, axis=0))
+    error = rounding * float(np.linalg.norm(balanced)) * condition
+    apart = np.abs(z[:, None] - z) + np.where(np.eye(len(z)), np.inf, 0.0)
+    error = np.where(apart.min(axis=1, initial=np.inf) < COALESCING, np.minimum(error, MOST_ROUNDING), error)
     distance = np.abs(np.abs(z) - (np.max(np.abs(z)) if radius is None else radius))
-    near = distance <= max(1e-6, float(np.min(distance)))
-    error = rounding * float(np.linalg.norm(balanced)) * float(np.max(condition[near]))
-    return float(min(error, MOST_ROUNDING))
+    return float(np.max(error[distance <= max(1e-6, float(np.min(distance)))]))
 
 
 def _balance(L: Floats) -> Floats:
