@@ -1,5 +1,7 @@
-"""One running workbench for the tests of a process, a client of its socket, and a browser; they end with the last of
-these tests, because a browser takes a tenth of a core as long as it is there."""
+"""One running workbench for the tests of a process, a client of its socket, and a browser.
+
+They end with the last of these tests, because a browser takes a tenth of a core as long as it is there.
+"""
 
 from __future__ import annotations
 

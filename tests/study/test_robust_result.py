@@ -62,6 +62,7 @@ def test_keys(robust_result):
     assert document.keys() == KEYS
     assert document["violation"] == {
         "unseen": 20,
+        "unknown": 0,
         "violating": 0,
         "worst_spectral_radius": robust_result.violation.worst_spectral_radius,
         "worst_stiffness_share": 0.0,

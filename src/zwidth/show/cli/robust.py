@@ -219,7 +219,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     chart = study.chart
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     members = " and ".join(_member(study, member) for member in chart.members_at_stiffness_max)
-    of_whom = " (charted members)" if study.unknown_members else " (in doubt)" if study.doubt else ""
+    of_whom = " (charted members)" if not study.holds_for_all else " (in doubt)" if study.doubt else ""
     yield (
         f"largest stiffness{of_whom}",
         f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "

@@ -59,7 +59,8 @@ class RobustStudy(Result):
     rounds       number of rounds of the search
     area_change  share of the area by which the last round moved the edge; 0 if it found no member
     settled      whether the search ended because no member that it found moves the edge by more than the tolerance
-    unknown_searched  number of members that the search came to and that could not be built
+    unknown_searched  whether the search came to members that could not be built; how many hangs on the way it
+                 took, and that on rounding
     violation    random members tried; None for a list without ranges, which is charted whole, and where no wall
                  is stable
     """
@@ -71,13 +72,18 @@ class RobustStudy(Result):
     area_change: float
     settled: bool
     violation: Violation | None
-    unknown_searched: int = 0
+    unknown_searched: bool = False
 
     @property
     def unknown_members(self) -> int:
-        """Number of members of which nothing is known: of the chart, of the search, and tried afterwards."""
+        """Number of members of which nothing is known: of the chart, and tried afterwards."""
         unseen = 0 if self.violation is None else self.violation.unknown
-        return self.chart.unknown_members + self.unknown_searched + unseen
+        return self.chart.unknown_members + unseen
+
+    @property
+    def holds_for_all(self) -> bool:
+        """Whether something is known of all members that were looked at, in the search, too."""
+        return not (self.unknown_members or self.unknown_searched)
 
     @property
     def decided(self) -> bool:
@@ -90,8 +96,7 @@ class RobustStudy(Result):
         doubts = [self.chart.doubt] if self.chart.doubt else []
         if self.unknown_searched:
             doubts.append(
-                f"nothing is known of {self.unknown_searched} members that the search for worse cases came to: "
-                "they cannot be built"
+                "nothing is known of members that the search for worse cases came to: they cannot be built"
             )
         if self.violation is not None and self.violation.unknown:
             tried = self.violation.unseen + self.violation.unknown
@@ -130,7 +135,7 @@ class RobustStudy(Result):
             held = self.chart.stiffness_max_is
             doubt |= {
                 "reason": f"this is undecided: {self.doubt}",
-                "numbers_hold_for": "charted members" if self.unknown_members else "all members",
+                "numbers_hold_for": "all members" if self.holds_for_all else "charted members",
                 "stiffness_max_is": "at most" if held in ("exact", "at most") else None,
             }
         violation = None if self.violation is None else self.violation.document()
@@ -150,7 +155,7 @@ class RobustStudy(Result):
         lines.append(f"{len(self.members)} members, {len(chart.binding)} of which bind")
         if chart.members_at_stiffness_max:
             stiffest = f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m"
-            of_whom = "the charted members" if self.unknown_members else "all"
+            of_whom = "all" if self.holds_for_all else "the charted members"
             lines.append(f"largest stiffness stable for {of_whom} {stiffest}")
             lines.append(
                 f"{chart.lost_stiffness_share:.2%} less than the best member has, {chart.lost_share:.2%} less area"
@@ -227,7 +232,7 @@ def robust_study(
         area_change=area_change,
         settled=settled,
         violation=_violation(charted, chart, unseen, seed),
-        unknown_searched=radii.unknown,
+        unknown_searched=radii.met_unknown,
     ).about(family.operating_point)
 
 
@@ -343,7 +348,7 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
         area_change=area_change,
         settled=settled,
         violation=violation,
-        unknown_searched=unknown,
+        unknown_searched=unknown > 0,
     ).about(family.operating_point)
 
 

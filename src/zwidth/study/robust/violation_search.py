@@ -57,9 +57,9 @@ class MemberRadii:
         return self._radii[member, wall]
 
     @property
-    def unknown(self) -> int:
-        """Number of members looked at that cannot be built."""
-        return sum(loop is None for loop in self._loops.values())
+    def met_unknown(self) -> bool:
+        """Whether some of the members looked at cannot be built."""
+        return any(loop is None for loop in self._loops.values())
 
     def _loop(self, member: FamilyMember) -> Loop | None:
         if member not in self._loops:
