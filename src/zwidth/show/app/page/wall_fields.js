@@ -16,13 +16,20 @@ export class WallFields {
   constructor(elements, listeners) {
     this.elements = elements;
     this.listeners = listeners;
-    for (const field of [elements.stiffness, elements.damping]) field.addEventListener("change", () => this.read(field));
+    /** Fields in which something was typed that is no part of a wall yet: an answer that comes meanwhile leaves them. */
+    this.typed = new Set();
+    this.written = "";
+    for (const field of [elements.stiffness, elements.damping]) {
+      field.addEventListener("input", () => this.typed.add(field));
+      field.addEventListener("change", () => this.read(field));
+    }
   }
 
   /** Take over what was typed; the other field, where it is still empty, is 0. @param {HTMLInputElement} typed */
   read(typed) {
     const { stiffness, damping } = this.elements;
     if (!stiffness.value.trim() && !damping.value.trim()) {
+      this.typed.clear();
       this.listeners.onWall(null);
       return;
     }
@@ -35,6 +42,7 @@ export class WallFields {
       this.listeners.say(`${name} of the wall is a number in ${unit.textContent}, such as ${example}, up to 1e15; got "${field.value}"`, true);
       return;
     }
+    this.typed.clear();
     this.listeners.onWall({ stiffness: value(stiffness), damping: value(damping) });
   }
 
@@ -45,8 +53,11 @@ export class WallFields {
    */
   write(wall, found, units) {
     const { stiffness, damping, stiffnessUnit, dampingUnit, verdict } = this.elements;
+    const chosen = JSON.stringify(wall);
+    if (chosen !== this.written) this.typed.clear();
+    this.written = chosen;
     const show = (/** @type {HTMLInputElement} */ field, /** @type {number | undefined} */ value) => {
-      if (document.activeElement !== field) field.value = value === undefined ? "" : String(Number(value.toPrecision(4)));
+      if (document.activeElement !== field && !this.typed.has(field)) field.value = value === undefined ? "" : String(Number(value.toPrecision(4)));
     };
     show(stiffness, wall?.stiffness);
     show(damping, wall?.damping);
