@@ -14,6 +14,28 @@ DIGITS = 40
 STEPS = 8  # of inverse iteration with one decomposition
 DECOMPOSITIONS = 4
 SETTLED = 1e-30  # change of a root in a step
+# Roots closer than this are judged by their mean, which a wall's last digits do not move; them they part by 1e-6.
+TOGETHER = 1e-5
+NOTHING = 1e-12  # share of a chart's size below which a stiffness or damping is 0 but for rounding
+
+
+def joined_excess(z):
+    """Largest |z| - 1 (k,) of roots (k, N), where the largest and a neighbour within TOGETHER are their mean."""
+    rows = np.arange(len(z))
+    top = np.argmax(np.abs(z), axis=-1)
+    apart = np.abs(z - z[rows, top][:, None])
+    apart[rows, top] = np.inf
+    other = np.argmin(apart, axis=-1)
+    near = apart[rows, other] <= TOGETHER
+    mean = (z[rows, top] + z[rows, other]) / 2.0
+    joined = z.astype(complex)
+    joined[rows[near], top[near]] = joined[rows[near], other[near]] = mean[near]
+    return np.abs(joined).max(axis=-1) - 1.0
+
+
+def walls_beside_origin(walls):
+    """Whether walls (k, 2) are K = B = 0 but for a chart's last digits; free motions have a double root there."""
+    return np.all(np.abs(walls) <= NOTHING * np.abs(walls).max(axis=0), axis=1)
 
 
 def exact_matrix(loop, k, b):

@@ -7,6 +7,7 @@ import pytest
 from systems import reference_transition_matrix
 
 from tests.apart import ExactLoop
+from tests.chart.exact_radii import joined_excess, walls_beside_origin
 from tests.chart.robust.test_robust import similar_loops
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.chart.edge_by_eigenvalues import ChartError
@@ -28,7 +29,7 @@ def roots(loop, walls):
 def walls_off_edge(loops):
     """Walls of the edge off the circle for the member that binds, or beyond it for another, in 40 digits.
 
-    [] of what is not decided.
+    [] of what is not decided. Roots that meet are judged by their mean, and K = B = 0 is left out.
     """
     try:
         chart = robust_chart(loops)
@@ -38,10 +39,11 @@ def walls_off_edge(loops):
         return []
     walls = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in chart.boundary])
     binding = np.repeat([arc.member for arc in chart.boundary], [len(arc.stiffness) for arc in chart.boundary])
+    walls, binding = walls[~walls_beside_origin(walls)], binding[~walls_beside_origin(walls)]
     off = []
     for index, loop in chart.members.items():
         z = roots(loop, walls)
-        away = np.abs(z).max(axis=-1) - 1.0
+        away = joined_excess(z)
         away = np.where(binding == index, np.abs(away), away)
         exact = ExactLoop(loop)
         for n in np.argsort(-away)[:MOST]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from multi_loops import random_multi, random_unlike, reference_radius
+from multi_loops import random_multi, random_unlike, reference_matrix
 
-from tests.chart.exact_radii import exact_matrix, exact_radius
+from tests.chart.exact_radii import exact_matrix, exact_radius, joined_excess, walls_beside_origin
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.chart.several_directions.chart import multi_chart
 
 OFF = 1e-9
-NOTHING = 1e-12  # share of the chart's size below which a stiffness or damping is 0 but for rounding
 # Walls judged in 40 digits, of those that double precision finds off: the farthest off.
 MOST = 12
 EVERYDAY_MOST = 2
@@ -20,14 +19,14 @@ EVERYDAY_MOST = 2
 def walls_off_circle(loop, most=MOST):
     """Walls of the edge whose largest root is off the unit circle, in 40 digits; [] of what is not decided.
 
-    K = B = 0 is left out, to the last digits of the chart: free motions have a double root z = 1 there.
+    Roots that meet are judged by their mean, and K = B = 0 is left out.
     """
     chart = multi_chart(loop)
     if not chart.boundary or len(chart.doubtful) or len(chart.off_circle) or len(chart.missed):
         return []
     walls = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in chart.boundary])
-    walls = walls[np.any(np.abs(walls) > NOTHING * np.abs(walls).max(axis=0), axis=1)]
-    away = np.abs(reference_radius(loop, walls) - 1.0)
+    walls = walls[~walls_beside_origin(walls)]
+    away = np.abs(joined_excess(np.linalg.eigvals([reference_matrix(loop, K, B) for K, B in walls.tolist()])))
     worst = np.argsort(-away)[:most]
     return [
         (float(K), float(B))
