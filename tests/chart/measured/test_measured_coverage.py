@@ -10,6 +10,7 @@ import pytest
 from tests import systems
 from tests.measured_cases import chirp
 from tests.noisy_benches import random_bench, readings
+from tests.study_sizes import study_size
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.measured.chart import measured_chart
 from zwidth.chart.verdict import eigenvalues
@@ -21,7 +22,7 @@ from zwidth.model.response import ResponseError, integrators_of
 from zwidth.model.sweep_response import sweep_response
 
 CLAIMED = 0.95
-BATCH = 250
+BATCH = study_size(continuous=100, full=250)
 ON_EDGE = 1e-9  # distance of the largest root from the circle, at which no verdict is wrong
 
 
@@ -97,7 +98,7 @@ def test_what_is_certain_on_a_noisy_bench_is_true(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("batch", range(4))
+@pytest.mark.parametrize("batch", range(study_size(continuous=1, full=4)))
 def test_charts_of_a_thousand_noisy_benches_are_as_right_as_they_claim(batch):
     """And the headline costs little: the median over the truth is above 0.95."""
     found = [one for seed in range(BATCH * batch, BATCH * (batch + 1)) if (one := outcome_or_refusal(seed))]
