@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.apart import ApartLoop
-from tests.chart.exact_radii import exact_radius
+from tests.chart.exact_radii import exact_radius, joined_excess
 from tests.chart.test_fixed_feedback_charts import KINDS
 from tests.control_apart import ControlledLoop, random_controlled_loop
 from tests.loop.estimators_cases import random_method
@@ -97,6 +97,7 @@ def vertices_off(chart, matrices, seen, most):
     most  so many of each arc at most
 
     K = B = 0 is left out: a free device alone has a double root z = 1, which rounding of its matrix sets apart.
+    Roots that meet elsewhere are judged by their mean.
     """
     L0, LK, LB = matrices
     off = []
@@ -106,7 +107,7 @@ def vertices_off(chart, matrices, seen, most):
         K, B = arc.stiffness[chosen], arc.damping[chosen]
         K, B = K[(K != 0.0) | (B != 0.0)], B[(K != 0.0) | (B != 0.0)]
         L = L0 + np.multiply.outer(K, LK) + np.multiply.outer(B, LB)
-        excess = np.abs(np.linalg.eigvals(L)).max(axis=-1) - 1.0
+        excess = joined_excess(np.linalg.eigvals(L))
         seen["walls"] += len(K)
         for k in np.flatnonzero(np.abs(excess) > BAND).tolist():
             seen["in 40 digits"] += 1
