@@ -29,7 +29,7 @@ SAME_POLES = 1e-6
 # A chain that misses the response by more than the first is written again in decimal arithmetic: a root on the
 # unit circle, which moves by about as much, would else be off it by what eigenvalues see (1e-9). By more than the
 # second it is tried pole by pole; by more than the third, two ways to write it tell nothing of the plant.
-KEPT_DIGITS, FEW_DIGITS, LOST_DIGITS = 1e-13, 1e-8, 1e-4
+KEPT_DIGITS, FEW_DIGITS, LOST_DIGITS = 1e-12, 1e-8, 1e-4
 
 
 class UnmovedError(ValueError):
