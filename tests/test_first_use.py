@@ -109,18 +109,15 @@ def test_a_kernel_is_compiled_once_and_only_what_python_calls(call, tmp_path):
 
 
 @needs_parts
-@pytest.mark.parametrize(
-    ("exchange", "value"),
-    [
+def test_an_edit_that_matters_is_compiled_anew(call):
+    """A constant, a callee, the order of a tuple's fields."""
+    call()
+    for exchange, value in (
         (("FACTOR = 3.0", "FACTOR = 4.0"), 32.0),
         (("return 2.0 * scaled", "return 1.0 * scaled"), 12.0),
         (("first: np.ndarray\n    second: np.ndarray", "second: np.ndarray\n    first: np.ndarray"), 0.0),
-    ],
-    ids=["a constant", "a callee", "the order of a tuple's fields"],
-)
-def test_an_edit_that_matters_is_compiled_anew(call, exchange, value):
-    call()
-    assert call(exchange) == f"{value} ['kernels.total']"
+    ):
+        assert call(exchange) == f"{value} ['kernels.total']", exchange
     assert call() == "24.0 []"
 
 

@@ -13,6 +13,7 @@ from app.socket_client import SocketClient
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from tests.cli.command_runner import refusal_lines
 from zwidth.show.app.server import LARGEST_REPORT, MOST_REPORTS, TYPES, Settings, page_files
 
 
@@ -175,11 +176,12 @@ def test_bad_command_lines_are_refused_on_one_line() -> None:
         (["no-such-device"], "is neither a file nor a bundled device"),
         (["five-bar", "--set", "loop.sampling_period_s=-1"], "must be at least"),
         (["--port", "70000"], "--port"),
-        (["--host", "no.such.host.invalid", "--port", "0"], "cannot listen"),
     ]:
-        command = [sys.executable, "-m", "zwidth", "app", "--no-browser", *arguments]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
-        assert ended.returncode == 2, arguments
-        assert ended.stdout == ""
-        assert part in ended.stderr
-        assert "Traceback" not in ended.stderr
+        assert any(part in line for line in refusal_lines("app", "--no-browser", *arguments)), arguments
+    nowhere = ["--host", "no.such.host.invalid", "--port", "0"]
+    command = [sys.executable, "-m", "zwidth", "app", "--no-browser", *nowhere]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 2
+    assert ended.stdout == ""
+    assert "cannot listen" in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -156,11 +156,11 @@ def assert_right(seen, loops):
 
 @pytest.mark.parametrize("kind", ["force-sensor", "feedforward", "local"])
 def test_charts_agree_with_eigenvalues(kind):
-    assert_right(look_at(kind, range(20)), 20)
+    assert_right(look_at(kind, range(10)), 10)
 
 
 def test_charts_of_all_three_together_agree_with_eigenvalues():
-    assert_right(look_at("all", range(20)), 20)
+    assert_right(look_at("all", range(10)), 10)
 
 
 @pytest.mark.slow
@@ -174,7 +174,7 @@ def test_thousands_of_charts_agree_with_eigenvalues(kind):
 def test_no_wall_decays_faster_than_the_fastest(kind):
     """The wall that the chart names has the radius it says, and none of many others about it has a smaller one."""
     tried = 0
-    for number in range(12):
+    for number in range(5):
         rng = np.random.default_rng([77, number])
         case = random_controlled_loop(rng, *KINDS[kind])
         try:
@@ -197,4 +197,4 @@ def test_no_wall_decays_faster_than_the_fastest(kind):
         around = np.nan_to_num(scale)[:, None] * sizes + np.array([[K], [B]])
         L = case.loop.transition_matrix(*around)
         assert np.abs(np.linalg.eigvals(L)).max(axis=-1).min() > radius - 2e-6, number
-    assert tried >= 6
+    assert tried >= 3

@@ -163,7 +163,7 @@ def counts_at_the_tip(loop, chart, factor):
     return judge.outside(np.array([inside, [1.001 * K, B], middle]))
 
 
-@pytest.mark.parametrize("seed", [1, 8, 13, 15, 115, 125, 140])
+@pytest.mark.parametrize("seed", [1, 15, 140])
 def test_the_tip_with_the_smallest_loss_is_where_roots_leave_the_circle(seed):
     loop = undamped_loop(seed)
     inside, beyond, middle = counts_at_the_tip(loop, lossy_chart(loop, SMALLEST), SMALLEST)
@@ -171,7 +171,7 @@ def test_the_tip_with_the_smallest_loss_is_where_roots_leave_the_circle(seed):
     assert beyond > 0.95
 
 
-@pytest.mark.parametrize("seed", [1, 140])
+@pytest.mark.parametrize("seed", [1, pytest.param(140, marks=pytest.mark.slow)])
 def test_twice_the_loss_moves_the_tip_twice_as_far_from_the_undamped_one(seed):
     loop = undamped_loop(seed)
     undamped = stability_chart(loop, decay=False).stiffness_max

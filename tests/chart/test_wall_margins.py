@@ -77,7 +77,7 @@ def compare_with_eigenvalues(seed, count):
 
 
 def test_the_box_is_stable_and_no_stiffer_one_is():
-    assert compare_with_eigenvalues(21, 25) > 10
+    assert compare_with_eigenvalues(21, 8) > 3
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, run_command
 from tests.identify.spring_bench import bench_record
+from tests.undrawn_figures import leave_undrawn
 from zwidth.show.cli.group import zwidth as group
 from zwidth.show.output import csv_text
 
@@ -78,12 +79,19 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture
+def quick(monkeypatch):
+    """Figures of reports are not drawn, and experiments seek the stiffest wall in one round of four."""
+    leave_undrawn(monkeypatch)
+    monkeypatch.setattr("zwidth.contact.boundary_experiment.ZOOMS", 1)
+
+
 # `zwidth compile` runs in test_first_use; the workbench goes on until ctrl-C, and runs in tests/app
 ELSEWHERE = ("zwidth compile", "zwidth app")
 
 
 @pytest.mark.parametrize("line", [one for one in blocks("sh").splitlines() if not one.startswith(ELSEWHERE)])
-def test_an_example_runs(folder, line):
+def test_an_example_runs(folder, quick, line):
     before = set(folder.iterdir())
     words = shlex.split(line)
     assert words[0] == "zwidth"
@@ -112,7 +120,7 @@ def test_every_command_has_its_section_and_every_option_its_word():
                     assert option.opts[0] in PAGE
 
 
-def test_the_keys_that_come_out_are_those_explained(folder):
+def test_the_keys_that_come_out_are_those_explained(folder, quick):
     asked = keys("What comes out")
     for device in (MECHANISM, TWO_MASS):
         assert set(document_of("show", device)) - asked == keys("show")

@@ -47,12 +47,25 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture
+def rough_search(monkeypatch):
+    """The stiffest wall is sought in one round of four: most of an experiment's time goes into the others."""
+    monkeypatch.setattr("zwidth.contact.boundary_experiment.ZOOMS", 1)
+
+
 @pytest.fixture(scope="module")
-def journal_bytes(tmp_path_factory):
-    """The journal of the smallest experiment, for tests of what is made of its points."""
+def smallest(tmp_path_factory):
+    """The points of the smallest experiment and its journal, for tests of what is made of them."""
     journal = tmp_path_factory.mktemp("experiment") / "run.progress"
-    document_of("experiment", TWO_MASS, *FEWEST, "--resume", journal)
-    return journal.read_bytes()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("zwidth.contact.boundary_experiment.ZOOMS", 1)
+        points = document_of("experiment", TWO_MASS, *FEWEST, "--resume", journal)["points"]
+    return points, journal.read_bytes()
+
+
+@pytest.fixture
+def journal_bytes(smallest):
+    return smallest[1]
 
 
 def dry(folder, friction=0.02, step=0.0):
@@ -109,8 +122,8 @@ def test_own_points_are_held_against_the_exact_edge(folder, journal_bytes):
         (0.0, 0.0, "agree", "friction"),
     ],
 )
-def test_the_difference_is_explained_by_what_makes_it(folder, friction, step, says, says_not):
-    asked = ("experiment", dry(folder, friction, step), *FEW, "--resume", "run.progress")
+def test_the_difference_is_explained_by_what_makes_it(folder, rough_search, friction, step, says, says_not):
+    asked = ("experiment", dry(folder, friction, step), *FEWEST, "--resume", "run.progress")
     document = document_of(*asked)
     text = " ".join(document["explanation"])
     assert says in text
@@ -178,15 +191,7 @@ def test_tips_beyond_all_edges_or_beside_them_contradict_nothing(tips):
     assert warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips))) is None
 
 
-def test_a_run_that_takes_its_time_says_what_it_does(folder, monkeypatch):
-    monkeypatch.delenv("ZWIDTH_QUIET")
-    monkeypatch.setattr("zwidth.show.cli.progress.PATIENCE", 0.0)
-    ran = run_command("experiment", TWO_MASS, *FEWEST)
-    assert "looking for stable walls" in ran.err
-    assert "looking" not in ran.out
-
-
-def test_subjects_and_trials_give_bars(folder):
+def test_subjects_and_trials_give_bars(folder, rough_search):
     asked = ("experiment", TWO_MASS, "--operator", "thesis-arm", "--wall", "one-sided", "--stiffnesses", 1)
     many = (*asked, "--tips", 0, "--subjects", 2, "--trials", 2, "--spread", 0.5)
     document = document_of(*many)
@@ -207,10 +212,12 @@ def test_an_interrupted_run_goes_on_where_it_was(folder):
     assert code == 130
     assert "points.csv.progress keeps the finished work" in err
     assert not (folder / "points.csv").exists()
-    assert journal.read_bytes().count(b"\n") == 5, "the question, and four results"
+    kept = journal.read_bytes().splitlines(keepends=True)
+    assert len(kept) == 5, "the question, and four results"
     assert run_command(*words).code == 0
     assert not journal.exists()
     resumed = (folder / "points.csv").read_bytes()
+    journal.write_bytes(b"".join(kept[:2]))  # where the stable walls are, and no edge
     assert run_command(*words).code == 0
     assert (folder / "points.csv").read_bytes() == resumed
 
@@ -219,17 +226,27 @@ def fail_if_measured(*_):
     raise AssertionError("measured again")
 
 
-def test_a_journal_of_ones_own_is_kept_and_a_changed_question_begins_anew(folder, monkeypatch):
-    asked = ("experiment", TWO_MASS, *FEWEST, "--resume", "run.progress")
-    first = document_of(*asked)["points"]
-    kept = Path("run.progress").read_bytes()
-    with monkeypatch.context() as patched:
-        for name in ("find_stable_walls", "measure_edges", "measure_tips"):
-            patched.setattr(f"zwidth.study.boundary.experiment.{name}", fail_if_measured)
-        assert document_of(*asked)["points"] == first
+def test_a_journal_of_ones_own_is_kept(folder, smallest, monkeypatch):
+    points, kept = smallest
+    Path("run.progress").write_bytes(kept)
+    for name in ("find_stable_walls", "measure_edges", "measure_tips"):
+        monkeypatch.setattr(f"zwidth.study.boundary.experiment.{name}", fail_if_measured)
+    assert document_of("experiment", TWO_MASS, *FEWEST, "--resume", "run.progress")["points"] == points
     assert Path("run.progress").read_bytes() == kept
-    assert document_of(*asked, "--disturbance", 0.002)["points"]
-    assert Path("run.progress").read_bytes() != kept
+
+
+def test_a_changed_question_begins_anew_and_a_run_that_takes_its_time_says_what_it_does(
+    folder, rough_search, journal_bytes, monkeypatch
+):
+    Path("run.progress").write_bytes(journal_bytes)
+    monkeypatch.delenv("ZWIDTH_QUIET")
+    monkeypatch.setattr("zwidth.show.cli.progress.PATIENCE", 0.0)
+    ran = run_command("experiment", TWO_MASS, *FEWEST, "--resume", "run.progress", "--disturbance", 0.002)
+    assert ran.code == 0
+    assert "looking for stable walls" in ran.err
+    assert "looking" not in ran.out
+    assert "lower" in ran.out
+    assert Path("run.progress").read_bytes() != journal_bytes
 
 
 def test_no_stable_wall_is_an_answer(folder):

@@ -85,8 +85,10 @@ def test_a_measured_chart_has_the_keys_of_every_chart_and_its_own(device):
     assert all(f == round(f) for arc in inner for f in arc["frequency_Hz"])
 
 
-def test_people_read_the_band_and_what_is_not_to_be_relied_on(noisy, tmp_path):
-    document = document_of("chart", noisy)
+def test_people_read_the_band_and_what_is_not_to_be_relied_on_and_the_boundary_is_written_as_a_table(
+    noisy, tmp_path
+):
+    document = document_of("chart", noisy, "--output", tmp_path / "edge.csv")
     band = document["band"]
     assert band["stiffness_low_N_per_m"] == document["stiffness_max_N_per_m"]
     nominal = document["stiffness_max_nominal_N_per_m"]
@@ -97,10 +99,6 @@ def test_people_read_the_band_and_what_is_not_to_be_relied_on(noisy, tmp_path):
     assert "95 % confidence at all" in out
     assert "400 of 400 frequencies used, 2 integrators" in out
     assert (tmp_path / "chart.png").stat().st_size > 10_000
-
-
-def test_the_boundary_is_written_as_a_table(noisy, tmp_path):
-    document_of("chart", noisy, "--output", tmp_path / "edge.csv")
     rows = list(csv.DictReader((tmp_path / "edge.csv").read_text().splitlines()))
     inner = [row for row in rows if 0.0 < float(row["frequency_Hz"]) < 400.0]
     for row in inner:

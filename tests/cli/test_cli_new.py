@@ -9,6 +9,7 @@ import tomllib
 import pytest
 
 from tests.cli.command_runner import document_of, refusal_lines, run_command
+from tests.undrawn_figures import leave_undrawn
 from zwidth.device.new_device import KINDS, new_device
 
 
@@ -18,14 +19,19 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+DRAWN = ("five-bar", "plant")  # kinds whose report is drawn: a mechanism, and masses
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_new_device_answers_at_once_without_a_word(folder, kind):
+def test_a_new_device_answers_at_once_without_a_word(folder, monkeypatch, kind):
     document = document_of("new", "mine", "--kind", kind)
     assert document == {"name": "mine", "kind": kind, "file": str(folder / "mine.toml")}
     assert (folder / "mine.toml").read_text() == new_device("mine", kind)
     endings = ("Nm_per_rad", "kg_m2") if kind == "wrist" else ("N_per_m", "kg")
     assert document_of("chart", "mine.toml")[f"stiffness_max_{endings[0]}"] > 500.0
     assert document_of("show", "mine.toml")[f"rigid_mass_{endings[1]}"] > 0.001
+    if kind not in DRAWN:
+        leave_undrawn(monkeypatch)
     assert document_of("report", "mine.toml", "--output", "mine.html")["file"] == str(folder / "mine.html")
     for words in (("chart", "mine.toml"), ("show", "mine.toml")):
         ran = run_command(*words)

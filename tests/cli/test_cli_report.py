@@ -6,9 +6,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, run_command
+from tests.undrawn_figures import leave_undrawn
 
 
-def test_the_report_is_written_and_its_numbers_are_the_charts(tmp_path):
+def test_the_report_is_written_and_its_numbers_are_the_charts(tmp_path, monkeypatch):
+    leave_undrawn(monkeypatch)
     file = tmp_path / "here.html"
     question = (MECHANISM, "--at", "-0.1,0.2", "--direction", "-1,0", "--set", "loop.delay_samples=0.25")
     report = document_of("report", *question, "--output", file)
@@ -24,6 +26,7 @@ def test_the_report_is_written_and_its_numbers_are_the_charts(tmp_path):
 
 @pytest.mark.parametrize(("device", "name"), [(TWO_MASS, TWO_MASS), ("folder/my.paddle.toml", "my.paddle")])
 def test_without_a_name_it_is_called_after_the_device(tmp_path, monkeypatch, device, name):
+    leave_undrawn(monkeypatch)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     text = 'name = "x"\n[plant]\nmass_kg = 0.05\n[loop]\nsampling_period_s = 0.001\n'
@@ -34,7 +37,8 @@ def test_without_a_name_it_is_called_after_the_device(tmp_path, monkeypatch, dev
     assert (tmp_path / f"{name}-report.html").stat().st_size > 10_000
 
 
-def test_a_device_without_stable_walls_has_a_report_and_exit_code_1(tmp_path):
+def test_a_device_without_stable_walls_has_a_report_and_exit_code_1(tmp_path, monkeypatch):
+    leave_undrawn(monkeypatch)
     file = tmp_path / "none.html"
     unstable = ("--set", "plant.damping_Ns_per_m=unset", "--set", "loop.delay_samples=1")
     ran = run_command("report", TWO_MASS, *unstable, "--output", file, "--json")

@@ -55,6 +55,17 @@ def study(folder: Path, *tables: str, wall: str = WALL, samples: int = 100, indi
     return Path("series.toml")
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """The study of `study(folder, indices=0)` with its store "kept", for tests of what is made of it."""
+    there = tmp_path_factory.mktemp("tolerance")
+    (there / "mass.toml").write_text(DEVICE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(there)
+        document = document_of("tolerance", study(there, indices=0), "--resume", "kept")
+    return there / "kept", document
+
+
 def lines(*words: object, code: int = 0) -> list[str]:
     """What is printed, the rows of tables with their cells parted by one blank."""
     ran = run_command("tolerance", *words)
@@ -63,7 +74,7 @@ def lines(*words: object, code: int = 0) -> list[str]:
 
 
 def test_the_answer_in_sentences(folder):
-    told = lines(study(folder))
+    told = lines(study(folder), "--resume", "kept")
     assert told[0] == "free mass: 100 devices drawn, seed 1"
     assert "plant.mass_kg uniform, 0.08 to 0.12 kg" in told
     (wall,) = [line for line in told if line.startswith("the wall")]
@@ -73,7 +84,7 @@ def test_the_answer_in_sentences(folder):
         wall,
     )
     share, low, high = map(float, number.groups())
-    found = document_of("tolerance", "series.toml")
+    found = document_of("tolerance", "series.toml", "--resume", "kept")
     assert [share, low, high] == pytest.approx(
         [100.0 * found[key] for key in ("probability", "probability_low", "probability_high")], rel=1e-3
     )
@@ -106,6 +117,14 @@ def test_a_wall_that_is_undecided_is_said_to_be(folder):
     assert not any("none of them" in line or "not stable" in line for line in told)
 
 
+@pytest.fixture(scope="module")
+def mass_study(tmp_path_factory):
+    """100 devices that differ in their mass."""
+    there = tmp_path_factory.mktemp("masses")
+    (there / "mass.toml").write_text(DEVICE)
+    return run_tolerances(there / study(there, MASS, indices=0))
+
+
 UNDECIDED_IN_SOME = [
     (4, 0, 96, "stable in 4 of 100 devices and undecided in 96", "at least 1.100 %"),
     (40, 50, 10, "stable in 40 of 100 devices and undecided in 10", "30.33 to 60.17 %"),
@@ -115,9 +134,9 @@ UNDECIDED_IN_SOME = [
 
 @pytest.mark.parametrize(("stable", "unstable", "undecided", "known", "part"), UNDECIDED_IN_SOME)
 def test_a_wall_that_is_undecided_in_some_devices_says_in_how_many(
-    folder, stable, unstable, undecided, known, part
+    mass_study, stable, unstable, undecided, known, part
 ):
-    found = run_tolerances(study(folder, MASS, indices=0))
+    found = mass_study
     n = [one.name for one in found.question.columns].index("wall_is_stable")
     values, status = found.cells.values.copy(), found.cells.status.copy()
     values[:, n] = np.repeat([1.0, 0.0, np.nan], [stable, unstable, undecided])
@@ -155,32 +174,34 @@ def test_devices_without_an_answer_are_told(folder):
     table = MASS.replace("plant.mass_kg", "links.distal-right.length_m").replace("20", "30")
     text = f'device = "five-bar"\nat = [0.0, 0.3]\nstiffness_N_per_m = 500\ndamping_Ns_per_m = 9\n{table}'
     (folder / "series.toml").write_text(text + "[draw]\nsamples = 72\nindex_samples = 0\n")
-    told = lines("series.toml")
-    found = document_of("tolerance", "series.toml")
+    told = lines("series.toml", "--resume", "kept")
+    found = document_of("tolerance", "series.toml", "--resume", "kept")
     out = found["outcomes"]["out of reach"]
     assert f"{out} of 72 devices do not get to the handle's position; they count as not stable" in told
     assert f"{out} of 72 devices have no chart; in its bands they count as not stable" in told
     (folder / "series.toml").write_text(text.replace("0.3", "0.9") + "[draw]\nsamples = 72\n")
-    ran = run_command("tolerance", "series.toml", "--json")
+    ran = run_command("tolerance", "series.toml", "--resume", "none", "--json")
     assert ran.code == 1
     assert ran.document["reason"] == "no drawn device has an answer: 72 out of reach"
     assert ran.document["bands"] == []
     assert (
-        lines("series.toml", code=1)[-1]
+        lines("series.toml", "--resume", "none", code=1)[-1]
         == "72 of 72 devices do not get to the handle's position; they count as not stable"
     )
 
 
-def test_devices_without_a_stable_wall_are_told(folder):
+def test_devices_without_a_stable_wall_are_told_and_a_band_without_a_wall_is_none(folder):
     falls = '[[tolerance]]\nkey = "plant.damping_Ns_per_m"\ndistribution = "uniform"\nlow = -200\nhigh = 60\n'
-    told = lines(study(folder, falls, wall="", indices=0))
-    found = document_of("tolerance", "series.toml")
+    told = lines(study(folder, falls, wall="", indices=0), "--resume", "kept")
+    found = document_of("tolerance", "series.toml", "--resume", "kept")
     none = found["without_stable_wall"]
     assert (
         f"{none} of 100 devices have no stable wall with K > 0 and B >= 0: their largest stiffness counts as 0"
         in told
     )
     assert found["outcomes"] == {"with a stable wall": 100 - none, "without a stable wall": none}
+    assert "95.00 % none none" in told
+    assert not any(line.startswith("5.000 % none") for line in told)
 
 
 def test_a_distribution_is_cut_off_where_no_device_can_be_and_what_is_left_of_it_is_said(folder):
@@ -205,13 +226,6 @@ def test_a_distribution_that_no_device_can_have_is_refused_before_any_is_drawn(f
     )
 
 
-def test_a_band_without_a_wall_is_none(folder):
-    falls = '[[tolerance]]\nkey = "plant.damping_Ns_per_m"\ndistribution = "uniform"\nlow = -200\nhigh = 60\n'
-    told = lines(study(folder, falls, wall="", indices=0))
-    assert "95.00 % none none" in told
-    assert not any(line.startswith("5.000 % none") for line in told)
-
-
 def test_what_is_for_other_commands_is_said_to_be(folder):
     axis = '[[axis]]\nkey = "loop.delay_samples"\nvalues = [0, 1]\n'
     path = study(folder, MASS, axis, indices=0)
@@ -223,9 +237,11 @@ def test_what_is_for_other_commands_is_said_to_be(folder):
 
 
 @pytest.mark.parametrize("kind", ["csv", "json", "nc", "mat", "svg", "png", "pdf"])
-def test_a_file_of_every_kind_and_nothing_is_left_beside_it(folder, kind):
+def test_a_file_of_every_kind_and_nothing_is_left_beside_it(folder, kept, kind):
+    """The first is computed; the others are written of what the same study keeps elsewhere."""
     path = study(folder, indices=0)
-    document = document_of("tolerance", path, "--output", f"found.{kind}")
+    resumed = () if kind == "csv" else ("--resume", kept[0])
+    document = document_of("tolerance", path, "--output", f"found.{kind}", *resumed)
     assert document["file"].endswith(f"found.{kind}")
     assert {one.name for one in folder.iterdir()} == {"mass.toml", "series.toml", f"found.{kind}"}
     if kind == "csv":
@@ -239,16 +255,15 @@ def test_a_file_of_every_kind_and_nothing_is_left_beside_it(folder, kind):
             assert float(dataset["wall_is_stable"].mean()) == document["probability"]
 
 
-def test_the_same_command_goes_on_from_what_is_kept(folder):
-    path = study(folder, indices=0)
+def test_the_same_command_goes_on_from_what_is_kept(folder, kept):
+    path, (store, first) = study(folder, indices=0), kept
     whole = document_of("tolerance", path)
-    first = document_of("tolerance", path, "--resume", "kept")
-    stores = {one.name for one in Path("kept").iterdir()}
+    stores = {one.name for one in store.iterdir()}
     assert stores == {"devices", "edges-0", "edges-1", "middle", "narrower", "unseen"}
-    values = Path("kept/devices/values").stat().st_mtime_ns
-    again = document_of("tolerance", path, "--resume", "kept")
+    values = (store / "devices" / "values").stat().st_mtime_ns
+    again = document_of("tolerance", path, "--resume", store)
     assert whole == first == again
-    assert Path("kept/devices/values").stat().st_mtime_ns == values
+    assert (store / "devices" / "values").stat().st_mtime_ns == values
     other = document_of("tolerance", path, "--seed", 2)
     assert other["quantiles"] != whole["quantiles"]
 
@@ -317,10 +332,9 @@ def test_the_page_names_every_key():
             assert f"`{key}`" in PAGE, key
 
 
-def test_a_figure_says_what_it_shows(folder):
-    found = run_tolerances(study(folder, indices=0))
-    assert any("plant.mass_kg" in line for line in caption_of_result(found))
-    ax = found.plot()
+def test_a_figure_says_what_it_shows(mass_study):
+    assert any("plant.mass_kg" in line for line in caption_of_result(mass_study))
+    ax = mass_study.plot()
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert [label.replace("\u00a0", " ") for label in labels[:3]] == [
         f"stable in at least {share} % of the devices" for share in (5, 50, 95)

@@ -141,15 +141,15 @@ def test_counted_readings_are_the_ode_solvers_until_one_count_parts_them_and_swi
     parts = Nonlinear(friction=(friction_of(0.1),), counters=(Counter(MOTOR, 1e-5),), force_limit=3.0)
     loop = two_mass_loop(parts, delay=0.4, actuator_time_constant=5e-4)
     x, v = np.array([1e-3, 1e-3]), np.zeros(2)
-    judged = EventSolver(loop, two_sided(4000.0, 6.0)).run(x, v, 801)
-    ours = run(loop, 4000.0, 6.0, 1.0, start=(x, v), substeps=80)
+    judged = EventSolver(loop, two_sided(4000.0, 6.0)).run(x, v, 401)
+    ours = run(loop, 4000.0, 6.0, 0.5, start=(x, v), substeps=80)
     same = judged.reading == ours.reading
     first = int(np.argmin(same)) if not same.all() else len(same)
     assert first > 40
     gap = np.abs(ours.truth - judged.position @ loop.plant.sensor)
     assert gap[:first].max() < 1e-7
     assert ours.force[:first] == pytest.approx(judged.force[:first], abs=1e-9)
-    late = slice(400, 801)
+    late = slice(200, 401)
     swing = np.ptp(judged.reading[late])
     assert np.ptp(ours.reading[late]) == pytest.approx(swing, rel=0.02)
     tones = [dominant_frequency(reading[late], loop.period) for reading in (ours.reading, judged.reading)]

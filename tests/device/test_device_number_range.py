@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import cache
 from math import pi, sqrt
 from typing import Any
 
@@ -34,12 +36,18 @@ REAL = {
 }
 
 
-def sliders(device: Device) -> list[DeviceNumber]:
-    return [one for one in device_numbers(device) if one.low is not None]
+@cache
+def numbers_of(name: str) -> tuple[DeviceNumber, ...]:
+    """The numbers of a bundled device, read off it once for all that is asked of them."""
+    return tuple(device_numbers(zwidth.load(name)))
 
 
-def number(device: Device, path: str) -> DeviceNumber:
-    return next(one for one in device_numbers(device) if one.path == path)
+def sliders(name: str) -> list[DeviceNumber]:
+    return [one for one in numbers_of(name) if one.low is not None]
+
+
+def number(numbers: Iterable[DeviceNumber], path: str) -> DeviceNumber:
+    return next(one for one in numbers if one.path == path)
 
 
 def one_mass(**loop: Any) -> Device:
@@ -49,7 +57,7 @@ def one_mass(**loop: Any) -> Device:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_slider_has_a_span_and_its_number_within_it(name: str) -> None:
-    for one in sliders(zwidth.load(name)):
+    for one in sliders(name):
         assert one.lowest <= one.low < one.high <= one.highest, one.path
         assert one.low <= one.value <= one.high, one.path
         assert one.high - one.low > 1e-9 * abs(one.value), one.path
@@ -59,7 +67,7 @@ def test_a_slider_has_a_span_and_its_number_within_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_slider_from_zero_shows_what_real_devices_have(name: str) -> None:
-    judged = [one for one in sliders(zwidth.load(name)) if one.value == 0.0 and one.low == 0.0]
+    judged = [one for one in sliders(name) if one.value == 0.0 and one.low == 0.0]
     lengths = [one for one in judged if one.name == "length"]  # of a link, no encoder's
     for one in judged:
         least, most = REAL[one.unit] if one not in lengths else (0.01, 0.1)
@@ -70,17 +78,17 @@ def test_a_slider_from_zero_shows_what_real_devices_have(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_times_and_delays_reach_a_few_samples(name: str) -> None:
-    device = zwidth.load(name)
-    period = device.document["loop"].get("sampling_period_s", 1e-3)
-    for one in sliders(device):
+    period = zwidth.load(name).document["loop"].get("sampling_period_s", 1e-3)
+    for one in sliders(name):
         if one.value == 0.0 and one.unit == "s":
             assert one.high == pytest.approx(4.0 * period), one.path
-    assert (number(device, "loop.delay_samples").low, number(device, "loop.delay_samples").high) == (0.0, 4.0)
+    delay = number(numbers_of(name), "loop.delay_samples")
+    assert (delay.low, delay.high) == (0.0, 4.0)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_numbers_of_either_sign_turn_over(name: str) -> None:
-    for one in sliders(zwidth.load(name)):
+    for one in sliders(name):
         if one.lowest >= 0.0 or one.scale == "logarithmic" or one.low >= 0.0:
             continue
         assert one.low < 0.0 < one.high, one.path
@@ -94,7 +102,7 @@ def test_numbers_of_either_sign_turn_over(name: str) -> None:
 @pytest.mark.filterwarnings("ignore::zwidth.device.plausibility.ImplausibleNumber")
 def test_an_element_beside_the_diagonal_goes_as_far_as_a_mass_matrix_may(end: str) -> None:
     device = zwidth.load("published-two-mass")
-    beside = number(device, MASS)
+    beside = number(device_numbers(device), MASS)
     changed = device.with_(dict.fromkeys((beside.path, *beside.also), getattr(beside, end)))
     assert changed.given_plant is not None
     assert beside.high == -beside.low == pytest.approx(0.99 * sqrt(0.2616 * 0.0254))
@@ -104,12 +112,12 @@ def test_an_element_beside_the_diagonal_goes_as_far_as_a_mass_matrix_may(end: st
 
 def test_a_delay_that_is_there_can_be_taken_away_by_its_slider() -> None:
     for delay, high in ((0.5, 4.0), (1.0, 4.0), (3.0, 12.0)):
-        late = number(one_mass(delay_samples=delay), "loop.delay_samples")
+        late = number(device_numbers(one_mass(delay_samples=delay)), "loop.delay_samples")
         assert (late.low, late.high, late.scale) == (0.0, high, "linear")
 
 
 def test_a_gain_of_force_feedback_stays_above_its_limit() -> None:
-    gain = number(one_mass(force_sensor={"gain": 0.5}), "loop.force_sensor.gain")
+    gain = number(device_numbers(one_mass(force_sensor={"gain": 0.5})), "loop.force_sensor.gain")
     assert (gain.lowest, gain.excluded, gain.high) == (-1.0, ("lowest",), 1.0)
     assert -1.0 < gain.low < -0.9
     one_mass(force_sensor={"gain": gain.low})

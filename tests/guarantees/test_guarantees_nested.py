@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from numpy.testing import assert_allclose
+from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from tests.frozen.devices import random_devices
@@ -25,6 +26,7 @@ from zwidth.guarantees.spring_stable import nyquist_spring, spring_stable_region
 from zwidth.guarantees.two_port import allows, coupling_impedance, llewellyn_demand, sampled_demand
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
+from zwidth.model.plant import Plant
 
 ONE = np.ones(1)
 M, DRAG, T = 0.03, 1.0, 0.001
@@ -78,19 +80,34 @@ def test_unseen_springs_leave_spring_stable_walls_stable(guarantees):
     springs = SpringFamily.of(guarantees.loop)
     region = guarantees["spring-stable"].region
     depth = 1e-5 if springs.loop.plant.size == 1 else 5e-5  # narrow bites of lightly damped modes
-    assert count_unstable(springs, region, 2000, depth, np.random.default_rng(1)) == 0
+    assert count_unstable(springs, region, 800, depth, np.random.default_rng(1)) == 0
     assert count_unstable(springs, region, 200, -3e-3, np.random.default_rng(1)) > 0  # and the edge is not far
 
 
-def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path):
-    """Two modes at 3.48 and 11.47 times Nyquist's: springs within half a percent make walls vibrate."""
+def in_stiffest_modes(loop, spring, count):
+    """The loop in the stiffest modes that its plant has with a spring [N/m] at the handle, so many of them."""
+    plant = loop.plant
+    held = plant.stiffness + spring * np.outer(plant.handle, plant.handle)
+    modes = eigh(held, plant.mass)[1][:, -count:]
+    matrices = [modes.T @ matrix @ modes for matrix in (plant.mass, plant.damping, plant.stiffness)]
+    ends = [modes.T @ end for end in (plant.actuator, plant.sensor, plant.handle)]
+    return Loop(Plant(*(0.5 * (matrix + matrix.T) for matrix in matrices), *ends), loop.controller)
+
+
+@pytest.mark.parametrize(
+    ("modes", "lowest", "highest"),
+    [(3, 0.98976, 0.98982), pytest.param(6, 0.98545, 0.98585, marks=pytest.mark.slow)],
+)
+def test_springs_with_which_two_modes_have_one_alias_are_found(tmp_path, modes, lowest, highest):
+    """Two modes at 3.48 and 11.5 times Nyquist's: springs within half a percent make walls vibrate."""
     (device,) = (one for one in random_devices() if one.word == "plant-23.toml")
     (tmp_path / device.word).write_text(device.files[device.word])
-    described = load(tmp_path / device.word)
-    loop = described.at().loop
+    loop = load(tmp_path / device.word).at().loop
+    if modes < loop.plant.size:
+        loop = in_stiffest_modes(loop, 6.7726e8, modes)
     springs, region = SpringFamily.of(loop), spring_stable_region(loop)
     K, B = np.ascontiguousarray(inside(region, 5e-5)[::20].T)
-    shares = np.linspace(0.98545, 0.98585, 41)
+    shares = np.linspace(lowest, highest, 41)
     assert not any(unstable(springs.tracer(share).polynomials, K, B).any() for share in shares.tolist())
     K, B = np.ascontiguousarray(inside(region, -3e-3)[::20].T)
     assert any(unstable(springs.tracer(share).polynomials, K, B).any() for share in shares.tolist())
@@ -139,13 +156,13 @@ def check_inclusions(seed):
 
 
 # some other seeds take long, have no chart, or hardly move what they read: there sets meet within rounding only
-@pytest.mark.parametrize("seed", [3, 9, 10, 14, 17, 242])
+@pytest.mark.parametrize("seed", [3, 14, 17])
 def test_guarantees_of_random_devices_lie_within_one_another(seed):
     check_inclusions(seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(200, 260))
+@pytest.mark.parametrize("seed", [9, 10, *range(200, 260)])
 def test_guarantees_of_many_random_devices_lie_within_one_another(seed):
     check_inclusions(seed)
 

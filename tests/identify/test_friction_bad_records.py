@@ -26,7 +26,7 @@ def driven():
 @pytest.fixture(scope="module")
 def short(driven):
     """A part of it: what no mass explains is searched for long."""
-    return {name: column[:900] for name, column in driven.items()}
+    return {name: column[:750] for name, column in driven.items()}
 
 
 def refusal(device, columns, what):
@@ -43,7 +43,7 @@ def test_a_constant_position_or_force(device, driven):
 
 
 def test_a_force_of_zero_is_free_motion(device, short):
-    result = identify_friction(device, [record({**short, "force_N": np.zeros(900)})])
+    result = identify_friction(device, [record({**short, "force_N": np.zeros(750)})])
     assert "force" in failed(result)
 
 
@@ -68,7 +68,7 @@ def test_a_reversed_sense_and_swapped_columns(device, short):
 
 
 def test_a_sign_that_flips_between_records(device, short):
-    other = records_of([replace(JOINT, tones=JOINT.tones[::-1], samples=900, seed=3)])[0]
+    other = records_of([replace(JOINT, tones=JOINT.tones[::-1], samples=750, seed=3)])[0]
     flipped = {**other, "force_N": -other["force_N"]}
     result = identify_friction(device, [record(short, "one.csv"), record(flipped, "two.csv")])
     assert result.estimates == ()

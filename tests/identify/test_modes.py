@@ -260,7 +260,7 @@ def multisine(lines, period, repeats, seed=0):
     return spectrum, np.tile(np.fft.irfft(spectrum), repeats)
 
 
-@pytest.mark.parametrize("seed", [6, 9, 11])
+@pytest.mark.parametrize("seed", [6, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (9, 11))])
 def test_a_loss_factor_is_told_from_a_damper(seed):
     """Steady vibration: each line of a multisine is the response's, without the package's spectra. No mode stands
     for what dampers do not explain."""
@@ -328,12 +328,13 @@ def test_friction_shows_by_two_amplitudes():
     assert "record a second time" in next(c.reason for c in alone.checks if c.what == "amplitude")
 
 
-def test_drives_of_a_mechanism():
+@pytest.mark.parametrize("count", [N // 2, pytest.param(N, marks=pytest.mark.slow)])
+def test_drives_of_a_mechanism(count):
     five_bar = load("five-bar", {"loop.delay_samples": 1})
-    period, force = five_bar.at().loop.period, bench()[0]
+    period, force = five_bar.at().loop.period, bench()[0][:count]
     exact = readings(five_bar.at().plant, period, force, 1.0)
     size = 0.02 * np.std(np.diff(exact, n=2))
-    position = quantised(exact + size * np.random.default_rng(9).normal(size=N), size)
+    position = quantised(exact + size * np.random.default_rng(9).normal(size=count), size)
     found = identified(columns(force, position, period), of=five_bar.with_({"mechanism.damping.mode_ratio": 0.1}))
     assert holds(found["mechanism.drives.motor-right.stiffness_Nm_per_rad"], 0.45)
     assert holds(found["mechanism.drives.motor-left.stiffness_Nm_per_rad"], 0.75)

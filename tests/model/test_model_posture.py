@@ -101,7 +101,7 @@ def arm_on_a_four_bar():
 # --- what can be reached ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 4, 5))])
 def test_reachable_in_the_assembly_is_connected_with_the_reference(seed):
     """Over a grid: a five-bar has closed-form postures, and an assembly is one connected piece of the plane.
 
@@ -137,7 +137,7 @@ def test_reachable_in_the_assembly_is_connected_with_the_reference(seed):
     assert np.isnan(posture.angles[~reached]).all()
 
     # alone, a posture starts from the reference and not from a roadmap: it must end in the same place
-    for i, j in rng.choice(np.argwhere(clear | outside), 60):
+    for i, j in rng.choice(np.argwhere(clear | outside), 30):
         if posture.status[i, j] == OK:
             alone = solve_posture(mechanism, (x[i, j], y[i, j]))
             assert same_angles(alone.angles, posture.angles[i, j])

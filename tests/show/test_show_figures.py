@@ -105,7 +105,7 @@ def test_prefixes_follow_the_view(chart):
 
 
 @given(st.floats(-1e7, 1e7), st.floats(1e-3, 1e7))
-@settings(max_examples=40)
+@settings(max_examples=15)
 def test_tick_labels_are_their_places(low, width):
     made, ax = figure()
     label(ax.xaxis, "Force", "N")

@@ -66,7 +66,7 @@ def test_a_killed_worker_is_told_and_its_batch_done_again():
 
 def test_a_killed_scheduler_ends_the_run_and_the_store_goes_on(tmp_path):
     path, job = tmp_path / "cells", RootsJob(100, seconds=0.01)
-    with running_cluster(1) as cluster:
+    with running_cluster(1, "--no-nanny") as cluster:
 
         def progress(stage, done, of):
             if done == 30:
@@ -159,7 +159,7 @@ def test_a_scheduler_that_falls_silent_ends_the_run(monkeypatch):
     """It is there, and does nothing: the system has stopped it."""
     monkeypatch.setattr(clusters, "SILENT", 1.0)
     monkeypatch.setattr(clusters, "LEAVE", 1.0)
-    with running_cluster(1) as cluster:
+    with running_cluster(1, "--no-nanny") as cluster:
 
         def progress(stage, done, of):
             if done == 30:

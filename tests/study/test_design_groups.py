@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from tests.study_sizes import study_size
 from zwidth.chart.verdict import judge
 from zwidth.device import address
 from zwidth.device.load import load
@@ -63,6 +65,7 @@ DEVICES = {
     ),
     "an arm": ("hapkit-course", {}, ("stiffness_max", "stable_area", "rigid_mass")),
 }
+FEW = 12  # designs of a random job
 LEFT_OUT = ("workspace", "direction", "sources", "friction", "assemblies")
 
 
@@ -106,14 +109,31 @@ def alone(job):
     )
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("kind", DEVICES)
-def test_designs_together_are_the_designs_alone(kind, seed):
-    job = random_job(kind, seed, 24)
-    together = job.compute(0, job.count)
+@cache
+def job_and_answers(kind, seed, size):
+    """A random job, and what its designs have together."""
+    job = random_job(kind, seed, size)
+    return job, job.compute(0, job.count)
+
+
+def together_is_alone(kind, seed, size):
+    job, together = job_and_answers(kind, seed, size)
     values, status = alone(replace(job, _cache={}))
     assert np.array_equal(together.status, status)
     np.testing.assert_allclose(together.values, values, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", DEVICES)
+def test_designs_together_are_the_designs_alone(kind, seed):
+    together_is_alone(kind, seed, FEW)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", DEVICES)
+def test_many_designs_together_are_the_designs_alone(kind):
+    for seed in range(study_size(continuous=3, full=20)):
+        together_is_alone(kind, seed, 24)
 
 
 def wall_job(kind, seed, size):
@@ -250,6 +270,6 @@ def test_some_designs_fail_and_some_do_not():
         int(one)
         for kind in DEVICES
         for seed in range(3)
-        for one in np.unique(random_job(kind, seed, 24).compute(0, 24).status)
+        for one in np.unique(job_and_answers(kind, seed, FEW)[1].status)
     }
     assert {OK, FAILED} < seen

@@ -94,7 +94,7 @@ def walls_of(loop, rng, count=3):
     return K, K * loop.period * rng.uniform(0.0, 3.0, count)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 @pytest.mark.parametrize("spread", [0.05, 0.5, 1.1])
 @pytest.mark.parametrize(("name", "paths"), [("five-bar", FIVE_BAR), ("published-two-mass", TWO_MASS)])
 def test_members_built_together_are_the_members_alone(name, paths, spread, seed):
@@ -125,11 +125,11 @@ def test_members_that_cannot_be_built_are_left_out_and_say_why():
     linkage = load("five-bar")
     short = Family(linkage, (Range("links.distal-left.length_m", 0.02, 0.25),), (), linkage.at())
     for family in (coupled, short):
-        members = [FamilyMember(0, (share,)) for share in np.linspace(0.0, 1.0, 21).tolist()]
+        members = [FamilyMember(0, (share,)) for share in np.linspace(0.0, 1.0, 11).tolist()]
         rows = {row for built in build_together(family, members) for row in built.rows.tolist()}
         assert rows == {n for n, member in enumerate(members) if alone(family, member) is not None}
-        assert 0 < len(rows) < 21
-        for n in set(range(21)) - rows:
+        assert 0 < len(rows) < 11
+        for n in set(range(11)) - rows:
             assert reason(family, members[n]) == reason(replace(family), members[n])
 
 
@@ -224,7 +224,7 @@ STUDIES = {
     "lengths": (
         load("five-bar"),
         (Range("links.distal-left.length_m", 0.08, 0.25), Range("loop.sampling_period_s", 0.001, 0.0015)),
-        {"members": 8, "unseen": 20},
+        {"members": 5, "unseen": 12},
     ),
 }
 
@@ -243,7 +243,7 @@ def test_a_study_says_the_same_of_members_built_together_and_alone(kind, monkeyp
         assert numbers["search"]["sampled"] < len(numbers["members"])
     if kind == "lengths":
         assert numbers["failed"]
-        assert numbers["violation"]["unseen"] < 20
+        assert numbers["violation"]["unseen"] < 12
 
 
 def test_how_unseen_members_are_split_changes_no_bit(monkeypatch):

@@ -21,6 +21,14 @@ from zwidth.study.jobs.journal import JournalError
 FEWEST = Plan(stiffnesses=1, tips=0)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def rough_search():
+    """The stiffest wall is sought in one round of four: most of a measurement's time goes into the others."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("zwidth.contact.boundary_experiment.ZOOMS", 1)
+        yield
+
+
 @pytest.fixture(scope="module")
 def point():
     return load("published-two-mass").at()

@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 
 import zwidth
 from tests.cli.command_runner import document_of, run_command
+from tests.undrawn_figures import leave_undrawn
+from zwidth.device.new_device import new_device
 from zwidth.measures.catalogue import MEASURES
 from zwidth.model.load import Load
 from zwidth.study.designs.sweep import sweep
@@ -59,11 +61,14 @@ def test_show_has_the_rates_of_the_orientation_and_units_of_a_wrist():
     assert "angle [rad]" in told
 
 
-def test_python_writes_the_report_that_the_command_writes(tmp_path):
+def test_python_writes_the_report_that_the_command_writes(tmp_path, monkeypatch):
+    leave_undrawn(monkeypatch)
+    wrist = tmp_path / "wrist.toml"
+    wrist.write_text(new_device("wrist", "wrist"))
     here, there = tmp_path / "here.html", tmp_path / "there.html"
-    device = zwidth.load(WRIST)
+    device = zwidth.load(wrist)
     numbers = device.report(here, device.at(axis=(0.0, 0.0, 1.0)))
-    told = document_of("report", WRIST, "--axis", "0,0,1", "--output", there)
+    told = document_of("report", wrist, "--axis", "0,0,1", "--output", there)
     assert here.read_bytes() == there.read_bytes()
     assert set(numbers) <= set(told)
     assert numbers["stiffness_max_Nm_per_rad"] == told["stiffness_max_Nm_per_rad"] > 0.0

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from study_sizes import study_size
 from systems import mass, random_loop, reference_transition_matrix, two_mass
 
 from zwidth.chart.chart import stability_chart
@@ -19,6 +20,11 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
+
+# Random members: of every kind, with one to five of them on the edge, and two that exclude each other.
+WALL_SEEDS = (2, 17, 20, 33, 40, 47, 51, 57)
+# the sixth has many arcs and takes longer than the others together
+ORDER_SEEDS, LATER_ORDER_SEEDS = (0, 4, 9, 10), (1, 2, 3, 5, 6, 7, 8, 11)
 
 
 def free_mass_loop(kilograms, period=0.001, **controller):
@@ -141,18 +147,28 @@ def test_a_peak_at_a_corner_names_both_members_and_both_frequencies():
     assert {(0,), (1,)} <= set(found) | {(0, 1)}
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", WALL_SEEDS)
 def test_walls_inside_are_stable_for_all_and_walls_outside_are_not(seed):
+    assert walls_are_as_the_region_says(seed)
+
+
+@pytest.mark.slow
+def test_walls_inside_many_charts_are_stable_for_all_and_walls_outside_are_not():
+    assert sum(map(walls_are_as_the_region_says, range(study_size(continuous=60, full=400)))) > 50
+
+
+def walls_are_as_the_region_says(seed):
+    """Whether there is a chart to ask: not where a member's edge is hidden by rounding."""
     rng = np.random.default_rng(1000 + seed)
     loops = similar_loops(rng)
     try:
         chart = robust_chart(loops)
     except ChartError:
-        pytest.skip("a member's edge is hidden by rounding")
+        return False
     loops = list(chart.members.values())
     if not chart.regions:
         assert chart.excluding
-        return
+        return True
     region = union(chart)
     low, high = np.array(region.bounds[:2]), np.array(region.bounds[2:])
     walls = low + (rng.random((12, 2)) * 1.2 - 0.1) * (high - low)
@@ -169,10 +185,12 @@ def test_walls_inside_are_stable_for_all_and_walls_outside_are_not(seed):
     for K, B in walls[far]:
         radius = largest_radius(loops, K, B)
         assert radius < 1.0 + 1e-7 if shapely.contains_xy(region, K, B) else radius > 1.0 - 1e-7
+    return True
 
 
-# the sixth has many arcs and takes longer than the others together
-@pytest.mark.parametrize("seed", [*range(6), pytest.param(6, marks=pytest.mark.slow), *range(7, 12)])
+@pytest.mark.parametrize(
+    "seed", [*ORDER_SEEDS, *(pytest.param(seed, marks=pytest.mark.slow) for seed in LATER_ORDER_SEEDS)]
+)
 def test_order_does_not_matter_and_more_members_never_help(seed):
     rng = np.random.default_rng(2000 + seed)
     base = random_loop(rng, ratios=(0.05, 0.3, 1.0), kind="chain")
@@ -224,7 +242,7 @@ def test_near_twins_are_told_apart_where_chords_are_not():
     """Members whose curves lie closer than the polygons follow them, and cross."""
     arm = two_mass(0.2616, 0.0254, 15620.0, 1.8744)
     loops = []
-    for k in range(8):
+    for k in range(5):
         operator = Operator(0.8 + 1e-7 * k, 580.0, 5.5 - 3e-7 * k * k, 9000.0 + 3e-3 * k, 10.0)
         loops.append(Loop(attach(arm, operator), Controller(0.00125)))
     chart = robust_chart(loops)

@@ -1,5 +1,7 @@
 """Charts of walls that differ along their directions: against eigenvalues, single charts and formulas."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import shapely
@@ -73,10 +75,13 @@ def walls_that_differ(chart, seed):
     return (walls * scale)[clear & (shapely.contains(stable, points) != (radius < 1.0))]
 
 
-EVERYDAY = (6, 8, 10, 12, 13, 19, 20, 22, 25, 26, 32, 34, 35, 36, 38, 42, 48, 49, 51, 52, 53, 58, 60, 62, 64)
+# Two and three directions with and without a filter, delays of no, whole and broken numbers of samples; without a
+# stable wall, with two sets of them, confirmed and in doubt.
+EVERYDAY = (6, 10, 13, 19, 20, 35, 53, 64)
+FURTHER = (8, 12, 22, 25, 26, 32, 34, 36, 38, 42, 48, 49, 51, 52, 58, 60, 62)
 
 
-@pytest.mark.parametrize("seed", EVERYDAY)
+@pytest.mark.parametrize("seed", [*EVERYDAY, *(pytest.param(seed, marks=pytest.mark.slow) for seed in FURTHER)])
 def test_charts_of_random_laws_agree_with_eigenvalues(seed):
     """By a transition matrix that shares nothing with the package, on walls over the chart and about its edge."""
     chart = multi_chart(random_unlike(seed))
@@ -169,21 +174,26 @@ def numbers(chart, scale=(1.0, 1.0)):
     ]
 
 
+@cache
+def one_law():
+    """A loop under one law, and its chart."""
+    loop = random_multi(8)
+    return loop, multi_chart(loop)
+
+
 @pytest.mark.parametrize(
     ("stiffness", "damping"),
     [([1.0, 1.0], None), ([7.0, 7.0], [0.3, 0.3]), (None, [2.0, 2.0]), (5.0 * np.eye(2), [1.0, 1.0])],
 )
 def test_a_law_alike_along_all_directions_is_one_law(stiffness, damping):
-    loop = random_multi(8)
-    one = multi_chart(loop)
+    loop, one = one_law()
     alike = multi_chart(MultiLoop(loop.plant, loop.controller, WallMatrices.of(stiffness, damping, 2)))
     assert numbers(alike) == numbers(one)
 
 
 @pytest.mark.parametrize("unlike", [1e-7, 1e-12])
 def test_a_law_almost_alike_is_almost_one_law(unlike):
-    loop = random_multi(8)
-    one = multi_chart(loop)
+    loop, one = one_law()
     law = WallMatrices.of([1.0, 1.0 - unlike], [1.0 - unlike, 1.0])
     chart = multi_chart(MultiLoop(loop.plant, loop.controller, law))
     assert one.decided
