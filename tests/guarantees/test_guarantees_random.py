@@ -188,10 +188,8 @@ def outside_the_spring_stable_set(seed):
     return core.difference(scaled(springs.rings, B / K)).area / core.area
 
 
-# the second takes three times as long as the other two together
-@pytest.mark.parametrize(
-    "seed", [1, pytest.param(2, marks=pytest.mark.slow), 14]
-)  # 14: one narrow band of springs leaves half of what the others leave
+# 14: one narrow band of springs leaves half of what the others leave; the second takes longer than both others
+@pytest.mark.parametrize("seed", [3, 14, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_random_passive_set_lies_within_the_spring_stable_one(seed):
     assert outside_the_spring_stable_set(seed) < 1e-9
 
