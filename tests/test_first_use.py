@@ -15,7 +15,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from zwidth import compile_events
+from zwidth import compile_events, machine_code
 from zwidth import compiled as compiled_module
 from zwidth.compile_events import compiling, listening
 from zwidth.compiled import can_be_taken_apart
@@ -207,6 +207,28 @@ def test_the_times_are_those_of_kernels_that_exist():
         module, _, function = name.rpartition(".")
         assert hasattr(import_module(module), function), name
     assert {name for names in times.of_command.values() for name in names} <= set(times.seconds)
+
+
+def test_that_all_kernels_are_kept_is_noted_until_a_file_or_the_sources_change(monkeypatch, tmp_path):
+    sources, kernels = tmp_path / "sources", tmp_path / "kernels"
+    for folder in (sources, kernels):
+        folder.mkdir()
+    (sources / "one.py").write_text("x = 1\n")
+    monkeypatch.setattr(machine_code, "written_folder", lambda: kernels)
+    monkeypatch.setattr(machine_code, "PACKAGE", sources)
+    file = kernels / f"one.total-0-0{machine_code.ENDING}"
+    file.write_bytes(b"code")
+    assert not machine_code.all_kernels_kept()
+    machine_code.note_all_kernels()
+    assert machine_code.all_kernels_kept()
+    for path, other in ((file, b"cod"), (sources / "one.py", b"x = 2\n")):
+        whole = path.read_bytes()
+        path.write_bytes(other)
+        assert not machine_code.all_kernels_kept()
+        path.write_bytes(whole)
+        assert machine_code.all_kernels_kept()
+    file.unlink()
+    assert not machine_code.all_kernels_kept()
 
 
 def test_compile_finds_nothing_to_do_after_the_set_up():

@@ -13,6 +13,7 @@ packages' kernels in the same process are compiled for the host.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import pickle
 import sys
@@ -26,6 +27,7 @@ from typing import Any, Final
 
 import numba
 import numpy as np
+from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 from numba.core import config
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
@@ -118,6 +120,50 @@ def kept_kernels() -> set[str]:
     return {f"zwidth.{file.name.split('-')[0]}" for folder in folders for file in folder.glob(f"*{ENDING}")}
 
 
+def all_kernels_kept() -> bool:
+    """Whether `note_all_kernels` was called for these sources, this processor and this Python, and every file that
+    lay there then lies there still.
+
+    Running what wants all kernels finds out as well, and takes a quarter of a minute for it.
+    """
+    note = _note_file()
+    with suppress(OSError, ValueError):
+        return note is not None and json.loads(note.read_text(encoding="utf-8")) == _kept_files()
+    return False
+
+
+def note_all_kernels() -> None:
+    """Note beside the kernels that there is none left to compile for these sources."""
+    note = _note_file()
+    if note is not None:
+        with suppress(OSError):
+            _write(note, json.dumps(_kept_files()).encode())
+
+
+def _note_file() -> Path | None:
+    """Where it is noted that all kernels are kept: named by a digest of everything that any of them depends on."""
+    folder = written_folder()
+    if folder is None:
+        return None
+    digest = hashlib.sha256(repr((FORMAT, sys.version, numba.__version__, *_processor())).encode())
+    for file in sorted(PACKAGE.rglob("*.py")):
+        digest.update(str(file.relative_to(PACKAGE)).encode())
+        digest.update(file.read_bytes())
+    return folder / f"all-{digest.hexdigest()[:16]}.json"
+
+
+def _processor() -> tuple[str, str]:
+    """Name and features of the processor that kernels are compiled for here."""
+    name, features = config.CPU_NAME, config.CPU_FEATURES
+    return name or get_host_cpu_name(), get_host_cpu_features().flatten() if features is None else features
+
+
+def _kept_files() -> list[list[object]]:
+    """Name and size of each file with machine code for this Python, by name; a file that was cut short differs."""
+    folders = [folder for folder in (written_folder(), SHIPPED) if folder is not None and folder.is_dir()]
+    return sorted([file.name, file.stat().st_size] for folder in folders for file in folder.glob(f"*{ENDING}"))
+
+
 def _write(file: Path, data: bytes) -> None:
     """Write a file whole or not at all: several processes may compile the same kernel at once.
 
@@ -127,7 +173,7 @@ def _write(file: Path, data: bytes) -> None:
     with NamedTemporaryFile(dir=file.parent, delete=False) as temporary:
         temporary.write(data)
     Path(temporary.name).replace(file)
-    if PACKAGE in file.parents:
+    if PACKAGE in file.parents and file.name.endswith(ENDING):
         use = file.name.removesuffix(ENDING).rpartition("-")[0]
         for older in file.parent.glob(f"{use}-*{ENDING}"):
             if older.name != file.name:

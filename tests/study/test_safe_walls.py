@@ -49,6 +49,16 @@ def job_of(device, *, narrowing=True, **arguments):
     return SafeWallsJob(replace(job.cell_question, narrowing=narrowing))
 
 
+def test_a_single_band_without_a_range_that_all_postures_share_is_told():
+    """Long delays bend the edge away from zero damping, so that no one range serves all stiffnesses."""
+    late = load(MECHANISM, {"loop.delay_samples": 5})
+    box = {"x": (0.0, 0.002), "y": (0.2, 0.202), "cells": (1, 1)}
+    one, two = (safe_walls(late, **box, levels=levels, workers=1) for levels in (1, 2))
+    assert one.status.item() == NO_VALUE
+    assert two.status.item() == OK
+    assert two.level.item() == 1
+
+
 # --- nothing unstable --------------------------------------------------------------------------------
 
 

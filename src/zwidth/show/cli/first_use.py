@@ -111,12 +111,17 @@ def compile_kernels() -> int:
     Returns how many were compiled
     Raises  RuntimeError  where a process failed, with the last line that it wrote
     """
+    from zwidth.machine_code import all_kernels_kept, note_all_kernels
+
+    if all_kernels_kept():
+        return 0
     times, processes = KernelTimes.read(), min(os.cpu_count() or 1, GROUPS)
     progress = Progress(times.missing(times.seconds), processes)
     if progress.missing:
         progress.announce()
     with ThreadPoolExecutor(processes) as pool:
         list(pool.map(lambda group: _compile_group(group, progress), range(GROUPS)))
+    note_all_kernels()
     return progress.done
 
 

@@ -64,6 +64,7 @@ NEARBY: Final = 0.15  # share of a cell, or a sector, by which samples beside th
 NOTHING: Final = 1e-9
 BAND_OVERLAP: Final = 1e-6  # share by which a band of stiffnesses reaches into its neighbours
 DIFFERENT: Final = "the walls differ too much within the cell; use smaller cells"
+NOTHING_COMMON: Final = "no range of damping is stable in all of the cell's postures and directions"
 UNTOLD: Final = (
     "rounding hides a part of the edge of the stable walls (undamped modes, or one that the wall hardly moves); "
     "give these modes some damping, or leave them out"
@@ -155,6 +156,8 @@ class _Slot:
             limits = Limits(intervals, np.tile(coarse, len(question.devices)), question.narrowing)
             if limits.narrowed_share <= FINE or not question.grid.dimensions:
                 break
+        if np.isnan(limits.centre).all():
+            raise _Failed(NO_VALUE, NOTHING_COMMON)
         if question.narrowing and question.grid.dimensions:
             tightest = Tightest(self.sampler, samples, intervals, limits.centre)
             self._search(tightest, limits, bands)
@@ -162,7 +165,7 @@ class _Slot:
             self._try(tightest, limits, bands)
         ranges = np.array([_with_margin(low, high, question.margin) for low, high in limits.ranges.tolist()])
         if not (ranges[0, 0] < ranges[0, 1]):
-            raise _Failed(NO_VALUE, "no range of damping is stable in all of the cell's postures and directions")
+            raise _Failed(NO_VALUE, NOTHING_COMMON)
         return top / (1.0 + question.margin), ranges
 
     def _lattice(self, halvings: int) -> tuple[Samples, NDArray[np.bool_]]:
