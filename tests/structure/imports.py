@@ -19,10 +19,9 @@ def import_graph(modules: list[Module], left_out: Collection[str] = ()) -> dict[
     that are left out neither import nor are imported.
     """
     names = {module.name for module in modules}
+    wanted = names.difference(left_out)
     return {
-        module.name: {
-            name for name in _imported(module, names) if name in names.difference(left_out, [module.name])
-        }
+        module.name: {name for name in _imported(module, names) if name in wanted and name != module.name}
         for module in modules
         if module.name not in left_out
     }
@@ -71,9 +70,12 @@ def _module_in(name: str, names: Collection[str]) -> str | None:
     return next((one for one in (name, name.rpartition(".")[0]) if one in names), None)
 
 
-def _runtime_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes but those that only a type checker sees."""
-    yield node
-    typed = isinstance(node, ast.If) and ast.unparse(node.test).split(".")[-1] == "TYPE_CHECKING"
-    for child in node.orelse if typed else ast.iter_child_nodes(node):
-        yield from _runtime_nodes(child)
+def _runtime_nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """All statements but those that only a type checker sees; expressions hold none."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        typed = isinstance(node, ast.If) and ast.unparse(node.test).split(".")[-1] == "TYPE_CHECKING"
+        children = node.orelse if typed and isinstance(node, ast.If) else ast.iter_child_nodes(node)
+        waiting += [child for child in children if not isinstance(child, ast.expr)]
