@@ -118,8 +118,26 @@ def save(made: Figure, path: str | os.PathLike[str]) -> Path:
         ".pdf": {"CreationDate": None, "ModDate": None, "Creator": "zwidth", "Producer": None},
     }
     with replacing(target) as draft, context():
-        made.savefig(draft, format=kind[1:], metadata=undated[kind])
+        _write(made, draft, kind, undated[kind])
     return target
+
+
+def _write(made: Figure, target: Path | StringIO, kind: str, metadata: dict[str, Any]) -> None:
+    """Draw a figure into a file of this kind, as `Figure.savefig` does, which draws twice: once for the layout.
+
+    Drawing lays out first, for the very canvas that it draws on, so that once gives the same file.
+    """
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    canvas: Any = {".png": FigureCanvasAgg, ".svg": FigureCanvasSVG, ".pdf": FigureCanvasPdf}[kind]
+    before, dots = made.canvas, made.get_dpi()
+    made.set_dpi(mpl.rcParams["savefig.dpi"])
+    try:
+        getattr(canvas(made), f"print_{kind[1:]}")(target, metadata=metadata)
+    finally:
+        made.set_canvas(before)
+        made.set_dpi(dots)
 
 
 def inline_svg(made: Figure, name: str, description: str) -> str:
@@ -130,7 +148,7 @@ def inline_svg(made: Figure, name: str, description: str) -> str:
     """
     text = StringIO()
     with context():
-        made.savefig(text, format="svg", metadata={"Date": None, "Creator": "zwidth"})
+        _write(made, text, ".svg", {"Date": None, "Creator": "zwidth"})
     body = text.getvalue()
     body = body[body.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
