@@ -283,7 +283,7 @@ def test_an_unknown_ending_is_refused(tmp_path):
 def test_a_failed_figure_leaves_the_old_one(tmp_path, monkeypatch):
     target = tmp_path / "chart.svg"
     target.write_text("before")
-    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full")))
+    monkeypatch.setattr(Figure, "draw", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(OutputError, match="disk full"):
         save(figure()[0], target)
     assert [path.name for path in tmp_path.iterdir()] == ["chart.svg"]
