@@ -37,11 +37,12 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Where it is set, every process that a test starts compiles all modules of the package anew, some seconds each.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help report test affected older-processor record structure slow lint stubs compile-check bench bench-check bench-pairs wasm wheel docs clean
+.PHONY: help report test quick affected older-processor record structure slow lint stubs compile-check bench bench-check bench-pairs wasm wheel docs clean
 
 help:
 	@echo 'make report   the report on a device (DEVICE=$(DEVICE)), into $(OUTPUT)'
 	@echo 'make test     the test suite, or TESTS=... of it'
+	@echo 'make quick    a choice of tests over all packages, within a minute'
 	@echo 'make affected  the tests that cover what has changed since BASE=$(BASE)'
 	@echo 'make older-processor  the numerical tests, or TESTS=..., as a processor without AVX2 runs them'
 	@echo 'make record   every number of two commits beside each other: BASE=$(BASE), and NEW or what is here'
@@ -65,6 +66,10 @@ report: $(VENV)/.kernels
 # Each worker takes its tests as they stand, so that what a file's tests share is computed once.
 test: $(VENV)/.installed-test $(VENV)/.kernels
 	$(BIN)/python -m pytest -n auto --dist worksteal $(TESTS)
+
+# The choice is in tests/verdict/quick.txt.
+quick: $(VENV)/.installed-test $(VENV)/.kernels
+	$(BIN)/python -m tests.verdict quick
 
 affected: $(VENV)/.installed-test $(VENV)/.kernels
 	$(BIN)/python -m tests.verdict affected $(BASE)

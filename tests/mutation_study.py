@@ -1,14 +1,16 @@
 """Does the suite notice a fault? Faults drawn by a fixed seed, each put in by itself, and what covers it run.
 
-    python tests/mutation_study.py draw 40 --seed 1 > faults.json
-    python tests/mutation_study.py run faults.json caught.jsonl --tree FOLDER
-    python tests/mutation_study.py again caught.jsonl still.jsonl --tree FOLDER
+    python -m tests.mutation_study draw 40 --seed 1 > faults.json
+    python -m tests.mutation_study run faults.json caught.jsonl --tree FOLDER
+    python -m tests.mutation_study again caught.jsonl still.jsonl --tree FOLDER
 
 FOLDER holds a copy of the project to break, with its own kernels; `again` runs first what caught each fault
 before, on newer sources. A fault is a changed sign, bound, index or factor in one function. What covers a
-function: the test files that name its module, then the folder of tests of its package, then those of the
-commands; the first failure ends a fault's run. A fault that nothing catches is either a hole in the suite or no
-fault at all (a start value of an iteration, a cell of a grid more): read those by eye.
+function is known where `python -m tests.verdict record` was run here: first those of its tests that the quick
+verdict runs, then the others, the quickest first. Elsewhere, and in a FOLDER of another time, it goes by name: the
+test files that name its module, then the folder of tests of its package, then those of the commands. The first
+failure ends a fault's run. A fault that nothing catches is either a hole in the suite or no fault at all (a start
+value of an iteration, a cell of a grid more): read those by eye.
 """
 
 from __future__ import annotations
@@ -23,12 +25,17 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
 
+from tests.verdict.recording import read_raw
+from tests.verdict.selection import read_quick
+
 ROOT = Path(__file__).parent.parent
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
+FIRST = 50  # tests in one run of pytest: with more, what a late one would catch at once waits for all before
 LIMIT = 900  # seconds for what covers one fault; a run that takes longer has caught it, as an endless loop
 
 
@@ -144,20 +151,46 @@ def drop_kernels(path: Path, source: Path) -> None:
             kernel.unlink()
 
 
-def covering_tests(fault: Mutation, tree: Path) -> list[list[str]]:
-    """The tests that cover a fault, in the order in which they are run."""
+def covering_tests(fault: Mutation, tree: Path, *, by_name: bool = False) -> dict[str, list[str]]:
+    """The tests that cover a fault, by the name of their group, in the order in which they are run.
+
+    by_name  whether to go by names although it is recorded what each test executes
+    """
+    recorded = {} if by_name else tests_by_function()
+    if recorded:
+        tests = recorded.get((fault.path, fault.function), [])
+        quick = set(read_quick())
+        rest = [name for name in tests if name not in quick]
+        groups = {"quick": [name for name in tests if name in quick]}
+        return groups | {f"others {k}": rest[k : k + FIRST] for k in range(0, len(rest), FIRST)}
     module = ".".join(Path(fault.path).relative_to("src").with_suffix("").parts)
     package = Path(fault.path).parts[2]
     files = sorted((tree / "tests").rglob("test_*.py"))
     named = [f for f in files if re.search(rf"{re.escape(module)}\b", f.read_text(encoding="utf-8"))]
     own = [f for f in files if f.parent.name == package and f not in named]
-    rest = [f for f in files if f.parent.name in ("cli", "reproduction") and f not in named]
-    return [[str(f.relative_to(tree)) for f in group] for group in (named, own, rest) if group]
+    rest_of_files = [f for f in files if f.parent.name in ("cli", "reproduction") and f not in named]
+    by_group = {"named": named, "package": own, "commands": rest_of_files}
+    return {group: [str(f.relative_to(tree)) for f in found] for group, found in by_group.items()}
+
+
+@cache
+def tests_by_function() -> dict[tuple[str, str], list[str]]:
+    """The recorded tests that execute each function, by its file and name, the quickest first; empty where nothing
+    was recorded here."""
+    found: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    for one in read_raw().values():
+        for name, (seconds, functions) in one.tests.items():
+            for path, _, qualified in (function.partition(":") for function in functions):
+                found.setdefault((path, qualified.rpartition(".")[2]), []).append((seconds, name))
+    return {function: [name for _, name in sorted(set(tests))] for function, tests in found.items()}
 
 
 def first_failing_test(tree: Path, tests: list[str]) -> str | None:
     """The first test that fails, or None."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]
+    names = tree / "out" / "tests-of-fault.txt"  # too many for a command line
+    names.parent.mkdir(exist_ok=True)
+    names.write_text("\n".join(tests), encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", f"@{names}"]
     environment = os.environ | {"PYTHONPATH": str(tree / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(
@@ -171,17 +204,18 @@ def first_failing_test(tree: Path, tests: list[str]) -> str | None:
     return failed[1] if failed else None if done.returncode in (0, 5) else done.stdout[-300:] + done.stderr[-300:]
 
 
-def run_mutation(fault: Mutation, tree: Path, groups: list[list[str]]) -> dict[str, object]:
-    """What came of one fault in a tree that is whole before and after."""
+def run_mutation(fault: Mutation, tree: Path, groups: dict[str, list[str]]) -> dict[str, object]:
+    """What came of one fault in a tree that is whole before and after: the test that caught it, and its group."""
     whole = (tree / fault.path).read_text(encoding="utf-8") if (tree / fault.path).exists() else ""
     if not apply(fault, tree):
         return asdict(fault) | {"caught": None, "gone": True}
     try:
-        caught = next((test for group in groups if (test := first_failing_test(tree, group))), None)
+        found = ((group, first_failing_test(tree, tests)) for group, tests in groups.items() if tests)
+        group, caught = next(((group, test) for group, test in found if test), (None, None))
     finally:
         (tree / fault.path).write_text(whole, encoding="utf-8")
         drop_kernels(tree / fault.path, tree / "src")
-    return asdict(fault) | {"caught": caught}
+    return asdict(fault) | {"caught": caught, "group": group, "tests": sum(map(len, groups.values()))}
 
 
 def main() -> None:
@@ -192,6 +226,7 @@ def main() -> None:
         "output", nargs="?", type=Path, help="one line of JSON for each fault; goes on where it ends"
     )
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--by-name", action="store_true", help="what covers a function goes by names of files")
     parser.add_argument("--tree", type=Path, help="a copy of the project")
     options = parser.parse_args()
     if options.what == "draw":
@@ -203,9 +238,9 @@ def main() -> None:
     tree = options.tree.resolve()
     for entry in entries[done:]:
         fault = Mutation(**{key: entry[key] for key in Mutation.__dataclass_fields__})
-        groups = covering_tests(fault, tree)
+        groups = covering_tests(fault, tree, by_name=options.by_name)
         if options.what == "again":
-            groups = [[entry["caught"]], *groups] if entry["caught"] else []
+            groups = {"again": [entry["caught"]], **groups} if entry["caught"] else {}
         found = run_mutation(fault, tree, groups)
         with options.output.open("a") as stream:
             stream.write(json.dumps(found) + "\n")

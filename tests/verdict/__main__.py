@@ -13,17 +13,20 @@ covered: they go by name.
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
+from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT
 from tests.verdict.recording import files_of_tests, read_raw, read_recorded, record_files, write_recorded
 from tests.verdict.selection import (
     QUICK,
     affected_tests,
     changed_files,
-    existing_tests,
+    files_of,
     quick_choice,
     read_quick,
 )
@@ -36,15 +39,21 @@ FILE_SECONDS = 0.15
 HEADER = "# Tests of the quick verdict; written by `python -m tests.verdict choose`.\n"
 
 
-def run_pytest(names: list[str], arguments: list[str]) -> int:
-    """Run tests by name; pytest reads the names from a file, as they may be too long for a command line."""
-    if not names:
+def run_pytest(files: list[str], arguments: list[str], tests: list[str] | None = None) -> int:
+    """Run test files, or of them the tests that are named; pytest reads the files' names from a file, as they may
+    be too long for a command line."""
+    if not files:
         print("no test covers what has changed")
         return 0
-    with tempfile.NamedTemporaryFile("w", suffix=".txt") as stream:
-        stream.write("\n".join(names))
-        stream.flush()
-        return subprocess.run([sys.executable, "-m", "pytest", *arguments, f"@{stream.name}"], cwd=ROOT).returncode
+    with tempfile.TemporaryDirectory() as folder:
+        lists = {name: Path(folder) / f"{name}.txt" for name in ("files", "tests")}
+        lists["files"].write_text("\n".join(files), encoding="utf-8")
+        command, environment = [sys.executable, "-m", "pytest", *arguments], dict(os.environ)
+        if tests is not None:
+            lists["tests"].write_text("\n".join(tests), encoding="utf-8")
+            command += ["-p", "tests.verdict.chosen"]
+            environment[CHOSEN] = str(lists["tests"])
+        return subprocess.run([*command, f"@{lists['files']}"], cwd=ROOT, env=environment).returncode
 
 
 def main() -> int:
@@ -56,7 +65,8 @@ def main() -> int:
     options = parser.parse_args(words[:cut])
     arguments = words[cut + 1 :] or ["-n", "auto", "--dist", "worksteal"]
     if options.what == "quick":
-        return run_pytest(existing_tests(read_quick()), arguments)
+        tests = read_quick()
+        return run_pytest(files_of(tests), arguments, tests)
     if options.what == "affected":
         (base,) = options.names or ["main"]
         changed = changed_files(base)

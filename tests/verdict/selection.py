@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 from collections.abc import Iterable, Mapping
@@ -138,22 +137,13 @@ def quick_choice(recorded: Mapping[str, RecordedFile], seconds: float, per_file:
 
 
 def read_quick() -> list[str]:
-    """The tests of the quick verdict, of those files that still exist."""
-    lines = [line for line in QUICK.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
-    return [line for line in lines if (ROOT / line.partition("::")[0]).exists()]
+    """The tests of the quick verdict; none where no choice was made."""
+    if not QUICK.exists():
+        return []
+    lines = QUICK.read_text(encoding="utf-8").splitlines()
+    return [line for line in lines if line and not line.startswith("#")]
 
 
-def existing_tests(names: Iterable[str]) -> list[str]:
-    """Of tests by name those whose function still stands in its file, so that a renamed test ends no run."""
-    functions: dict[str, set[str]] = {}
-    kept = []
-    for name in names:
-        file, _, inside = name.partition("::")
-        if file not in functions:
-            tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
-            functions[file] = {
-                node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)
-            }
-        if all(part.partition("[")[0] in functions[file] for part in inside.split("::")):
-            kept.append(name)
-    return kept
+def files_of(tests: Iterable[str]) -> list[str]:
+    """The files of tests by name, those that still exist."""
+    return sorted({file for name in tests if (ROOT / (file := name.partition("::")[0])).exists()})

@@ -11,10 +11,11 @@ from types import SimpleNamespace
 import pytest
 
 from tests.verdict import selection
+from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT, ExecutionRecord
 from tests.verdict.recorder import RECORD
 from tests.verdict.recording import RecordedFile, read_recorded, write_recorded
-from tests.verdict.selection import affected_tests, existing_tests, files_that_name, quick_choice
+from tests.verdict.selection import affected_tests, files_of, files_that_name, quick_choice
 from tests.verdict.slowest import slowest_lines
 from tests.verdict.studies import choose_studies, run_studies
 
@@ -99,10 +100,19 @@ def test_one_more_file_costs_its_import():
     assert quick_choice(record, seconds=0.75, per_file=0.5) == ["f.py::one", "f.py::two"]
 
 
-def test_names_of_tests_that_are_gone_are_left_out():
+def test_of_the_files_only_the_tests_of_the_choice_run_and_those_that_are_gone_end_no_run(tmp_path):
+    test, chosen = tmp_path / "test_one.py", tmp_path / "chosen.txt"
+    test.write_text("def test_a(): pass\ndef test_b(): assert False\n")
+    chosen.write_text("test_one.py::test_a\ntest_one.py::test_that_never_was[1]\n")
+    environment = os.environ | {CHOSEN: str(chosen), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.verdict.chosen", "-p", "no:cacheprovider", test]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert "1 passed, 1 deselected" in done.stdout
+
+
+def test_files_that_are_gone_are_left_out():
     own = "tests/verdict/test_verdict_of_changes.py"
-    here = f"{own}::test_names_of_tests_that_are_gone_are_left_out"
-    assert existing_tests([here, f"{own}::test_that_never_was[1]"]) == [here]
+    assert files_of([f"{own}::test_a", f"{own}::test_b[1]", "tests/test_that_never_was.py::test_c"]) == [own]
 
 
 # --- the longer studies -----------------------------------------------------------------------------
