@@ -6,6 +6,7 @@ import asyncio
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ import zwidth
 from zwidth.model.modes import undamped_modes
 from zwidth.model.operator import Operator
 from zwidth.show.app.frames import pack_frame, unpack_frame
-from zwidth.show.app.worker import ComputeLost, ComputeProcess
+from zwidth.show.app.request import FileRequest, State, ViewRequest
+from zwidth.show.app.worker import ANSWER, ComputeLost, ComputeProcess, SparePool
 
 PLANT = """name = "paddle"
 [plant]
@@ -287,6 +289,56 @@ def test_a_process_that_is_ended_while_it_starts_is_lost() -> None:
 
     with ThreadPoolExecutor(1) as thread:  # the browser's tests run an event loop in this one
         thread.submit(asyncio.run, lose()).result()
+
+
+def test_a_closed_page_leaves_its_idle_process_to_the_next_which_finds_nothing_of_it() -> None:
+    async def hand_over() -> None:
+        pool = SparePool()
+        first = await pool.take()
+        file = FileRequest(id=1, kind="file", name="my.toml", text=PLANT)
+        view = ViewRequest(id=2, kind="view", state=State(device="my.toml", from_file=True), layers=("chart",))
+        assert await answer_of(first, file)
+        assert await answer_of(first, view)
+        await pool.give_back(first)
+        taken = [await pool.take(), await pool.take()]
+        assert first in taken
+        assert not await answer_of(first, view)
+        for process in taken:
+            await process.ready()
+            await pool.give_back(process)
+        await pool.end()
+        assert first.process is not None
+        assert first.process.returncode is not None
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, hand_over()).result()
+
+
+def test_a_process_that_still_computes_serves_no_other_page() -> None:
+    async def hand_over() -> None:
+        pool = SparePool()
+        process = await pool.take()
+        asked = process.ask(ViewRequest(id=1, kind="view", state=State(device="five-bar"), layers=("chart",)))
+        waiting = asyncio.ensure_future(anext(asked))
+        await process.ready()
+        await asyncio.sleep(0)
+        assert not process.idle
+        await pool.give_back(process)
+        with pytest.raises(ComputeLost):
+            await waiting
+        assert process not in [await pool.take()]
+        await pool.end()
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, hand_over()).result()
+
+
+async def answer_of(process: ComputeProcess, request: Any) -> bool:
+    """Whether a request has an answer."""
+    async for kind, frame in process.ask(request):
+        if kind == ANSWER:
+            head, _ = unpack_frame(frame)
+    return bool(head["ok"])
 
 
 # Guarantees of a loop of this size take longer than anybody waits.

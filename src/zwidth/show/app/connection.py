@@ -66,14 +66,16 @@ class Lane:
             await self._drop_process()
 
     async def end(self) -> None:
-        """End the lane with its process."""
+        """End the lane; its process serves another page, unless it computes."""
         self.task.cancel()
         for task in (self.task, self._watch):
             if task is not None:
                 task.cancel()
                 with suppress(asyncio.CancelledError):
                     await task
-        await self._drop_process()
+        process, self.process = self.process, None
+        if process is not None:
+            await self.pool.give_back(process)
 
     async def _lose_patience(self, kind: str) -> None:
         loop = asyncio.get_running_loop()

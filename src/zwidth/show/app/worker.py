@@ -2,7 +2,8 @@
 
 A computation cannot be stopped from within the process that runs it, compiled code least of all. So each page has
 processes of its own: what is no longer wanted is ended with its process, and a spare one, which has loaded
-everything already, takes over.
+everything already, takes over. A process that has answered all becomes a spare one when its page is closed; of the
+page nothing is left in it.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ START: Final = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from zwidth.show.app.worker import work; work()"
 )
 LENGTH: Final = 8  # bytes of the number that a message's length is
+MOST_SPARES: Final = 2  # as many as one page has; each more would hold 150 MB for pages that may never open
 # Kinds of messages from a process.
 READY, PROGRESS, ANSWER = b"r", b"p", b"a"
 
@@ -38,6 +40,7 @@ class ComputeProcess:
         self.folder = Path(tempfile.mkdtemp(prefix="zwidth-app-"))
         self.process: asyncio.subprocess.Process | None = None
         self._ready: asyncio.Task[None] | None = None
+        self._answering = False
 
     async def start(self) -> None:
         """Start it; it then loads what every answer needs, which takes a second."""
@@ -70,6 +73,20 @@ class ComputeProcess:
             raise ComputeLost("the computing process was ended before it had started")
         self._ready.result()
 
+    @property
+    def idle(self) -> bool:
+        """Whether it has started, and has answered all that it was asked."""
+        started = self._ready is not None and self._ready.done() and not self._ready.cancelled()
+        return started and self._ready.exception() is None and not self._answering  # type: ignore[union-attr]
+
+    def renew(self) -> None:
+        """Have an idle process forget what it was asked, and the files that it was sent; `ready` waits for it.
+
+        Raises ComputeLost where it has ended
+        """
+        self._send(b"")
+        self._ready = asyncio.ensure_future(self._until_ready())
+
     async def ask(self, request: Any) -> AsyncIterator[tuple[bytes, bytes]]:
         """Send a request; yields (PROGRESS, frame) any number of times, then (ANSWER, frame) once.
 
@@ -78,17 +95,27 @@ class ComputeProcess:
         assert self.process is not None
         assert self.process.stdin is not None
         await self.ready()
-        data = pickle.dumps(request)
+        self._answering = True
+        self._send(pickle.dumps(request))
         try:
-            self.process.stdin.write(len(data).to_bytes(LENGTH, "little") + data)
             await self.process.stdin.drain()
         except (ConnectionError, RuntimeError) as error:
             raise ComputeLost(str(error)) from None
         while True:
             kind, content = await self._read()
+            if kind == ANSWER:
+                self._answering = False
             yield kind, content
             if kind == ANSWER:
                 return
+
+    def _send(self, data: bytes) -> None:
+        assert self.process is not None
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(len(data).to_bytes(LENGTH, "little") + data)
+        except (ConnectionError, RuntimeError) as error:
+            raise ComputeLost(str(error)) from None
 
     async def _read(self) -> tuple[bytes, bytes]:
         assert self.process is not None
@@ -118,36 +145,46 @@ class ComputeProcess:
 
 
 class SparePool:
-    """Keeps one process ready that has loaded everything."""
+    """Keeps a process ready that has loaded everything, and a few that closed pages have left."""
 
     def __init__(self) -> None:
-        self._spare: ComputeProcess | None = None
+        self._spares: list[ComputeProcess] = []
         self._lock = asyncio.Lock()
         self._next: asyncio.Task[None] | None = None
+        self._ended = False
 
     async def prepare(self) -> None:
         """Start a spare process if there is none."""
         async with self._lock:
-            if self._spare is None:
+            if not self._spares:
                 spare = ComputeProcess()
                 await spare.start()
-                self._spare = spare
+                self._spares.append(spare)
 
     async def take(self) -> ComputeProcess:
-        """The spare process, which is the caller's to end; another is started."""
+        """A spare process, the caller's to give back or to end; where it was the last another is started."""
         await self.prepare()
-        taken, self._spare = self._spare, None
-        assert taken is not None
+        taken = self._spares.pop(0)
         self._next = asyncio.ensure_future(self.prepare())
         return taken
 
+    async def give_back(self, process: ComputeProcess) -> None:
+        """Keep a process for another page where it is idle and there are not MOST_SPARES; else end it."""
+        if process.idle and len(self._spares) < MOST_SPARES and not self._ended:
+            with suppress(ComputeLost):
+                process.renew()
+                self._spares.append(process)
+                return
+        await process.end()
+
     async def end(self) -> None:
-        """End the spare process."""
+        """End the spare processes, and those that are given back from now on."""
+        self._ended = True
         if self._next is not None:
             await self._next
-        if self._spare is not None:
-            await self._spare.end()
-            self._spare = None
+        spares, self._spares = self._spares, []
+        for spare in spares:
+            await spare.end()
 
 
 def work() -> None:
@@ -169,14 +206,26 @@ def work() -> None:
             from zwidth.show.app.answers import Answers
 
             os.chdir(sys.argv[2])  # a device file's label is its bare name, see `opened`
-            answers = Answers(Path(sys.argv[2]), lambda frame: send(PROGRESS, frame))
+            folder = Path(sys.argv[2])
+
+            def new_answers() -> Answers:
+                return Answers(folder, lambda frame: send(PROGRESS, frame))
+
+            answers = new_answers()
             answers.warm_up()
         send(READY)
         while True:
             head = received.read(LENGTH)
             if len(head) < LENGTH:
                 break
-            request = pickle.loads(received.read(int.from_bytes(head, "little")))
+            length = int.from_bytes(head, "little")
+            if not length:  # for another page
+                for file in folder.iterdir():
+                    file.unlink()
+                answers = new_answers()
+                send(READY)
+                continue
+            request = pickle.loads(received.read(length))
             with ended_with_its_starter():
                 frame = answers.answer(request)
             send(ANSWER, frame)
