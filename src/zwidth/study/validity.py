@@ -44,6 +44,7 @@ NEGLIGIBLE: Final = (
 )
 BISECTIONS: Final = 24  # of a range's end between two walls of the edge
 NEAR: Final = 0.2  # error at the same frequency below which no farther piece of a model's edge can be nearer
+MOST_PLACES: Final = 100_000  # points times walls whose distances are computed at once: 30 MB
 CLOSE: Final = np.linspace(
     -1.0, 1.0, 33
 )  # frequencies around a wall's at which the curve is computed, over its error
@@ -173,8 +174,10 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
     best = np.full(len(walls), np.inf)
     for arc in chart.boundary:
         points = np.column_stack([arc.stiffness, arc.damping, arc.frequency])
-        for n, wall in enumerate(walls):
-            best[n] = min(best[n], _nearest(points / wall - 1.0))
+        at_once = max(1, MOST_PLACES // len(points))
+        for first in range(0, len(walls), at_once):
+            some = slice(first, first + at_once)
+            best[some] = np.minimum(best[some], _nearest(points / walls[some, None] - 1.0))
     return best
 
 
@@ -192,24 +195,32 @@ def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
             if error < NEAR:
                 frequencies = [f for f in wall[2] * (1.0 + error * CLOSE) if low < f < high]
                 points = np.array([(*tracer.wall(in_radians * f)[:2], f) for f in frequencies])
-                best[n] = _nearest(points / wall - 1.0)
+                best[n] = float(_nearest(points / wall - 1.0))
     return best
 
 
-def _nearest(points: Floats) -> float:
-    """Least max(|u|, |v|, ...) along a polyline through points (k, n).
+def _nearest(points: Floats) -> Floats:
+    """Least max(|u|, |v|, ...) along each polyline (...,) through points (..., k, n); inf where it has no piece.
 
     Along each straight piece it is convex, and least at an end, where one of u, v, ... is 0, or where two of them
     are equal or opposite.
     """
-    start, step = points[:-1].T, np.diff(points, axis=0).T
-    pairs = list(combinations(range(len(start)), 2))
-    zeros = [(start[i], step[i]) for i in range(len(start))]
-    zeros += [(start[i] - sign * start[j], step[i] - sign * step[j]) for i, j in pairs for sign in (1.0, -1.0)]
+    start, step = points[..., :-1, :], np.diff(points, axis=-2)
+    pairs = list(combinations(range(points.shape[-1]), 2))
+    first, second = (np.array(one, dtype=np.int64) for one in zip(*pairs, strict=True))
+    ends = np.broadcast_to((0.0, 1.0), (*start.shape[:-1], 2))
+    # where these are 0 along the piece: each alone, the differences, the sums
+    a, b = (
+        np.concatenate([one, one[..., first] - one[..., second], one[..., first] + one[..., second]], axis=-1)
+        for one in (start, step)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
-        places = np.array([0.0 * start[0], 1.0 + 0.0 * start[0], *(-a / b for a, b in zeros)])
+        places = np.concatenate([ends, -a / b], axis=-1)
     places = np.clip(np.nan_to_num(places, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    return float(np.min(np.max(np.abs(start[:, None] + places * step[:, None]), axis=0), initial=np.inf))
+    largest = np.abs(start[..., 0, None] + places * step[..., 0, None])
+    for n in range(1, points.shape[-1]):
+        largest = np.maximum(largest, np.abs(start[..., n, None] + places * step[..., n, None]))
+    return np.asarray(largest.min(axis=(-2, -1), initial=np.inf))
 
 
 class _Edge:
