@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import root
+from scipy.optimize import brentq, root
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
@@ -89,15 +89,18 @@ class BruteForceLoop:
 
     def largest_stiffness(self, K_above, B_above):
         """K, B and the frequency of the dominant root [Hz] of the stiffest stable wall below the two guesses."""
-        low, high = 0.0, float(K_above)
-        for _ in range(60):
-            K = 0.5 * (low + high)
-            stable = self.radius(K, self.calmest(K, 0.0, B_above)) < 1.0
-            low, high = (K, high) if stable else (low, K)
-        B = float(self.calmest(low, 0.0, B_above))
-        roots = self.roots(low, B)
+
+        def excess(K):
+            return float(self.radius(K, self.calmest(K, 0.0, B_above))) - 1.0
+
+        low = float(K_above)
+        while excess(low) > 0.0:  # not from 0, where a rigid mode's root is 1
+            low *= 0.5
+        K = brentq(excess, low, 2.0 * low, xtol=1e-13 * low, rtol=1e-14) if low < K_above else low
+        B = float(self.calmest(K, 0.0, B_above))
+        roots = self.roots(K, B)
         top = roots[np.argmax(np.abs(roots))]
-        return low, B, float(abs(np.angle(top)) / (2.0 * np.pi * self.period))
+        return K, B, float(abs(np.angle(top)) / (2.0 * np.pi * self.period))
 
     def edges(self, K, B_above):
         """Lower and upper edge in damping at each stiffness, by bisection from the calmest wall between them."""

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from functools import lru_cache
 from html import escape
 from io import StringIO
 from itertools import pairwise
@@ -220,6 +221,7 @@ def number_logarithmic(axis: Axis, low: float, high: float, unit: str = "") -> N
     axis.set_minor_formatter(NullFormatter())
 
 
+@lru_cache(maxsize=4096)
 def text_width(text: str, size: float) -> float:
     """Width of a line in letters of this size [points], the same on every machine."""
     font = FontProperties(family=FAMILY, size=size)
