@@ -23,7 +23,9 @@ COARSE = 0.02  # distance of a coarse chord from the curve, in shares of the cur
 CLEAR = 0.2  # least |1 + L| / (1 + |L|) of a wall that is clear of the boundary
 LIKELY, SURE = 28, 7  # numbers of walls: counted at every angle; the clearest, whose counts must agree
 SOME_ANGLES = 1500  # at which all walls are counted, before the likely ones at every angle
-AT_ONCE = 30_000  # walls times angles: 0.5 MB, which a processor's cache holds; in one piece it takes twice as long
+AT_ONCE = (
+    30_000  # walls times angles: 0.5 MB, which a processor's cache holds; in one piece it takes twice as long
+)
 MOST = 200_000  # angles on the curve
 
 
@@ -279,7 +281,6 @@ def _open_loops(loop: MeasuredLoop, angles: Floats, walls: Floats) -> Iterator[t
     for first in range(0, len(walls), at_once):
         some = slice(first, first + at_once)
         yield some, -(walls[some, :1] + walls[some, 1:] * w) / h
-
 
 
 def _clear_walls(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Floats, Floats, Whole, Floats]:

@@ -56,14 +56,16 @@ def stable_intervals(outlines: Sequence[Floats], dampings: Floats) -> Floats:
     K = first[chord, 0] + along * (last[chord, 0] - first[chord, 0])
     order = np.lexsort((K, line))
     K, line = K[order], line[order]
-    starts = np.searchsorted(line, np.arange(len(dampings) + 1))
-    for d in range(len(dampings)):
-        ends = K[starts[d] : starts[d + 1]].reshape(-1, 2)
-        ends = np.maximum(ends[ends[:, 1] > 0.0], 0.0)
-        if len(ends) > MOST_INTERVALS:
-            longest = np.sort(np.argsort(ends[:, 0] - ends[:, 1], kind="stable")[:MOST_INTERVALS])
-            ends = ends[longest]
-        out[d, : len(ends)] = ends
+    ends, of = K.reshape(-1, 2), line[::2]  # each line has an even number of them
+    positive = ends[:, 1] > 0.0
+    ends, of = np.maximum(ends[positive], 0.0), of[positive]
+    starts = np.searchsorted(of, np.arange(len(dampings) + 1))
+    for d in np.flatnonzero(np.diff(starts) > MOST_INTERVALS):
+        own = np.arange(starts[d], starts[d + 1])
+        shorter = np.argsort(ends[own, 0] - ends[own, 1], kind="stable")[MOST_INTERVALS:]
+        of[own[shorter]] = -1
+    ends, of = ends[of >= 0], of[of >= 0]
+    out[of, np.arange(len(of)) - np.searchsorted(of, of)] = ends
     return out
 
 
