@@ -57,6 +57,7 @@ class ExecutionRecord:
     def functions(self, seen: set[int]) -> set[str]:
         """The functions of a set as "src/zwidth/chart/area.py:name", with the kernels that they name."""
         found: set[str] = set()
+        seen = seen.copy()  # what runs here is recorded, too
         waiting = [self._places[code] for code in seen if code in self._places]
         done = {id(code) for code, _ in waiting}
         while waiting:

@@ -9,11 +9,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +20,16 @@ from tests.verdict.executed import ROOT
 from tests.verdict.recorder import RECORD
 
 RAW: Final = ROOT / "out" / "verdict"  # every test with its functions; too large for the repository
+# Nothing of the project: what a test file imports of it belongs to the record of that file.
+LOADED_BY_MOST: Final = [
+    "pytest",
+    "hypothesis",
+    "numba",
+    "scipy.signal",
+    "scipy.optimize",
+    "matplotlib.figure",
+    "pydantic",
+]
 RECORDED: Final = Path(__file__).parent / "recorded.json"
 
 
@@ -45,24 +54,43 @@ def files_of_tests() -> list[str]:
 
 def record_files(files: Iterable[str], processes: int = 2) -> None:
     """Run test files one by one and keep their lines in RAW; a file whose tests fail is named and kept all the
-    same."""
+    same.
 
-    def run(file: str) -> str:
-        folder = RAW / file.replace("/", ".")
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.verdict.recorder", "-p", "no:xdist", file]
-        environment = os.environ | {RECORD: str(folder)}
-        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-        if done.returncode not in (0, 5):
-            return f"{file}: {done.stdout[-2000:]}"
-        (folder / "complete").touch()
-        return ""
-
-    with ThreadPoolExecutor(processes) as pool:
-        files = list(files)
-        for count, (file, fault) in enumerate(zip(files, pool.map(run, files), strict=True), 1):
+    The processes are forked from one that has loaded what most tests load, so that not each of them waits for it.
+    """
+    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}  # read when these are loaded, see conftest
+    starting = get_context("forkserver")
+    starting.set_forkserver_preload(LOADED_BY_MOST)
+    files = list(files)
+    for file in files:
+        if not (ROOT / file).is_file():
+            raise SystemExit(f"{file}: no such test file; name it from the project's root")
+    with starting.Pool(processes, maxtasksperchild=1) as pool:
+        for count, (file, fault) in enumerate(zip(files, pool.imap(_record_file, files), strict=True), 1):
             print(f"{count}/{len(files)} {file} {fault}".rstrip(), flush=True)
+
+
+def _record_file(file: str) -> str:
+    """Run one test file in this process, and say what failed; "" where nothing did."""
+    folder = RAW / file.replace("/", ".")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    os.chdir(ROOT)
+    os.environ[RECORD] = str(folder)
+    printed = folder / "printed.txt"
+    with printed.open("wb") as stream:
+        for descriptor in (1, 2):
+            os.dup2(stream.fileno(), descriptor)
+    import pytest
+
+    # pytest would rewrite what is loaded already
+    warnings = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+    code = pytest.main(["-q", *warnings, "-p", "tests.verdict.recorder", "-p", "no:xdist", file])
+    sys.stdout.flush()
+    if code not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        return f"{code}: {printed.read_text(errors='replace')[-2000:]}"
+    (folder / "complete").touch()
+    return ""
 
 
 def read_raw() -> dict[str, RecordedFile]:
