@@ -8,6 +8,8 @@ DEVICE  ?= five-bar
 PYTHON  ?= python3 python3.13 python3.12 python3.11 python
 # The tests to run; none named: all, of the everyday suite or of the longer studies.
 TESTS   ?=
+# A choice of tests instead, by what they cover: quick, numerical or interfaces (tests/verdict).
+CHOICE  ?=
 
 # What `record`, `structure` and `bench-pairs` compare with what is here, or with the commit NEW. Left out, pairs
 # are timed with the commit at which main was left.
@@ -65,9 +67,8 @@ report: $(VENV)/.kernels
 
 # Each worker takes its tests as they stand, so that what a file's tests share is computed once.
 test: $(VENV)/.installed-test $(VENV)/.kernels
-	$(BIN)/python -m pytest -n auto --dist worksteal $(TESTS)
+	$(BIN)/python -m $(if $(CHOICE),tests.verdict $(CHOICE),pytest -n auto --dist worksteal $(TESTS))
 
-# The choice is in tests/verdict/quick.txt.
 quick: $(VENV)/.installed-test $(VENV)/.kernels
 	$(BIN)/python -m tests.verdict quick
 
@@ -75,7 +76,8 @@ affected: $(VENV)/.installed-test $(VENV)/.kernels
 	$(BIN)/python -m tests.verdict affected $(BASE)
 
 older-processor: $(VENV)/.installed-test
-	$(BIN)/python tests/older_processor.py AVX2 -n auto --dist worksteal $(or $(TESTS),$(NUMERICAL))
+	$(BIN)/python tests/older_processor.py AVX2 \
+	  $(if $(CHOICE),--choice $(CHOICE),-n auto --dist worksteal $(or $(TESTS),$(NUMERICAL)))
 
 record: $(VENV)/.installed-test
 	$(BIN)/python -m tests.frozen $(BASE) $(NEW)

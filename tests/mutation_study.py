@@ -31,7 +31,7 @@ from pathlib import Path
 import pytest
 
 from tests.verdict.recording import read_raw
-from tests.verdict.selection import read_quick
+from tests.verdict.selection import read_choice
 
 ROOT = Path(__file__).parent.parent
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
@@ -159,7 +159,7 @@ def covering_tests(fault: Mutation, tree: Path, *, by_name: bool = False) -> dic
     recorded = {} if by_name else tests_by_function()
     if recorded:
         tests = recorded.get((fault.path, fault.function), [])
-        quick = set(read_quick())
+        quick = set(read_choice("quick"))
         rest = [name for name in tests if name not in quick]
         groups = {"quick": [name for name in tests if name in quick]}
         return groups | {f"others {k}": rest[k : k + FIRST] for k in range(0, len(rest), FIRST)}

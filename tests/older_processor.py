@@ -2,6 +2,7 @@
 
     python tests/older_processor.py AVX512F [pytest's arguments ...]      as one without AVX-512
     python tests/older_processor.py AVX2 [pytest's arguments ...]         as one without AVX2 and FMA, too
+    python tests/older_processor.py AVX2 --choice NAME                    a choice of `python -m tests.verdict`
 
 NumPy, OpenBLAS, the C library and numba each choose their instructions when they start, by what the processor can
 do. The last digits of sums, matrix products and sines differ between them, and so does which floating point
@@ -50,8 +51,9 @@ def main() -> int:
     without, *arguments = sys.argv[1:] or [""]
     env = environment(without)
     subprocess.run([sys.executable, "-m", "zwidth", "compile"], env=env, check=True)
+    command = ["tests.verdict", *arguments[1:]] if arguments[:1] == ["--choice"] else ["pytest", *arguments]
     root = Path(__file__).parent.parent
-    return subprocess.run([sys.executable, "-m", "pytest", *arguments], env=env, cwd=root).returncode
+    return subprocess.run([sys.executable, "-m", *command], env=env, cwd=root).returncode
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """Fast verdicts on a change, from a record of what each test file costs and covers.
 
-    python -m tests.verdict quick                 a choice of tests over all packages, within a minute
+    python -m tests.verdict quick                 a choice of tests over all packages, within a minute; `numerical`
+                                                  and `interfaces`: other choices, see `selection.CHOICES`
     python -m tests.verdict affected BASE         the tests that cover what has changed since a commit
     python -m tests.verdict record [FILE ...]     run test files, each in a process of its own, and record them
-    python -m tests.verdict choose                write the choice of `quick` from what was recorded here
+    python -m tests.verdict choose                write the choices from what was recorded here
 
 Words after `--` go to pytest. `record` of all files takes as long as the suite on one core and half as much
 again; a record of a few files replaces theirs and keeps the others. Moved and new files need no record to be
@@ -23,20 +24,18 @@ from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT
 from tests.verdict.recording import files_of_tests, read_raw, read_recorded, record_files, write_recorded
 from tests.verdict.selection import (
-    QUICK,
+    CHOICES,
     affected_tests,
+    best_choice,
     changed_files,
+    file_of_choice,
     files_of,
-    quick_choice,
-    read_quick,
+    read_choice,
 )
 
-# Processor time of the tests that `quick` chooses, and of importing and collecting one more file, in seconds
-# on a core that does nothing else. Two cores take a minute of wall time for it, with starting pytest's
-# processes; with more of it the verdict is no quick one, with less it catches fewer faults.
-QUICK_SECONDS = 60.0
+# Importing and collecting one more file, in seconds of a core that does nothing else.
 FILE_SECONDS = 0.15
-HEADER = "# Tests of the quick verdict; written by `python -m tests.verdict choose`.\n"
+HEADER = "# Names of tests; written by `python -m tests.verdict choose`.\n"
 
 
 def run_pytest(files: list[str], arguments: list[str], tests: list[str] | None = None) -> int:
@@ -60,12 +59,15 @@ def main() -> int:
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["quick", "affected", "record", "choose"])
+    parser.add_argument("what", choices=[*CHOICES, "affected", "record", "choose"])
     parser.add_argument("names", nargs="*", help="a commit; test files")
     options = parser.parse_args(words[:cut])
     arguments = words[cut + 1 :] or ["-n", "auto", "--dist", "worksteal"]
-    if options.what == "quick":
-        tests = read_quick()
+    if options.what in CHOICES:
+        tests = read_choice(options.what)
+        if not tests:
+            print("no tests are chosen: `python -m tests.verdict record`, then `choose`", file=sys.stderr)
+            return 2
         return run_pytest(files_of(tests), arguments, tests)
     if options.what == "affected":
         (base,) = options.names or ["main"]
@@ -77,9 +79,11 @@ def main() -> int:
         record_files(options.names or files_of_tests())
         write_recorded(read_recorded() | read_raw())
         return 0
-    chosen = quick_choice(read_raw(), QUICK_SECONDS, FILE_SECONDS)
-    QUICK.write_text(HEADER + "\n".join(chosen) + "\n", encoding="utf-8")
-    print(f"{len(chosen)} tests")
+    recorded = read_raw()
+    for name, choice in CHOICES.items():
+        chosen = best_choice(recorded, choice, FILE_SECONDS)
+        file_of_choice(name).write_text(HEADER + "\n".join(chosen) + "\n", encoding="utf-8")
+        print(f"{name}: {len(chosen)} tests of {len(files_of(chosen))} files")
     return 0
 
 

@@ -6,12 +6,34 @@ import re
 import subprocess
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from tests.verdict.executed import PACKAGE, ROOT
 from tests.verdict.recording import RecordedFile
 
-QUICK: Final = Path(__file__).parent / "quick.txt"
+
+class Choice(NamedTuple):
+    """Tests that are chosen by what they cover, and run together.
+
+    seconds   processor time of all of them, on a core that does nothing else
+    packages  folders of tests that they are chosen from; none: all
+    """
+
+    seconds: float
+    packages: tuple[str, ...] = ()
+
+
+# `quick`: two cores take a minute of wall time for it, with starting pytest's processes; with more of it the
+# verdict is no quick one, with less it catches fewer faults. The others are what `.ci/run` tries where a change
+# seldom parts from what the everyday suite has tried: with twice the time it would not end within half an hour.
+CHOICES: Final = {
+    "quick": Choice(60.0),
+    "numerical": Choice(
+        120.0,
+        ("chart", "conditions", "contact", "guarantees", "loop", "measures", "model", "reproduction", "study"),
+    ),
+    "interfaces": Choice(120.0, ("app", "cli", "device", "identify", "show", "study")),
+}
 # What one more test of the same function is worth beside the one before: a second test catches some of the
 # faults that the first leaves. At 0 each function would be run once; at 1 a few functions that every test runs
 # would fill the choice.
@@ -84,12 +106,12 @@ def files_that_name(path: str, existing: Iterable[str]) -> set[str]:
     }
 
 
-def quick_choice(recorded: Mapping[str, RecordedFile], seconds: float, per_file: float) -> list[str]:
+def best_choice(recorded: Mapping[str, RecordedFile], choice: Choice, per_file: float) -> list[str]:
     """Names of tests that together take at most so many seconds of processor time and cover as many functions
     as can be.
 
     recorded  test files with their tests
-    seconds   processor time of all tests that are chosen
+    choice    processor time of all tests that are chosen, and the folders that they are chosen from
     per_file  seconds that one more test file takes to be imported and collected
 
     Greedy: always the test with the most new functions for its time. A function is worth 1 at first and a factor
@@ -99,12 +121,13 @@ def quick_choice(recorded: Mapping[str, RecordedFile], seconds: float, per_file:
     tests = {
         name: (taken, functions, file)
         for file, one in recorded.items()
+        if not choice.packages or Path(file).parts[1] in choice.packages
         for name, (taken, functions) in one.tests.items()
     }
     worth: dict[str, float] = {}
     chosen: list[str] = []
     opened: set[str] = set()
-    left = seconds
+    left = choice.seconds
 
     def gain(name: str) -> float:
         taken, functions, file = tests[name]
@@ -136,11 +159,15 @@ def quick_choice(recorded: Mapping[str, RecordedFile], seconds: float, per_file:
     return sorted(chosen)
 
 
-def read_quick() -> list[str]:
-    """The tests of the quick verdict; none where no choice was made."""
-    if not QUICK.exists():
-        return []
-    lines = QUICK.read_text(encoding="utf-8").splitlines()
+def file_of_choice(name: str) -> Path:
+    """Where the names of a choice's tests stand."""
+    return Path(__file__).parent / f"{name}.txt"
+
+
+def read_choice(name: str) -> list[str]:
+    """The names of a choice's tests; none where nothing was chosen."""
+    file = file_of_choice(name)
+    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
     return [line for line in lines if line and not line.startswith("#")]
 
 

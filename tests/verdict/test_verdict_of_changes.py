@@ -15,7 +15,7 @@ from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT, ExecutionRecord
 from tests.verdict.recorder import RECORD
 from tests.verdict.recording import RecordedFile, read_recorded, write_recorded
-from tests.verdict.selection import affected_tests, files_of, files_that_name, quick_choice
+from tests.verdict.selection import Choice, affected_tests, best_choice, files_of, files_that_name
 from tests.verdict.slowest import slowest_lines
 from tests.verdict.studies import choose_studies, run_studies
 
@@ -87,9 +87,9 @@ def test_quick_covers_most_functions_for_its_time():
         "f.py::again": (1.0, {"a"}),
     }
     record = {"f.py": RecordedFile(8.0, set(), tests)}
-    assert quick_choice(record, seconds=2.5, per_file=0.1) == ["f.py::first", "f.py::second"]
-    assert quick_choice(record, seconds=0.5, per_file=0.1) == []
-    assert quick_choice(record, seconds=100.0, per_file=0.1) == sorted(tests)
+    assert best_choice(record, Choice(2.5), per_file=0.1) == ["f.py::first", "f.py::second"]
+    assert best_choice(record, Choice(0.5), per_file=0.1) == []
+    assert best_choice(record, Choice(100.0), per_file=0.1) == sorted(tests)
 
 
 def test_one_more_file_costs_its_import():
@@ -97,7 +97,7 @@ def test_one_more_file_costs_its_import():
         "f.py": RecordedFile(1.0, set(), {"f.py::one": (0.1, {"a", "b"}), "f.py::two": (0.1, {"c"})}),
         "g.py": RecordedFile(1.0, set(), {"g.py::other": (0.1, {"d"})}),
     }
-    assert quick_choice(record, seconds=0.75, per_file=0.5) == ["f.py::one", "f.py::two"]
+    assert best_choice(record, Choice(0.75), per_file=0.5) == ["f.py::one", "f.py::two"]
 
 
 def test_of_the_files_only_the_tests_of_the_choice_run_and_those_that_are_gone_end_no_run(tmp_path):
@@ -108,6 +108,14 @@ def test_of_the_files_only_the_tests_of_the_choice_run_and_those_that_are_gone_e
     command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.verdict.chosen", "-p", "no:cacheprovider", test]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
     assert "1 passed, 1 deselected" in done.stdout
+
+
+def test_a_choice_may_be_of_some_packages():
+    record = {
+        f"tests/{package}/test_f.py": RecordedFile(1.0, set(), {f"tests/{package}/test_f.py::a": (0.1, {package})})
+        for package in ("chart", "loop")
+    }
+    assert best_choice(record, Choice(9.0, ("loop",)), per_file=0.1) == ["tests/loop/test_f.py::a"]
 
 
 def test_files_that_are_gone_are_left_out():
