@@ -221,6 +221,8 @@ def test_that_all_kernels_are_kept_is_noted_until_a_file_or_the_sources_change(m
     assert not machine_code.all_kernels_kept()
     machine_code.note_all_kernels()
     assert machine_code.all_kernels_kept()
+    (kernels / f"another.total-1-1{machine_code.ENDING}").write_bytes(b"of another version")
+    assert machine_code.all_kernels_kept()
     for path, other in ((file, b"cod"), (sources / "one.py", b"x = 2\n")):
         whole = path.read_bytes()
         path.write_bytes(other)

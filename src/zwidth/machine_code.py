@@ -128,7 +128,9 @@ def all_kernels_kept() -> bool:
     """
     note = _note_file()
     with suppress(OSError, ValueError):
-        return note is not None and json.loads(note.read_text(encoding="utf-8")) == _kept_files()
+        if note is not None:
+            kept = dict(_kept_files())
+            return all(kept.get(name) == size for name, size in json.loads(note.read_text(encoding="utf-8")))
     return False
 
 
@@ -158,10 +160,10 @@ def _processor() -> tuple[str, str]:
     return name or get_host_cpu_name(), get_host_cpu_features().flatten() if features is None else features
 
 
-def _kept_files() -> list[list[object]]:
-    """Name and size of each file with machine code for this Python, by name; a file that was cut short differs."""
+def _kept_files() -> list[tuple[str, int]]:
+    """Name and size of each file with machine code for this Python, by name; one that was cut short is smaller."""
     folders = [folder for folder in (written_folder(), SHIPPED) if folder is not None and folder.is_dir()]
-    return sorted([file.name, file.stat().st_size] for folder in folders for file in folder.glob(f"*{ENDING}"))
+    return sorted((file.name, file.stat().st_size) for folder in folders for file in folder.glob(f"*{ENDING}"))
 
 
 def _write(file: Path, data: bytes) -> None:
