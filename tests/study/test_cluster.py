@@ -131,6 +131,8 @@ def test_a_cluster_at_an_address_has_its_own_workers():
 def test_dask_is_silent_here_and_its_levels_are_given_back(tmp_path: Path):
     import logging
 
+    import distributed  # noqa: F401  (it sets its own level as it is loaded)
+
     before = logging.getLogger("distributed.client").level
     with warnings.catch_warnings(), open_executor(1, "local"):
         warnings.simplefilter("ignore")

@@ -79,25 +79,51 @@ def test_importers_are_found_by_the_full_name_of_a_module():
 # --- the quick choice -------------------------------------------------------------------------------
 
 
+def functions(*names: str, package: str = "chart") -> set[str]:
+    return {f"src/zwidth/{package}/area.py:{name}" for name in names}
+
+
 def test_quick_covers_most_functions_for_its_time():
+    f = "tests/chart/f.py"
     tests = {
-        "f.py::slow": (5.0, {"a", "b", "c"}),
-        "f.py::first": (1.0, {"a", "b"}),
-        "f.py::second": (1.0, {"c"}),
-        "f.py::again": (1.0, {"a"}),
+        f"{f}::slow": (5.0, functions("a", "b", "c")),
+        f"{f}::first": (1.0, functions("a", "b")),
+        f"{f}::second": (1.0, functions("c")),
+        f"{f}::again": (1.0, functions("a")),
     }
-    record = {"f.py": RecordedFile(8.0, set(), tests)}
-    assert best_choice(record, Choice(2.5), per_file=0.1) == ["f.py::first", "f.py::second"]
+    record = {f: RecordedFile(8.0, set(), tests)}
+    assert best_choice(record, Choice(2.5), per_file=0.1) == [f"{f}::first", f"{f}::second"]
     assert best_choice(record, Choice(0.5), per_file=0.1) == []
     assert best_choice(record, Choice(100.0), per_file=0.1) == sorted(tests)
 
 
 def test_one_more_file_costs_its_import():
+    f, g = "tests/chart/f.py", "tests/chart/g.py"
     record = {
-        "f.py": RecordedFile(1.0, set(), {"f.py::one": (0.1, {"a", "b"}), "f.py::two": (0.1, {"c"})}),
-        "g.py": RecordedFile(1.0, set(), {"g.py::other": (0.1, {"d"})}),
+        f: RecordedFile(1.0, set(), {f"{f}::one": (0.1, functions("a", "b")), f"{f}::two": (0.1, functions("c"))}),
+        g: RecordedFile(1.0, set(), {f"{g}::other": (0.1, functions("d"))}),
     }
-    assert best_choice(record, Choice(0.75), per_file=0.5) == ["f.py::one", "f.py::two"]
+    assert best_choice(record, Choice(0.75), per_file=0.5) == [f"{f}::one", f"{f}::two"]
+
+
+def test_a_test_of_another_package_counts_little():
+    f, g = "tests/show/f.py", "tests/chart/g.py"
+    record = {
+        f: RecordedFile(1.0, set(), {f"{f}::drawn": (1.0, functions("a", "b"))}),
+        g: RecordedFile(1.0, set(), {f"{g}::judged": (1.0, functions("a"))}),
+    }
+    assert best_choice(record, Choice(1.5), per_file=0.1) == [f"{g}::judged"]
+    assert best_choice(record, Choice(3.0), per_file=0.1) == [f"{g}::judged", f"{f}::drawn"]
+
+
+def test_a_choice_may_be_of_some_packages():
+    record = {
+        f"tests/{package}/f.py": RecordedFile(
+            1.0, set(), {f"tests/{package}/f.py::a": (0.1, functions("a", package=package))}
+        )
+        for package in ("chart", "loop")
+    }
+    assert best_choice(record, Choice(9.0, ("loop",)), per_file=0.1) == ["tests/loop/f.py::a"]
 
 
 def test_of_the_files_only_the_tests_of_the_choice_run_and_those_that_are_gone_end_no_run(tmp_path):
@@ -108,14 +134,6 @@ def test_of_the_files_only_the_tests_of_the_choice_run_and_those_that_are_gone_e
     command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.verdict.chosen", "-p", "no:cacheprovider", test]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
     assert "1 passed, 1 deselected" in done.stdout
-
-
-def test_a_choice_may_be_of_some_packages():
-    record = {
-        f"tests/{package}/test_f.py": RecordedFile(1.0, set(), {f"tests/{package}/test_f.py::a": (0.1, {package})})
-        for package in ("chart", "loop")
-    }
-    assert best_choice(record, Choice(9.0, ("loop",)), per_file=0.1) == ["tests/loop/test_f.py::a"]
 
 
 def test_files_that_are_gone_are_left_out():
