@@ -27,9 +27,9 @@ class Choice(NamedTuple):
 
 
 # As recorded, where tracing makes tests slower than they are: `quick` takes 41 s of the clock on two cores; with
-# more of it the verdict is no quick one, with less it catches fewer faults. The others are what `.ci/run` tries where
-# a change seldom parts from what the everyday suite has tried: with twice the time it would not end within half an
-# hour.
+# more of it the verdict is no quick one, with less it catches fewer faults. The others are what `.ci/run` tries
+# where a change seldom parts from what the everyday suite has tried: with twice the time it would not end within
+# half an hour.
 CHOICES: Final = {
     "quick": Choice(120.0),
     "numerical": Choice(
