@@ -179,9 +179,9 @@ def tests_by_function() -> dict[tuple[str, str], list[str]]:
     was recorded here."""
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for one in read_raw().values():
-        for name, (seconds, functions) in one.tests.items():
-            for path, _, qualified in (function.partition(":") for function in functions):
-                found.setdefault((path, qualified.rpartition(".")[2]), []).append((seconds, name))
+        for name, test in one.tests.items():
+            for path, _, qualified in (function.partition(":") for function in test.functions):
+                found.setdefault((path, qualified.rpartition(".")[2]), []).append((test.seconds, name))
     return {function: [name for _, name in sorted(set(tests))] for function, tests in found.items()}
 
 

@@ -10,11 +10,11 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from tests.verdict.executed import ROOT
 from tests.verdict.recorder import RECORD
@@ -33,18 +33,31 @@ LOADED_BY_MOST: Final = [
 RECORDED: Final = Path(__file__).parent / "recorded.json"
 
 
+class RecordedTest(NamedTuple):
+    """What is known of a test.
+
+    seconds    processor time of its own
+    functions  those that it executes, or that its fixtures do
+    shared     processor time of each fixture that other tests may use, too
+    """
+
+    seconds: float
+    functions: set[str]
+    shared: Mapping[str, float] = {}
+
+
 @dataclass
 class RecordedFile:
     """What is known of a test file.
 
     seconds  processor time of all its tests, alone in a process, kernels compiled
     covers   files of the project whose functions it executes or that it reads
-    tests    of each test its seconds and functions; empty where only `recorded.json` is at hand
+    tests    by name; none where only `recorded.json` is at hand
     """
 
     seconds: float = 0.0
     covers: set[str] = field(default_factory=set)
-    tests: dict[str, tuple[float, set[str]]] = field(default_factory=dict)
+    tests: dict[str, RecordedTest] = field(default_factory=dict)
 
 
 def files_of_tests() -> list[str]:
@@ -111,9 +124,14 @@ def _merged(lines: list[dict[str, Any]]) -> RecordedFile:
         functions = set(line["functions"])
         result.covers |= {name.partition(":")[0] for name in functions} | set(line["files"])
         if line["test"] is not None:
-            seconds, known = result.tests.get(line["test"], (0.0, set()))
-            result.tests[line["test"]] = (seconds + line["seconds"], known | functions)
+            known = result.tests.get(line["test"], RecordedTest(0.0, set()))
+            shared = line.get("shared", {})
+            result.tests[line["test"]] = RecordedTest(
+                known.seconds + line["seconds"], known.functions | functions, {**known.shared, **shared}
+            )
             result.seconds += line["seconds"]
+    fixtures = {name: seconds for one in result.tests.values() for name, seconds in one.shared.items()}
+    result.seconds += sum(fixtures.values())
     return result
 
 

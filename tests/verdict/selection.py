@@ -45,6 +45,7 @@ WORTH_OF_ANOTHER: Final = 0.5
 # What a test of another package is worth: it executes much that it does not judge. At 1 a choice is of tests of
 # commands and figures, which run through everything; at 0 what only they call is not covered at all.
 ELSEWHERE: Final = 0.2
+LEAST_SECONDS: Final = 1e-3  # of a test, however little was measured: pytest itself takes as long
 ROUNDING: Final = 1e-12  # of a gain that is made anew; without it equal ones would be put back for ever
 
 
@@ -127,37 +128,43 @@ def best_choice(recorded: Mapping[str, RecordedFile], choice: Choice, per_file: 
     ELSEWHERE as much. Ties go by name, so that a choice hangs on the record alone.
     """
     tests = [
-        (name, max(taken, 1e-3), file, functions)
+        (name, file, test)
         for file, one in sorted(recorded.items())
         if not choice.packages or Path(file).parts[1] in choice.packages
-        for name, (taken, functions) in sorted(one.tests.items())
+        for name, test in sorted(one.tests.items())
     ]
-    number = {one: k for k, one in enumerate(sorted(set().union(*(functions for *_, functions in tests))))}
+    number = {one: k for k, one in enumerate(sorted(set().union(*(test.functions for *_, test in tests))))}
     packages = np.array([Path(one).parts[2] for one in number] or [""])
-    executed = [np.array([number[one] for one in functions], dtype=np.int64) for *_, functions in tests]
+    executed = [np.array([number[one] for one in test.functions], dtype=np.int64) for *_, test in tests]
     share = [
-        np.where(packages[own] == Path(tests[k][2]).parts[1], 1.0, ELSEWHERE) for k, own in enumerate(executed)
+        np.where(packages[own] == Path(tests[k][1]).parts[1], 1.0, ELSEWHERE) for k, own in enumerate(executed)
     ]
+    of_file: dict[str, list[int]] = {}
+    for k, (_, file, _) in enumerate(tests):
+        of_file.setdefault(file, []).append(k)
     worth = np.ones(len(number))
-    chosen: list[str] = []
-    opened: set[str] = set()
+    chosen: dict[int, str] = {}
+    at_hand: set[str] = set()  # files that are opened, and fixtures that are made
     left = choice.seconds
 
+    def wanted(k: int) -> dict[str, float]:
+        """What a test waits for, other than itself: its file, and fixtures that it shares with others."""
+        _, file, test = tests[k]
+        return {name: each for name, each in {file: per_file, **test.shared}.items() if name not in at_hand}
+
     def cost(k: int) -> float:
-        _, taken, file, _ = tests[k]
-        return taken + (0.0 if file in opened else per_file)
+        return max(tests[k][2].seconds, LEAST_SECONDS) + sum(wanted(k).values())
 
     def gain(k: int) -> float:
         return float(share[k] @ worth[executed[k]]) / cost(k)
 
     # Gains fall while functions are taken, and are made anew when they come first; they rise where a file has been
-    # opened, and its tests are then put in once more.
+    # opened or a fixture made, and the file's tests are then put in once more.
     waiting = [(-gain(k), tests[k][0], k) for k in range(len(tests))]
     heapq.heapify(waiting)
-    taken_already: set[int] = set()
     while waiting:
         expected, name, k = heapq.heappop(waiting)
-        if k in taken_already or cost(k) > left:
+        if k in chosen or cost(k) > left:
             continue
         again = gain(k)
         if again < -expected * (1.0 - ROUNDING):
@@ -165,15 +172,14 @@ def best_choice(recorded: Mapping[str, RecordedFile], choice: Choice, per_file: 
                 heapq.heappush(waiting, (-again, name, k))
             continue
         left -= cost(k)
-        chosen.append(name)
-        taken_already.add(k)
+        chosen[k] = name
         worth[executed[k]] *= 1.0 - (1.0 - WORTH_OF_ANOTHER) * share[k]
-        if tests[k][2] not in opened:
-            opened.add(tests[k][2])
-            for other in range(len(tests)):
-                if tests[other][2] == tests[k][2] and other not in taken_already:
+        if wanted(k):
+            at_hand |= set(wanted(k))
+            for other in of_file[tests[k][1]]:
+                if other not in chosen:
                     heapq.heappush(waiting, (-gain(other), tests[other][0], other))
-    return sorted(chosen)
+    return sorted(chosen.values())
 
 
 def file_of_choice(name: str) -> Path:

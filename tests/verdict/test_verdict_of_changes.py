@@ -14,7 +14,7 @@ from tests.verdict import selection
 from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT, ExecutionRecord
 from tests.verdict.recorder import RECORD
-from tests.verdict.recording import RecordedFile, read_recorded, write_recorded
+from tests.verdict.recording import RecordedFile, RecordedTest, read_recorded, write_recorded
 from tests.verdict.selection import Choice, affected_tests, best_choice, files_of, files_that_name
 from tests.verdict.slowest import slowest_lines
 from tests.verdict.studies import choose_studies, run_studies
@@ -86,10 +86,10 @@ def functions(*names: str, package: str = "chart") -> set[str]:
 def test_quick_covers_most_functions_for_its_time():
     f = "tests/chart/f.py"
     tests = {
-        f"{f}::slow": (5.0, functions("a", "b", "c")),
-        f"{f}::first": (1.0, functions("a", "b")),
-        f"{f}::second": (1.0, functions("c")),
-        f"{f}::again": (1.0, functions("a")),
+        f"{f}::slow": RecordedTest(5.0, functions("a", "b", "c")),
+        f"{f}::first": RecordedTest(1.0, functions("a", "b")),
+        f"{f}::second": RecordedTest(1.0, functions("c")),
+        f"{f}::again": RecordedTest(1.0, functions("a")),
     }
     record = {f: RecordedFile(8.0, set(), tests)}
     assert best_choice(record, Choice(2.5), per_file=0.1) == [f"{f}::first", f"{f}::second"]
@@ -100,17 +100,33 @@ def test_quick_covers_most_functions_for_its_time():
 def test_one_more_file_costs_its_import():
     f, g = "tests/chart/f.py", "tests/chart/g.py"
     record = {
-        f: RecordedFile(1.0, set(), {f"{f}::one": (0.1, functions("a", "b")), f"{f}::two": (0.1, functions("c"))}),
-        g: RecordedFile(1.0, set(), {f"{g}::other": (0.1, functions("d"))}),
+        f: RecordedFile(
+            1.0,
+            set(),
+            {f"{f}::one": RecordedTest(0.1, functions("a", "b")), f"{f}::two": RecordedTest(0.1, functions("c"))},
+        ),
+        g: RecordedFile(1.0, set(), {f"{g}::other": RecordedTest(0.1, functions("d"))}),
     }
     assert best_choice(record, Choice(0.75), per_file=0.5) == [f"{f}::one", f"{f}::two"]
+
+
+def test_a_fixture_of_several_tests_costs_once():
+    f, shared = "tests/chart/f.py", {"tests/chart/f.py::chart None": 2.0}
+    tests = {
+        f"{f}::one": RecordedTest(0.1, functions("a", "b"), shared),
+        f"{f}::two": RecordedTest(0.1, functions("c", "d"), shared),
+        f"{f}::alone": RecordedTest(0.5, functions("e")),
+    }
+    record = {f: RecordedFile(3.0, set(), tests)}
+    assert best_choice(record, Choice(1.0), per_file=0.1) == [f"{f}::alone"]
+    assert best_choice(record, Choice(2.9), per_file=0.1) == sorted(tests)
 
 
 def test_a_test_of_another_package_counts_little():
     f, g = "tests/show/f.py", "tests/chart/g.py"
     record = {
-        f: RecordedFile(1.0, set(), {f"{f}::drawn": (1.0, functions("a", "b"))}),
-        g: RecordedFile(1.0, set(), {f"{g}::judged": (1.0, functions("a"))}),
+        f: RecordedFile(1.0, set(), {f"{f}::drawn": RecordedTest(1.0, functions("a", "b"))}),
+        g: RecordedFile(1.0, set(), {f"{g}::judged": RecordedTest(1.0, functions("a"))}),
     }
     assert best_choice(record, Choice(1.5), per_file=0.1) == [f"{g}::judged"]
     assert best_choice(record, Choice(3.0), per_file=0.1) == [f"{g}::judged", f"{f}::drawn"]
@@ -119,7 +135,7 @@ def test_a_test_of_another_package_counts_little():
 def test_a_choice_may_be_of_some_packages():
     record = {
         f"tests/{package}/f.py": RecordedFile(
-            1.0, set(), {f"tests/{package}/f.py::a": (0.1, functions("a", package=package))}
+            1.0, set(), {f"tests/{package}/f.py::a": RecordedTest(0.1, functions("a", package=package))}
         )
         for package in ("chart", "loop")
     }
@@ -232,7 +248,12 @@ def test_kernels_that_a_function_names_count_as_executed():
 
 def test_each_test_is_recorded_with_its_time(tmp_path):
     test = tmp_path / "test_one.py"
-    test.write_text("from zwidth.device.load import load\ndef test_load(): assert load('five-bar').name\n")
+    test.write_text(
+        "import pytest\nfrom time import process_time\nfrom zwidth.device.load import load\n"
+        "@pytest.fixture(scope='module')\ndef busy():\n    end = process_time() + 0.2\n"
+        "    while process_time() < end: pass\n"
+        "def test_load(busy): assert load('five-bar').name\n"
+    )
     environment = os.environ | {
         RECORD: str(tmp_path),
         "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")]),
@@ -253,6 +274,8 @@ def test_each_test_is_recorded_with_its_time(tmp_path):
     (line,) = [line for line in lines if line["test"] is not None]
     assert line["test"].endswith("test_one.py::test_load")
     assert line["seconds"] > 0.0
+    (seconds,) = line["shared"].values()
+    assert seconds >= 0.15
     assert any("device/load.py" in name for name in line["functions"])
 
 
