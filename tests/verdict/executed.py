@@ -12,6 +12,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
+from inspect import CO_OPTIMIZED
 from pathlib import Path
 from types import CodeType, FrameType, ModuleType
 from typing import Any, Final
@@ -63,7 +64,8 @@ class ExecutionRecord:
         while waiting:
             code, names = waiting.pop()
             path = project_path(code.co_filename)
-            if path is not None:
+            # a module and a class body run when they are imported, which covers nothing of them
+            if path is not None and code.co_flags & CO_OPTIMIZED:
                 found.add(f"{path}:{code.co_qualname}")
             for kernel in _kernels_named_by(code, names):
                 if id(kernel.__code__) not in done:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import heapq
 import re
 import subprocess
@@ -75,7 +76,8 @@ def affected_tests(
 
     A changed test file is run itself. A changed file that no record knows (it is new, or has moved) is covered
     by the tests that name its module and by its package's folder of tests. What a file defines outside functions,
-    such as a constant, acts in the files that import it: the tests that cover these are taken, too. Of a test
+    such as a constant, acts in the files that import it: the tests that cover these are taken, too, as of a
+    deleted file, of which it is not known any more what it defined. Of a test
     file that is not recorded nothing is known, so that it is run whenever anything of the package has changed.
     """
     existing = list(existing)
@@ -94,14 +96,25 @@ def affected_tests(
 
 
 def direct_importers(path: str) -> set[str]:
-    """Files of the package that import a module, by its full name."""
-    module = re.escape(path.removeprefix("src/").removesuffix(".py").removesuffix("/__init__").replace("/", "."))
-    package, _, name = module.rpartition(r"\.")
-    imports = re.compile(
-        rf"^\s*(?:from {module} import|import {module}\b|from {package} import .*\b{name}\b)", re.M
-    )
-    files = (ROOT / PACKAGE).rglob("*.py")
-    return {str(file.relative_to(ROOT)) for file in files if imports.search(file.read_text(encoding="utf-8"))}
+    """Files of the package that import a module, or more of it than functions: that these ran is recorded, that a
+    constant was used is not."""
+    name = path.removeprefix("src/").removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    package, _, last = name.rpartition(".")
+    text = (ROOT / path).read_text(encoding="utf-8") if (ROOT / path).exists() else ""
+    functions = {node.name for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
+
+    def uses(source: str) -> bool:
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.ImportFrom):
+                names = {alias.name for alias in node.names}
+                if (node.module == name and names - functions) or (node.module == package and last in names):
+                    return True
+            elif isinstance(node, ast.Import) and name in {alias.name for alias in node.names}:
+                return True
+        return False
+
+    texts = {file: file.read_text(encoding="utf-8") for file in (ROOT / PACKAGE).rglob("*.py")}
+    return {str(file.relative_to(ROOT)) for file, source in texts.items() if last in source and uses(source)}
 
 
 def files_that_name(path: str, existing: Iterable[str]) -> set[str]:

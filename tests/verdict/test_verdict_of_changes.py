@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -69,11 +70,27 @@ def test_a_new_file_is_covered_by_name_and_by_its_package():
     assert "tests/loop/test_hold.py" in files_that_name("src/zwidth/loop/unheard_of.py", existing)
 
 
-def test_importers_are_found_by_the_full_name_of_a_module():
-    importers = selection.direct_importers(AREA)
-    assert importers
-    assert all("zwidth.chart.area" in (ROOT / path).read_text() or "area" in path for path in importers)
-    assert AREA not in importers
+def test_importers_are_found_by_the_full_name_of_a_module_unless_they_import_functions_alone(
+    tmp_path, monkeypatch
+):
+    package = tmp_path / "src/zwidth/chart"
+    package.mkdir(parents=True)
+    (package / "area.py").write_text("LIMIT = 1\ndef area(): pass\nclass Area: pass\n")
+    importing = {
+        "function": "from zwidth.chart.area import area\n",
+        "constant": "def f():\n    from zwidth.chart.area import (\n        LIMIT,\n        area,\n    )\n",
+        "thing": "from zwidth.chart.area import Area\n",
+        "module": "from zwidth.chart import area\n",
+        "whole": "import zwidth.chart.area\n",
+        "other": "from zwidth.loop.area import LIMIT\n",
+    }
+    for name, text in importing.items():
+        (package / f"{name}.py").write_text(text)
+    monkeypatch.setattr(selection, "ROOT", tmp_path)
+    found = {Path(path).stem for path in selection.direct_importers(AREA)}
+    assert found == {"constant", "thing", "module", "whole"}
+    (package / "area.py").unlink()
+    assert "src/zwidth/chart/function.py" in selection.direct_importers(AREA)
 
 
 # --- the quick choice -------------------------------------------------------------------------------
@@ -232,6 +249,7 @@ def test_functions_that_ran_and_files_that_were_read_are_recorded():
     functions, files = json.loads(done.stdout)
     assert any(name.startswith("src/zwidth/device/load.py:load") for name in functions)
     assert not any("chart/arcs.py" in name for name in functions)
+    assert not any(name.endswith(("<module>", ":Device")) for name in functions), "these are imported"
     assert "src/zwidth/device/zoo/five-bar.toml" in files
 
 
