@@ -23,9 +23,7 @@ COARSE = 0.02  # distance of a coarse chord from the curve, in shares of the cur
 CLEAR = 0.2  # least |1 + L| / (1 + |L|) of a wall that is clear of the boundary
 LIKELY, SURE = 28, 7  # numbers of walls: counted at every angle; the clearest, whose counts must agree
 SOME_ANGLES = 1500  # at which all walls are counted, before the likely ones at every angle
-AT_ONCE = (
-    30_000  # walls times angles: 0.5 MB, which a processor's cache holds; in one piece it takes twice as long
-)
+AT_ONCE = 30_000  # walls times angles: 0.5 MB, which a cache holds; in one piece they take twice as long
 MOST = 200_000  # angles on the curve
 
 
