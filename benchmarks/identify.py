@@ -34,8 +34,9 @@ from zwidth.identify.kinds import identify
 ROOT = Path(__file__).parents[1]
 HOUR, MINUTE = 3600, 60
 LONGEST_S, LARGEST_MB = 60.0, 1000.0  # of an hour
-LONGEST_FIT_S = 2.0  # of two masses to a sweep of OWN_S
-OWN_S = 20  # of the records of our own cases
+LONGEST_FIT_S = 2.0  # of two masses to a sweep of FIT_S
+FIT_S = 20  # of the record to which two masses are fitted
+OWN_S = 5  # of the records of our own cases
 READ = "stiffness"  # the kind whose time is most of all that of reading a file
 
 
@@ -108,7 +109,7 @@ def compare_fits() -> bool:
     from zwidth.identify.modes import identify as modes
 
     bench = BENCHES["modes"]
-    device, columns = bench.device(), columns_of(bench, OWN_S)
+    device, columns = bench.device(), columns_of(bench, FIT_S)
     table = DataFrame(columns)
     fit_model, fits = modes.fit_model, list[Callable[[], object]]()
 
@@ -124,7 +125,7 @@ def compare_fits() -> bool:
     response = response_by_csd(table)
     peer_fit = median_time(lambda: masses_by_curve_fit(*response), repeats=3, warm=1)
     print(
-        f"two masses from {OWN_S} s, warm: zwidth {seconds(whole)}, csd and curve_fit {seconds(peer)}, ratio "
+        f"two masses from {FIT_S} s, warm: zwidth {seconds(whole)}, csd and curve_fit {seconds(peer)}, ratio "
         f"{whole / peer:.2f}\nof these the fit to the response: zwidth {seconds(fit)}, with intervals by profile "
         f"likelihood; curve_fit {seconds(peer_fit)}, ratio {fit / peer_fit:.2f}, target {LONGEST_FIT_S:g} s "
         f"{verdict(fit, LONGEST_FIT_S)}",

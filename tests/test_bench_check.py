@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks import _check
 from benchmarks._cases import TimedCase
-from benchmarks._check import LIMIT, Measurement, check, keep, read_kept, verdict_of, without_tools, write_kept
+from benchmarks._check import LIMIT, Measurement, check, keep, read_kept, verdict_of, without_tools, write_ratios
 from benchmarks._workload import fixed_work
 from zwidth.compile_events import compiling
 from zwidth.measures.definition import OK
@@ -213,10 +213,10 @@ def test_a_missing_program_is_a_fault_only_where_nothing_may_be_skipped(clock, m
 def test_ratios_are_kept_a_case_a_line_in_order(clock, tmp_path):
     file = tmp_path / "kept.json"
     cases = {name: TimedCase(lambda n=n: clock.take(SECONDS * n)) for n, name in ((3, "b: x"), (1, "a: x"))}
-    write_kept({"gone: x": 2.0}, file)
+    write_ratios({"gone: x": [2.0]}, file)
     assert keep(cases, [], lambda line: None, clock, file) == 0
     assert read_kept(file) == {"a: x": 2.4, "b: x": 7.2}
-    assert [line.strip() for line in file.read_text().splitlines()] == ["{", '"a: x": 2.4,', '"b: x": 7.2', "}"]
+    assert file.read_text().splitlines() == ["{", '"a: x": [2.4],', '"b: x": [7.2]', "}"]
     cases["a: x"] = TimedCase(lambda: clock.take(2.0 * SECONDS))
     cases["b: x"] = TimedCase(lambda: 1 / 0)
     assert keep(cases, ["a: *"], lambda line: None, clock, file) == 0
@@ -225,10 +225,23 @@ def test_ratios_are_kept_a_case_a_line_in_order(clock, tmp_path):
     assert read_kept(file) == {"a: x": 4.8, "b: x": 7.2}
 
 
+def test_ratios_of_several_processors_stand_beside_each_other_and_their_geometric_mean_is_kept(clock, tmp_path):
+    file = tmp_path / "kept.json"
+    cases = {"a: x": TimedCase(lambda: clock.take(SECONDS))}
+    keep(cases, [], lambda line: None, clock, file, beside=True)
+    cases["a: x"] = TimedCase(lambda: clock.take(2.25 * SECONDS))
+    keep(cases, [], lambda line: None, clock, file, beside=True)
+    assert json.loads(file.read_text()) == {"a: x": [2.4, 5.4]}
+    assert read_kept(file) == pytest.approx({"a: x": 3.6})
+    assert faults(check(cases, read_kept(file), clock)) == {}
+    keep(cases, [], lambda line: None, clock, file)
+    assert read_kept(file) == {"a: x": 5.4}
+
+
 def test_the_repository_keeps_ratios_that_a_check_can_read():
     kept = json.loads(_check.KEPT.read_text(encoding="utf-8"))
     assert list(kept) == sorted(kept)
-    assert all(isinstance(ratio, float | int) and ratio > 0.0 for ratio in kept.values())
+    assert all(ratio > 0.0 for ratios in kept.values() for ratio in ratios)
     scripts = {path.stem for path in Path(_check.FOLDER).glob("[!_]*.py")}
     assert {name.partition(": ")[0] for name in kept} <= scripts
 
