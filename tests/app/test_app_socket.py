@@ -318,8 +318,14 @@ def test_a_process_that_still_computes_serves_no_other_page() -> None:
     async def hand_over() -> None:
         pool = SparePool()
         process = await pool.take()
-        asked = process.ask(ViewRequest(id=1, kind="view", state=State(device="five-bar"), layers=("chart",)))
-        waiting = asyncio.ensure_future(anext(asked))
+        state = State(device="five-bar", settings={"loop.delay_samples": 60.0, "loop.velocity": SLOW})
+        asked = process.ask(ViewRequest(id=1, kind="view", state=state, layers=("chart", "guarantees")))
+
+        async def to_the_end() -> None:
+            async for _ in asked:  # frames of progress, which may come before the page is closed
+                pass
+
+        waiting = asyncio.ensure_future(to_the_end())
         await process.ready()
         await asyncio.sleep(0)
         assert not process.idle
