@@ -14,6 +14,7 @@ import pytest
 from tests.verdict import selection
 from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT, ExecutionRecord
+from tests.verdict.full_studies import outcomes_of_studies, page_of
 from tests.verdict.recorder import RECORD
 from tests.verdict.recording import RecordedFile, RecordedTest, read_recorded, write_recorded
 from tests.verdict.selection import Choice, affected_tests, best_choice, files_of, files_that_name
@@ -295,6 +296,36 @@ def test_each_test_is_recorded_with_its_time(tmp_path):
     (seconds,) = line["shared"].values()
     assert seconds >= 0.15
     assert any("device/load.py" in name for name in line["functions"])
+
+
+def ended(test, outcome="passed", figures="", seconds=60.0):
+    return {
+        "test": f"tests/chart/test_a.py::{test}",
+        "outcome": outcome,
+        "seconds": seconds,
+        "figures": figures,
+        "commit": "abc",
+        "day": "2026-01-01",
+    }
+
+
+def test_the_last_outcome_of_each_test_counts_and_numbers_by_name_are_added():
+    studies = outcomes_of_studies(
+        [
+            ended("test_x[0]", "failed"),
+            ended("test_x[1]", figures="{'walls': 900}"),
+            ended("test_y", "failed", figures="17 of 20"),
+            ended("test_x[0]", figures="{'walls': 200, 'refused': 1}"),
+        ]
+    )
+    x, y = studies.values()
+    assert (x["passed"], x["failed"], x["seconds"]) == (2, [], 120.0)
+    assert (y["passed"], y["failed"]) == (0, ["tests/chart/test_a.py::test_y"])
+    page = page_of(studies, dict.fromkeys(studies, 3) | {"tests/chart/test_a.py::test_z": 1})
+    row_x, row_y = (line for line in page.splitlines() if "(../tests/chart/test_a.py)" in line)
+    assert [cell.strip() for cell in row_x.split("|")][2:5] == ["2 of 3", "walls 1 100, refused 1", "2.0"]
+    assert "1 failed" in row_y
+    assert "17 of 20" in row_y
 
 
 def test_a_record_is_read_as_it_was_written(tmp_path, monkeypatch):
