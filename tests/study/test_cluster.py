@@ -7,6 +7,7 @@ import signal
 import socket
 import sys
 import warnings
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -77,6 +78,23 @@ def test_a_killed_scheduler_ends_the_run_and_the_store_goes_on(tmp_path):
     again = RootsJob(100)
     assert same_cells(run(again, Store(path, again), workers=1), RootsJob(100).compute(0, 100))
     assert again.computed_ranges[0] >= (30, 35)
+
+
+@pytest.mark.parametrize("fault", ["CancelledError", "comm.CommClosedError"])
+def test_what_dask_raises_of_a_lost_connection_ends_the_run_as_a_scheduler_that_has_ended(monkeypatch, fault):
+    import distributed
+
+    submit, submitted = distributed.Client.submit, []
+
+    def lost_later(*given, **options):
+        submitted.append(given)
+        if len(submitted) > 5:
+            raise attrgetter(fault)(distributed)("gone")
+        return submit(*given, **options)
+
+    monkeypatch.setattr(distributed.Client, "submit", lost_later)
+    with pytest.raises(ClusterEnded, match=r"has ended$"):
+        run(RootsJob(100), batch=5, cluster="local")
 
 
 def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):

@@ -104,11 +104,20 @@ class Cluster:
         """
         client = self._connect()
         self._last_seen = monotonic()
-        tasks = _Tasks(self, client, job)
+        tasks: _Tasks | None = None
         try:
+            tasks = _Tasks(self, client, job)
             yield from tasks.finished(iter(ranges))
+        except ClusterError:
+            raise
+        except Exception as error:
+            # what dask raises where the scheduler ends hangs on what was on its way
+            if _is_connected(client) and not _is_of_connection(error):
+                raise
+            raise ClusterEnded(f"the scheduler at {self.address} has ended") from None
         finally:
-            tasks.cancel()
+            if tasks is not None:
+                tasks.cancel()
 
     def lost_workers(self) -> list[str]:
         """Addresses of workers that have left since this was called last; new ones are noted.
@@ -304,6 +313,14 @@ def _within(seconds: float, call: Callable[[], Any]) -> Any:
 def _is_connected(client: Client) -> bool:
     communication = client.scheduler_comm
     return client.status == "running" and communication is not None and not communication.comm.closed()
+
+
+def _is_of_connection(error: Exception) -> bool:
+    """Whether dask says by an error that a connection, or what was asked over it, is gone."""
+    from distributed import CancelledError
+    from distributed.comm import CommClosedError
+
+    return isinstance(error, CancelledError | CommClosedError)
 
 
 def _workers_of(client: Client) -> dict[str, int]:
