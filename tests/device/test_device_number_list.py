@@ -183,3 +183,12 @@ def test_each_kind_of_table_brings_what_it_needs() -> None:
             brought = [f"{p}=unset" if value is None else (p, value) for p, value in one.brings[choice].items()]
             base = base.with_([(one.path, choice), *brought])
             assert next(each for each in device_numbers(base) if each.path == one.path).value == choice
+
+
+def test_what_a_table_leaves_out_comes_after_what_it_gives_and_before_the_next_table() -> None:
+    device = from_document({"name": "m", "loop": {"sampling_period_s": 0.001}, "plant": {"mass_kg": 0.1}})
+    paths = [one.path for one in device_numbers(device)]
+    assert paths[0] == "loop.sampling_period_s"
+    own, after = (paths[: paths.index("plant.mass_kg")], paths[paths.index("plant.mass_kg") :])
+    assert {"loop.delay_samples", "loop.encoder.resolution_m"} <= set(own)
+    assert not [path for path in after if path.startswith("loop.")]
