@@ -35,6 +35,7 @@ from tests.verdict.selection import read_choice
 
 ROOT = Path(__file__).parent.parent
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
+COLLECTING = re.compile(r"^_* ERROR collecting (\S+)", re.MULTILINE)
 FIRST = 50  # tests in one run of pytest: with more, what a late one would catch at once waits for all before
 LIMIT = 900  # seconds for what covers one fault; a run that takes longer has caught it, as an endless loop
 
@@ -198,8 +199,10 @@ def first_failing_test(tree: Path, tests: list[str]) -> str | None:
         )
     except subprocess.TimeoutExpired:
         return "took too long"
-    if done.returncode == pytest.ExitCode.USAGE_ERROR:  # a test that is not there any more
-        raise SystemExit(done.stderr)
+    if done.returncode == pytest.ExitCode.USAGE_ERROR:
+        if broken := COLLECTING.search(done.stdout):  # its file cannot even be imported
+            return broken[1]
+        raise SystemExit(done.stderr)  # a test that is not there any more
     failed = FAILED.search(done.stdout)
     return failed[1] if failed else None if done.returncode in (0, 5) else done.stdout[-300:] + done.stderr[-300:]
 
