@@ -7,10 +7,11 @@
 FOLDER holds a copy of the project to break, with its own kernels; `again` runs first what caught each fault
 before, on newer sources. A fault is a changed sign, bound, index or factor in one function. What covers a
 function is known where `python -m tests.verdict record` was run here: first those of its tests that the quick
-verdict runs, then the others, the quickest first. Elsewhere, and in a FOLDER of another time, it goes by name: the
-test files that name its module, then the folder of tests of its package, then those of the commands. The first
-failure ends a fault's run. A fault that nothing catches is either a hole in the suite or no fault at all (a start
-value of an iteration, a cell of a grid more): read those by eye.
+verdict runs, then those of its package, then the others, the quickest first. What most tests execute takes the
+whole suite where nothing catches the fault; `--seconds` ends that, and the fault counts as open. Elsewhere, and in
+a FOLDER of another time, it goes by name: the test files that name its module, then the folder of tests of its
+package, then those of the commands. The first failure ends a fault's run. A fault that nothing catches is either a
+hole in the suite or no fault at all (a start value of an iteration, a cell of a grid more): read those by eye.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from time import monotonic
 
 import pytest
 
@@ -160,10 +162,14 @@ def covering_tests(fault: Mutation, tree: Path, *, by_name: bool = False) -> dic
     recorded = {} if by_name else tests_by_function()
     if recorded:
         tests = recorded.get((fault.path, fault.function), [])
-        quick = set(read_choice("quick"))
+        quick, folder = set(read_choice("quick")), f"tests/{Path(fault.path).parts[2]}/"
         rest = [name for name in tests if name not in quick]
+        own = [name for name in rest if name.startswith(folder)]
+        far = [name for name in rest if not name.startswith(folder)]
         groups = {"quick": [name for name in tests if name in quick]}
-        return groups | {f"others {k}": rest[k : k + FIRST] for k in range(0, len(rest), FIRST)}
+        for group, names in {"package": own, "others": far}.items():
+            groups |= {f"{group} {k}": names[k : k + FIRST] for k in range(0, len(names), FIRST)}
+        return groups
     module = ".".join(Path(fault.path).relative_to("src").with_suffix("").parts)
     package = Path(fault.path).parts[2]
     files = sorted((tree / "tests").rglob("test_*.py"))
@@ -207,18 +213,31 @@ def first_failing_test(tree: Path, tests: list[str]) -> str | None:
     return failed[1] if failed else None if done.returncode in (0, 5) else done.stdout[-300:] + done.stderr[-300:]
 
 
-def run_mutation(fault: Mutation, tree: Path, groups: dict[str, list[str]]) -> dict[str, object]:
-    """What came of one fault in a tree that is whole before and after: the test that caught it, and its group."""
+def run_mutation(
+    fault: Mutation, tree: Path, groups: dict[str, list[str]], seconds: float = float("inf")
+) -> dict[str, object]:
+    """What came of one fault in a tree that is whole before and after: the test that caught it, and its group.
+
+    seconds  no further group is begun after them; `tried` says how many of the `tests` were run
+    """
+    end, tried = monotonic() + seconds, 0
     whole = (tree / fault.path).read_text(encoding="utf-8") if (tree / fault.path).exists() else ""
     if not apply(fault, tree):
         return asdict(fault) | {"caught": None, "gone": True}
     try:
-        found = ((group, first_failing_test(tree, tests)) for group, tests in groups.items() if tests)
-        group, caught = next(((group, test) for group, test in found if test), (None, None))
+        caught = where = None
+        for group, tests in groups.items():
+            if not tests or monotonic() > end:
+                continue
+            tried += len(tests)
+            if caught := first_failing_test(tree, tests):
+                where = group
+                break
     finally:
         (tree / fault.path).write_text(whole, encoding="utf-8")
         drop_kernels(tree / fault.path, tree / "src")
-    return asdict(fault) | {"caught": caught, "group": group, "tests": sum(map(len, groups.values()))}
+    counts = {"tests": sum(map(len, groups.values())), "tried": tried}
+    return asdict(fault) | {"caught": caught, "group": where} | counts
 
 
 def main() -> None:
@@ -230,6 +249,7 @@ def main() -> None:
     )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--by-name", action="store_true", help="what covers a function goes by names of files")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="after which a fault is left open")
     parser.add_argument("--tree", type=Path, help="a copy of the project")
     options = parser.parse_args()
     if options.what == "draw":
@@ -244,7 +264,7 @@ def main() -> None:
         groups = covering_tests(fault, tree, by_name=options.by_name)
         if options.what == "again":
             groups = {"again": [entry["caught"]], **groups} if entry["caught"] else {}
-        found = run_mutation(fault, tree, groups)
+        found = run_mutation(fault, tree, groups, options.seconds)
         with options.output.open("a") as stream:
             stream.write(json.dumps(found) + "\n")
         print(fault.path, fault.function, fault.kind, "->", found["caught"], flush=True)
