@@ -49,9 +49,9 @@ python -m tests.verdict.full_studies page                                       
 
 A test is one random device, or a batch of them, as the study has it; the time is that of its tests, one after the
 other on one core. Figures are what the study counts, over all its tests: walls that were judged, and of them those
-judged again in 40 digits; loops whose chart was refused, that move nothing (unmoved), or with a motion that neither
-motor nor encoder sees (unobserved). A study that is not listed has not been run at full size yet; where fewer tests
-were run than a study has, both numbers stand there.
+judged again in 40 digits; loops whose chart was refused, that move nothing (unmoved), or with a motion that
+neither motor nor encoder sees (unobserved). A study that is not listed has not been run at full size yet; where
+fewer tests were run than a study has, both numbers stand there.
 """
 
 
