@@ -283,6 +283,12 @@ def test_the_sound_is_told_and_silence_is_no_answer(tmp_path):
     assert not file.exists()
 
 
+@pytest.mark.parametrize(("start", "said"), [(0.005, "3.000 mm inside"), (0.0005, "1.500 mm outside")])
+def test_the_start_is_told_from_the_walls_surface_wherever_it_is(start, said):
+    place = ("--wall-position", 0.002, "--start-position", start)
+    assert said in run_command("simulate", ONE_MASS, *SOFT, "--wall", "one-sided", *place).out
+
+
 def test_people_read_verdict_growth_energies_and_remarks(folder):
     out = run_command("simulate", TWO_MASS, *WALL).out
     assert "stable: the vibration dies away" in out

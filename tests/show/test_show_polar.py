@@ -24,6 +24,9 @@ def test_the_outline_is_closed_and_as_far_out_as_the_stiffness():
     outline = ax.lines[0].get_xydata()
     assert np.hypot(*outline.T).tolist() == [1000.0, 2000.0, 3000.0, 2000.0, 1000.0]
     assert ax.get_aspect() == 1.0
+    for low, high in (ax.get_xlim(), ax.get_ylim()):
+        assert high == -low
+        assert 3000.0 < high < 3600.0
 
 
 def test_the_stiffest_and_the_least_stiff_direction_are_named():
