@@ -2,8 +2,10 @@
 it reads.
 
 Python calls a trace function once per call of a Python function, which is enough here: lines are not followed.
-What runs as machine code is not seen by it; a kernel counts as executed where a function that runs names it,
-and so do the kernels that it names in turn.
+What runs as machine code is not seen by it; a kernel counts as executed where a function that runs names it, by
+itself, in a module or in a table, and so do the kernels that it names in turn. The function of a virtual
+environment, which is compiled as it stands and reached by its address, counts where the environment's parameters
+are asked for, which everyone does who uses it.
 """
 
 from __future__ import annotations
@@ -22,6 +24,9 @@ PACKAGE: Final = "src/zwidth/"
 # Folders whose files a test may read: devices, pages and pictures of the package, documents, examples, its own
 # helpers.
 WATCHED: Final = ("src/", "docs/", "gallery/", "benchmarks/", "tests/", "tools/")
+
+# Methods of objects that hold a function to be compiled, in `function`.
+OF_HOLDERS: Final = frozenset({"Environment.values"})
 
 Place = tuple[CodeType, dict[str, Any]]  # a function's code, and the names that it can see
 
@@ -83,6 +88,8 @@ class ExecutionRecord:
         """Python's trace function."""
         code = frame.f_code
         key = id(code)
+        if code.co_qualname in OF_HOLDERS:
+            self._held(frame)
         if key in self._seen:
             return
         self._seen.add(key)
@@ -92,6 +99,14 @@ class ExecutionRecord:
             self._places[key] = (code, frame.f_globals)
         else:
             self._codes.append(code)
+
+    def _held(self, frame: FrameType) -> None:
+        """Note the function that the object of a method holds."""
+        function = getattr(frame.f_locals.get("self"), "function", None)
+        code = getattr(function, "__code__", None)
+        if code is not None and f"/{PACKAGE}" in code.co_filename:
+            self._seen.add(id(code))
+            self._places[id(code)] = (code, function.__globals__)
 
     def _audit(self, event: str, arguments: tuple[Any, ...]) -> None:
         """Python's audit hook: note the files of the project that are opened, other than Python's own."""
@@ -108,9 +123,21 @@ def _kernels_named_by(code: CodeType, names: dict[str, Any]) -> Iterator[Any]:
         one = codes.pop()
         codes += [constant for constant in one.co_consts if isinstance(constant, CodeType)]
         for name in one.co_names:
-            value = names.get(name)
+            # a module is named by itself where a function imports from it
+            value = names.get(name, sys.modules.get(name))
             values = [getattr(value, other, None) for other in one.co_names] if _is_own(value) else [value]
-            yield from (kernel.py_func for kernel in values if _is_kernel(kernel))
+            yield from (kernel.py_func for kernel in _entries(values) if _is_kernel(kernel))
+
+
+def _entries(values: list[Any]) -> Iterator[Any]:
+    """Values, and those of tables among them."""
+    for value in values:
+        if type(value) is dict:
+            yield from value.values()
+        elif type(value) in (tuple, list):
+            yield from value
+        else:
+            yield value
 
 
 def _is_kernel(value: object) -> bool:

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -263,6 +264,40 @@ def test_kernels_that_a_function_names_count_as_executed():
     record = ExecutionRecord()
     record._places[id(code)] = (code, names)
     assert "src/zwidth/chart/arcs.py:sample_arcs" in record.functions({id(code)})
+
+
+def test_kernels_of_a_table_and_of_a_module_that_a_function_imports_count_as_executed():
+    from zwidth.chart.arcs import sample_arcs
+
+    names: dict[str, object] = {"TABLE": {"one": SimpleNamespace(py_func=sample_arcs)}}
+    exec("def by_table(): TABLE['one']()", names)
+    exec("def by_import():\n    from zwidth.model.rotations import fill_rotation\n    fill_rotation()", names)
+    import_module("zwidth.model.rotations")
+    record = ExecutionRecord()
+    for name, kernel in {
+        "by_table": "chart/arcs.py:sample_arcs",
+        "by_import": "rotations.py:fill_rotation",
+    }.items():
+        code = names[name].__code__
+        record._places[id(code)] = (code, names)
+        assert any(found.endswith(kernel) for found in record.functions({id(code)}))
+
+
+def test_the_function_of_an_environment_counts_where_its_parameters_are_asked_for():
+    from zwidth.contact.environments.friction_patch import friction_patch
+    from zwidth.contact.environments.texture import texture
+
+    record, seen = ExecutionRecord(), set()
+    record.swap(seen)
+    before = sys.gettrace()
+    sys.settrace(record._called)
+    try:
+        friction_patch.values()
+    finally:
+        sys.settrace(before)
+    found = record.functions(seen)
+    assert "src/zwidth/contact/environments/friction_patch.py:friction_patch" in found
+    assert not any(texture.function.__name__ in name for name in found)
 
 
 def test_each_test_is_recorded_with_its_time(tmp_path):
