@@ -125,7 +125,7 @@ def _kernels_named_by(code: CodeType, names: dict[str, Any]) -> Iterator[Any]:
         for name in one.co_names:
             # a module is named by itself where a function imports from it
             value = names.get(name, sys.modules.get(name))
-            values = [getattr(value, other, None) for other in one.co_names] if _is_own(value) else [value]
+            values = [vars(value).get(other) for other in one.co_names] if _is_own(value) else [value]
             yield from (kernel.py_func for kernel in _entries(values) if _is_kernel(kernel))
 
 
