@@ -5,9 +5,9 @@
 
 A study is a test marked `slow`; its full size is the one with ZWIDTH_FULL_STUDY=1. What each test of it came to
 is kept as soon as it has ended, in `out/full-studies.jsonl`, so that a run that is interrupted loses nothing;
-`page` puts the last outcome of each into `full_studies.json` beside this file, which holds those of earlier runs.
-Large studies are cut into batches, tests that can be run one by one. What a test prints last are its figures:
-numbers by name, {"walls": 100, "refused": 1}, are added up over a study's tests.
+`page` puts the last outcome of each test into `full_studies.json` beside this file, which holds those of earlier
+runs: large studies are cut into batches, tests that can be run one by one and on other days. What a test prints
+last are its figures: numbers by name, {"walls": 100, "refused": 1}, are added up over a study's tests.
 """
 
 from __future__ import annotations
@@ -101,27 +101,31 @@ def added_figures(figures: Iterable[str]) -> str:
     return "; ".join(part for part in (numbers, *other) if part)
 
 
-def outcomes_of_studies(ended: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Of each study what its tests came to, each by its last outcome.
+def kept_with(
+    kept: Mapping[str, Mapping[str, Any]], ended: Iterable[Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Outcomes of tests by study and parameters, those of an earlier run replaced by the last."""
+    together = {study: dict(tests) for study, tests in kept.items()}
+    for one in ended:
+        study = study_of(one["test"])
+        outcome = {key: value for key, value in one.items() if key != "test" and value != ""}
+        together.setdefault(study, {})[one["test"].removeprefix(study)] = outcome
+    return {study: dict(sorted(tests.items())) for study, tests in sorted(together.items())}
 
-    "passed", "failed" (the parameters of those tests), "seconds" of all, "figures", and the "commits" and the last
-    "day" of the runs
+
+def summary_of(tests: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """What a study's tests came to.
+
+    "passed" and "failed" (how many), "seconds" of all, "figures", and the first and the last of the "days"
     """
-    last = {one["test"]: one for one in ended}
-    studies = {}
-    for study, group in groupby(
-        sorted(last.values(), key=lambda one: one["test"]), lambda one: study_of(one["test"])
-    ):
-        tests = list(group)
-        studies[study] = {
-            "passed": sum(one["outcome"] == "passed" for one in tests),
-            "failed": [one["test"] for one in tests if one["outcome"] == "failed"],
-            "seconds": round(sum(one["seconds"] for one in tests), 1),
-            "figures": added_figures(one["figures"] for one in tests),
-            "commits": sorted({one["commit"] for one in tests}),
-            "day": max(one["day"] for one in tests),
-        }
-    return studies
+    days = sorted({one["day"] for one in tests.values()})
+    return {
+        "passed": sum(one["outcome"] == "passed" for one in tests.values()),
+        "failed": sum(one["outcome"] == "failed" for one in tests.values()),
+        "seconds": sum(one["seconds"] for one in tests.values()),
+        "figures": added_figures(one["figures"] for one in tests.values() if "figures" in one),
+        "days": " to ".join(dict.fromkeys((days[0], days[-1]))),
+    }
 
 
 def sizes_of_studies() -> dict[str, int]:
@@ -144,35 +148,46 @@ def sizes_of_studies() -> dict[str, int]:
     return Counter(study_of(line) for line in listed.splitlines() if "::" in line)
 
 
-def page_of(studies: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]) -> str:
+def page_of(kept: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]) -> str:
     """The page: a table for each folder of tests."""
     parts = [HEAD]
-    known = [study for study in sorted(studies) if study in sizes]
+    known = [study for study in sorted(kept) if study in sizes]
     for folder, names in groupby(known, lambda study: Path(study.partition("::")[0]).parent.name):
         parts.append(
             f"\n## {folder}\n\n| study | tests passed | figures | minutes | day |\n|---|---|---|---|---|\n"
         )
         for name in names:
-            found, (file, _, function) = studies[name], name.partition("::")
+            found, (file, _, function) = summary_of(kept[name]), name.partition("::")
             passed = f"{found['passed']} of {sizes[name]}"
             if found["failed"]:
-                passed += f", {len(found['failed'])} failed"
+                passed += f", {found['failed']} failed"
             words = function.removeprefix("test_").replace("_", " ")
             parts.append(
                 f"| {words} ([{Path(file).name}](../{file})) | {passed} | {found['figures']} "
-                f"| {found['seconds'] / MINUTE:.1f} | {found['day']} |\n"
+                f"| {found['seconds'] / MINUTE:.1f} | {found['days']} |\n"
             )
     return "".join(parts)
 
 
+def text_of(kept: Mapping[str, Mapping[str, Any]]) -> str:
+    """JSON with a test to a line, so that a run adds the lines of its tests."""
+    studies = (
+        f'"{study}": {{\n'
+        + ",\n".join(f"{json.dumps(key)}: {json.dumps(one)}" for key, one in tests.items())
+        + "}"
+        for study, tests in kept.items()
+    )
+    return "{" + ",\n".join(studies) + "}\n"
+
+
 def write_page() -> int:
-    """Put what was run here into the record, and write the page; 1 where a study has failed."""
-    studies = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
-    if ENDED.exists():
-        studies |= outcomes_of_studies(map(json.loads, ENDED.read_text(encoding="utf-8").splitlines()))
-    KEPT.write_text(json.dumps(studies, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    PAGE.write_text(page_of(studies, sizes_of_studies()), encoding="utf-8")
-    return int(any(study["failed"] for study in studies.values()))
+    """Put what was run here into the record, and write the page; 1 where a test has failed."""
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    lines = ENDED.read_text(encoding="utf-8").splitlines() if ENDED.exists() else []
+    kept = kept_with(kept, map(json.loads, lines))
+    KEPT.write_text(text_of(kept), encoding="utf-8")
+    PAGE.write_text(page_of(kept, sizes_of_studies()), encoding="utf-8")
+    return int(any(one["outcome"] == "failed" for tests in kept.values() for one in tests.values()))
 
 
 def main() -> int:

@@ -15,7 +15,7 @@ import pytest
 from tests.verdict import selection
 from tests.verdict.chosen import CHOSEN
 from tests.verdict.executed import ROOT, ExecutionRecord
-from tests.verdict.full_studies import outcomes_of_studies, page_of
+from tests.verdict.full_studies import kept_with, page_of, summary_of, text_of
 from tests.verdict.recorder import RECORD
 from tests.verdict.recording import RecordedFile, RecordedTest, read_recorded, write_recorded
 from tests.verdict.selection import Choice, affected_tests, best_choice, files_of, files_that_name
@@ -345,17 +345,16 @@ def ended(test, outcome="passed", figures="", seconds=60.0):
 
 
 def test_the_last_outcome_of_each_test_counts_and_numbers_by_name_are_added():
-    studies = outcomes_of_studies(
-        [
-            ended("test_x[0]", "failed"),
-            ended("test_x[1]", figures="{'walls': 900}"),
-            ended("test_y", "failed", figures="17 of 20"),
-            ended("test_x[0]", figures="{'walls': 200, 'refused': 1}"),
-        ]
-    )
-    x, y = studies.values()
-    assert (x["passed"], x["failed"], x["seconds"]) == (2, [], 120.0)
-    assert (y["passed"], y["failed"]) == (0, ["tests/chart/test_a.py::test_y"])
+    earlier = kept_with({}, [ended("test_x[0]", "failed"), ended("test_x[1]", figures="{'walls': 900}")])
+    later = [
+        ended("test_y", "failed", figures="17 of 20"),
+        ended("test_x[0]", figures="{'walls': 200, 'refused': 1}"),
+    ]
+    studies = kept_with(json.loads(text_of(earlier)), later)
+    assert json.loads(text_of(studies)) == studies
+    x, y = map(summary_of, studies.values())
+    assert (x["passed"], x["failed"], x["seconds"]) == (2, 0, 120.0)
+    assert (y["passed"], y["failed"]) == (0, 1)
     page = page_of(studies, dict.fromkeys(studies, 3) | {"tests/chart/test_a.py::test_z": 1})
     row_x, row_y = (line for line in page.splitlines() if "(../tests/chart/test_a.py)" in line)
     assert [cell.strip() for cell in row_x.split("|")][2:5] == ["2 of 3", "walls 1 100, refused 1", "2.0"]
