@@ -5,12 +5,13 @@
     python -m tests.mutation_study again caught.jsonl still.jsonl --tree FOLDER
 
 FOLDER holds a copy of the project to break, with its own kernels; `again` runs first what caught each fault
-before, on newer sources. A fault is a changed sign, bound, index or factor in one function. What covers a
-function is known where `python -m tests.verdict record` was run here: first those of its tests that the quick
-verdict runs, then those of its package, then the others, the quickest first. What most tests execute takes the
-whole suite where nothing catches the fault; `--seconds` ends that, and the fault counts as open. Elsewhere, and in
-a FOLDER of another time, it goes by name: the test files that name its module, then the folder of tests of its
-package, then those of the commands. The first failure ends a fault's run. A fault that nothing catches is either a
+before, on newer sources. A fault is a changed sign, bound, index or factor in one function. First come those of
+the quick verdict's tests that cover it, then those of its package, then the others. What covers a function is
+known where `python -m tests.verdict record` was run here, the quickest tests come first; elsewhere the test files
+that `make affected` names for the fault's file are taken. What most tests execute takes the whole suite where
+nothing catches the fault; `--seconds` ends that, and the fault counts as open. In a FOLDER of another time it goes
+`--by-name`: the test files that name its module, then the folder of tests of its package, then those of the
+commands. The first failure ends a fault's run. A fault that nothing catches is either a
 hole in the suite or no fault at all (a start value of an iteration, a cell of a grid more): read those by eye.
 """
 
@@ -32,8 +33,8 @@ from time import monotonic
 
 import pytest
 
-from tests.verdict.recording import read_raw
-from tests.verdict.selection import read_choice
+from tests.verdict.recording import files_of_tests, read_raw, read_recorded
+from tests.verdict.selection import affected_tests, files_of, read_choice
 
 ROOT = Path(__file__).parent.parent
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
@@ -141,7 +142,12 @@ def apply(fault: Mutation, tree: Path) -> bool:
 
 
 def drop_kernels(path: Path, source: Path) -> None:
-    """Delete the compiled kernels of a file and of all that import it, directly or not: they would not notice."""
+    """Delete the compiled kernels of a file and of all that import it, directly or not: they would not notice.
+
+    Those in a folder that NUMBA_CACHE_DIR names are kept by what they were made from, and stay.
+    """
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
     module = ".".join(path.relative_to(source).with_suffix("").parts)
     stale, before = {module}, set[str]()
     files = {".".join(p.relative_to(source).with_suffix("").parts): p for p in source.rglob("*.py")}
@@ -157,7 +163,7 @@ def drop_kernels(path: Path, source: Path) -> None:
 def covering_tests(fault: Mutation, tree: Path, *, by_name: bool = False) -> dict[str, list[str]]:
     """The tests that cover a fault, by the name of their group, in the order in which they are run.
 
-    by_name  whether to go by names although it is recorded what each test executes
+    by_name  whether to go by names although it is recorded what each test, or each file of them, executes
     """
     recorded = {} if by_name else tests_by_function()
     if recorded:
@@ -172,12 +178,18 @@ def covering_tests(fault: Mutation, tree: Path, *, by_name: bool = False) -> dic
         return groups
     module = ".".join(Path(fault.path).relative_to("src").with_suffix("").parts)
     package = Path(fault.path).parts[2]
-    files = sorted((tree / "tests").rglob("test_*.py"))
-    named = [f for f in files if re.search(rf"{re.escape(module)}\b", f.read_text(encoding="utf-8"))]
-    own = [f for f in files if f.parent.name == package and f not in named]
-    rest_of_files = [f for f in files if f.parent.name in ("cli", "reproduction") and f not in named]
-    by_group = {"named": named, "package": own, "commands": rest_of_files}
-    return {group: [str(f.relative_to(tree)) for f in found] for group, found in by_group.items()}
+    files = [str(f.relative_to(tree)) for f in sorted((tree / "tests").rglob("test_*.py"))]
+    named = [f for f in files if re.search(rf"{re.escape(module)}\b", (tree / f).read_text(encoding="utf-8"))]
+    own = [f for f in files if Path(f).parts[1] == package and f not in named]
+    if by_name:
+        commands = [f for f in files if Path(f).parts[1] in ("cli", "reproduction") and f not in named]
+        return {"named": named, "package": own, "commands": commands}
+    affected = affected_tests([fault.path], read_recorded(), files_of_tests())
+    return {
+        "quick": [test for test in read_choice("quick") if files_of([test])[0] in affected],
+        "named": [f for f in named if f in affected],
+        "package": [f for f in own if f in affected],
+    } | {f"others {f}": [f] for f in affected if f not in named and f not in own}
 
 
 @cache
