@@ -177,10 +177,10 @@ def covering_tests(fault: Mutation, tree: Path, *, by_name: bool = False) -> dic
             groups |= {f"{group} {k}": names[k : k + FIRST] for k in range(0, len(names), FIRST)}
         return groups
     module = ".".join(Path(fault.path).relative_to("src").with_suffix("").parts)
-    package = Path(fault.path).parts[2]
+    packages = Path(fault.path).parts[2:-1]  # show/cli has its tests in tests/show and tests/cli
     files = [str(f.relative_to(tree)) for f in sorted((tree / "tests").rglob("test_*.py"))]
     named = [f for f in files if re.search(rf"{re.escape(module)}\b", (tree / f).read_text(encoding="utf-8"))]
-    own = [f for f in files if Path(f).parts[1] == package and f not in named]
+    own = [f for f in files if Path(f).parts[1] in packages and f not in named]
     if by_name:
         commands = [f for f in files if Path(f).parts[1] in ("cli", "reproduction") and f not in named]
         return {"named": named, "package": own, "commands": commands}
