@@ -7,6 +7,7 @@ import pytest
 
 from tests.measured_handle_cases import AT_SENSOR, COLLOCATED, EVERY, RECIPROCAL, frequencies, measured_device
 from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.guarantees.between_frequencies import BETWEEN, CubicPieces
 from zwidth.guarantees.measured import measured_passive_region
 from zwidth.guarantees.passive import passive_region
 from zwidth.loop.controller import Controller
@@ -81,3 +82,15 @@ def test_what_a_promise_exceeds_where_modes_or_the_plants_own_region_err(seed, e
     ten times as many frequencies give the same promise, and the plant's own region is known to a few 1e-4."""
     found, exact = promised_and_exact(seed)
     assert TOLERANCE < found.stiffness_max / exact.stiffness_max - 1.0 < excess
+
+
+def test_what_is_allowed_for_between_nodes_is_the_distance_to_the_four_round_a_place():
+    """A function of fourth order misses its cubic by its leading coefficient times these distances."""
+    nodes, leading = np.geomspace(0.1, 3.0, 12), 0.7
+    pieces = CubicPieces.through(nodes, leading * nodes[None, :] ** 4, np.array([1.0]))
+    first = np.arange(3, 8)
+    places = 0.5 * (nodes[first + 1] + nodes[first + 2])
+    (value,), (allowed,) = pieces.at(places)
+    missed = leading * np.prod(places[:, None] - nodes[first[:, None] + np.arange(4)], axis=1)
+    np.testing.assert_allclose(leading * places**4 - value.real, missed, rtol=1e-9)
+    np.testing.assert_allclose(allowed, BETWEEN * np.abs(missed), rtol=1e-9)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.systems import mass, published, random_controller, random_plant
+from tests.systems import mass, published, random_controller, random_plant, two_mass
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.verdict import spectral_radius
 from zwidth.guarantees.disks import force_filter_response, response_disks
@@ -220,3 +220,16 @@ def test_a_plant_without_handle_is_asked_where_it_is_held():
     with pytest.raises(ValueError, match="no handle"):
         passive_region(loop)
     assert_allclose(passive_region(loop, ONE).stiffness_max, 2000.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_many_frequencies_are_answered_in_batches(coupled, monkeypatch):
+    plant = two_mass(0.26, 0.025, 15620.0, 1.9)
+    if coupled:
+        plant = replace(plant, damping=plant.damping + np.diag([0.5, 0.0]))
+    held, w = port(plant, plant.sensor), np.geomspace(1.0, 1e4, 30).reshape(5, 6)
+    together = port_response(held, w)
+    monkeypatch.setattr("zwidth.guarantees.port.AT_ONCE", 28)
+    for name, batches in vars(port_response(held, w)).items():
+        np.testing.assert_allclose(batches, getattr(together, name), rtol=1e-12)
+    assert port_response(held, np.zeros((0, 3))).port.shape == (0, 3)

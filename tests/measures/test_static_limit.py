@@ -15,6 +15,7 @@ from tests.systems import mass, two_mass
 from zwidth.chart.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.loop.controller import Controller
+from zwidth.loop.fixed_feedback import ForceSensor
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.felt_chart import felt_chart
@@ -200,6 +201,22 @@ def test_a_sensor_beyond_the_hand_feels_walls_stiffer_than_their_limit():
     felt = static_stiffness(opposed, np.geomspace(1.0, 1e9, 200))
     assert kind == "limit"
     assert np.any(felt > limit)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "sensor", "handle"),
+    [((0.6, 0.6), (0.5, 1.3), (0.9, -0.7)), ((0.5, 0.1), (1.3, -0.4), (0.1, -0.9))],
+)
+def test_the_help_of_a_force_sensor_decides_whether_the_limit_is_a_bound(actuator, sensor, handle):
+    springs = np.array([[1500.0, -1000.0], [-1000.0, 1000.0]])
+    plant = Plant(np.eye(2), np.zeros((2, 2)), springs, np.array(actuator), np.array(sensor), np.array(handle))
+    limit, kinds = static_stiffness_limit(plant), set()
+    for controller in (None, Controller(0.001, force_sensor=ForceSensor(gain=2.0))):
+        felt = static_stiffness(plant, np.geomspace(1e-2, 1e12, 400), controller)
+        kind = static_stiffness_limit_kind(plant, controller)
+        assert (kind == "limit") == bool(np.any(felt > limit * (1.0 + 1e-9)))
+        kinds.add(kind)
+    assert kinds == {"bound", "limit"}
 
 
 def test_a_chart_says_the_same():

@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.idle_motions import separated_modes
-from zwidth.model.modes import undamped_modes
+from zwidth.model.modes import real_modes, undamped_modes
 from zwidth.model.plant import Plant
 
 PERIOD = 1e-3
@@ -95,3 +95,13 @@ def test_equal_modes_are_turned_to_the_wall():
     assert moved.tolist() == [True, False, False]
     assert np.abs(turned_shapes[:, 0] @ plant.actuator) == pytest.approx(1.0, abs=1e-15)
     assert turned_shapes.T @ turned_shapes == pytest.approx(np.eye(3), abs=1e-15)
+
+
+def test_slow_motions_beside_a_fast_one_are_not_taken_for_one():
+    """Frequencies a thousandth apart, whose dampers couple them: no turning of the two shapes takes that away."""
+    stiffness, damping = np.diag([1.0, 1.001, 1e14]), np.diag([0.1, 0.1, 1.0])
+    damping[0, 1] = damping[1, 0] = 0.05
+    along = np.ones(3)
+    assert real_modes(Plant(np.eye(3), damping, stiffness, along, along)) is None
+    equal = np.diag([1.0, 1.0, 1e14])
+    assert real_modes(Plant(np.eye(3), damping, equal, along, along)) is not None
