@@ -136,3 +136,15 @@ def test_base_parameters_of_two_links_are_named_as_people_write_them():
     assert "m c_x(link-2)" in base.names
     assert "J(motor-2)" in base.names
     assert len(base.names) == 5 + 6  # and friction of two drives
+
+
+@pytest.mark.parametrize("axes", ["zyx", "yxz", "xzy"])
+def test_moments_of_inertia_about_the_joints_lead_their_combinations(axes):
+    """Of each hinged link that about its own axis is kept, whichever axis that is; the third link slides."""
+    document = spatial_document(np.random.default_rng(3))
+    for link, axis in zip(document["mechanism"]["links"], axes, strict=True):
+        link["axis"], link["orientation_rad"] = [float(axis == other) for other in "xyz"], [0.0, 0.0, 0.0]
+    parameters = Parameters.of(from_document(document, "bench").mechanism, rotors=False)
+    base = base_parameters(parameters, np.array([0.5, 0.6, 0.02]), GRAVITY)
+    kept = {parameters.names[k] for k in base.kept}
+    assert {f"I_{axis}{axis}(link-{i})" for i, axis in enumerate(axes[:2])} <= kept
