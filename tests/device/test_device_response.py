@@ -196,6 +196,21 @@ def test_the_paths_of_the_handle_stand_in_the_same_file_or_beside_it(write, spec
     assert (beside.handle.missing, beside.delay) == ((), 0.4)
 
 
+def test_repeated_sweeps_of_the_handle_share_their_frequencies(write, spectrum):
+    first = [line.split(",")[0] for line in spectrum[1:]]
+    keys = 'file = "sweep.csv"\nhandle_file = "hand.csv"'
+    for sweeps in ("7", "78"):
+        values = [f"{f},{k}e-3,-2e-3,{n}" for k, n in enumerate(sweeps, 1) for f in first]
+        write([f"frequency_Hz,{PAIR},sweep", *values], name="hand.csv")
+        mean = np.mean(np.arange(1, len(sweeps) + 1))
+        assert load(write(spectrum, keys)).response.handle.force_to_encoder.value == pytest.approx(
+            1e-3 * mean - 2e-3j
+        )
+    write([f"frequency_Hz,{PAIR},sweep", *values[:-1]], name="hand.csv")
+    (line,) = faults(write(spectrum, keys))
+    assert "sweep 8 has other frequencies than the first" in line
+
+
 def test_half_a_path_and_a_path_given_twice_are_refused(write, spectrum):
     head, *lines = spectrum
     path = write([f"{head},{PAIR.split(',')[0]}", *(f"{line},1e-3" for line in lines)])

@@ -133,11 +133,12 @@ def _handle_experiment(
         }
         frequency = found["force_to_encoder"].frequency
         return frequency, {name: MeasuredPath(one.value, one.coherence) for name, one in found.items()}
-    _check_spectrum(path, table, period)
     if "sweep" not in table:
+        _check_spectrum(path, table, period)
         return table["frequency_Hz"], _handle_paths(table)
     parts = [{key: column[table["sweep"] == n] for key, column in table.items()} for n in _sweep_numbers(table)]
     for n, part in zip(_sweep_numbers(table), parts, strict=True):
+        _check_spectrum(path, part, period)
         _check_sweep(path, n, part["frequency_Hz"], parts[0]["frequency_Hz"])
     every = [_handle_paths(part) for part in parts]
     return parts[0]["frequency_Hz"], {name: mean_path([paths[name] for paths in every]) for name in every[0]}
