@@ -103,8 +103,10 @@ def test_of_a_run_that_soon_rests_the_part_with_the_contact_is_drawn():
 
 
 def test_a_run_that_goes_on_is_drawn_whole():
-    response, _, _ = simulate_and_draw(0.3)
+    response, _, axes = simulate_and_draw(0.3)
     assert time_window(response) == (0.0, response.time[-1])
+    # the trail goes beyond the last sample, the panels do not
+    assert {ax.get_xlim() for ax in axes} == {time_window(response)}
 
 
 def test_a_run_without_its_trail_is_drawn_by_its_samples():
