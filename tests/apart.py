@@ -268,29 +268,40 @@ class ExactLoop(ApartLoop):
 
     @cached_property
     def poles(self):
-        """Poles of the plant, z - 1 of the sampled ones, their residues of the force now and one sample later."""
+        """z - 1 of the sampled plant's poles."""
         plant, controller = self.loop.plant, self.loop.controller
         with mpmath.workdps(self.DIGITS):
-            A, source, T = *exact_generator(plant, controller), mpmath.mpf(controller.sampling_period)
-            s, right = mpmath.eig(A)
-            weight = mpmath.lu_solve(right, source)
+            A, _ = exact_generator(plant, controller)
+            return [mpmath.expm1(p * controller.sampling_period) for p in mpmath.eig(A, left=False, right=False)]
+
+    @cached_property
+    def exactly_sampled(self):
+        """F - 1, what a force of 1 N does now and one sample later, and the sensor; free motions are no exception."""
+        plant, controller = self.loop.plant, self.loop.controller
+        with mpmath.workdps(self.DIGITS):
+            A, source = exact_generator(plant, controller)
+            T, n = mpmath.mpf(controller.sampling_period), A.rows
             rest = mpmath.mpf(controller.delay) - self.whole
-            read = [sum(plant.sensor[i] * right[i, k] for i in range(plant.size)) for k in range(len(s))]
-            pulse = [r * weight[k] for k, r in enumerate(read)]
-            now = [r * hold(p, (1 - rest) * T) for r, p in zip(pulse, s, strict=True)]
-            later = [
-                r * mpmath.exp(p * (1 - rest) * T) * hold(p, rest * T) if rest else mpmath.mpf(0)
-                for r, p in zip(pulse, s, strict=True)
-            ]
-            return [mpmath.expm1(p * T) for p in s], now, later
+            forced = mpmath.zeros(n + 1)
+            forced[:n, :n], forced[:n, n] = A, source
+
+            def held(time):
+                both = mpmath.expm(forced * time)
+                return both[:n, :n], both[:n, n]
+
+            (F, whole), (_, now) = held(T), held((1 - rest) * T)
+            sensor = mpmath.zeros(1, n)
+            for i in range(plant.size):
+                sensor[i] = plant.sensor[i]
+            return F - mpmath.eye(n), now, whole - now, sensor
 
     def exact_terms(self, d):
         """P and w at z = 1 + d, as numbers of mpmath."""
         controller = self.loop.controller
         T = mpmath.mpf(controller.sampling_period)
-        sampled, now, later = self.poles
+        moved, now, later, sensor = self.exactly_sampled
         z = 1 + d
-        P = sum((a + b / z) / (d - e) for e, a, b in zip(sampled, now, later, strict=True))
+        P = (sensor * mpmath.lu_solve(d * mpmath.eye(moved.rows) - moved, now + later / z))[0]
         P *= z**-self.whole * exact_low_pass(controller.force_filter, d, T)
         method = controller.velocity
         weights = velocity_weights(method, 1.0)
@@ -316,7 +327,7 @@ class ExactLoop(ApartLoop):
 
         moved  how far a root has to be from the plant's poles to count
         """
-        sampled = self.poles[0]
+        sampled = self.poles
         with mpmath.workdps(50):
             K, B, largest = mpmath.mpf(float(K)), mpmath.mpf(float(B)), -1.0
 

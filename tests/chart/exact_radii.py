@@ -38,6 +38,22 @@ def walls_beside_origin(walls):
     return np.all(np.abs(walls) <= NOTHING * np.abs(walls).max(axis=0), axis=1)
 
 
+def is_off(excess, wall, size, band):
+    """Whether the largest root of a wall is off the circle, and on the same side for those beside it that a chart
+    of its size in double precision does not tell from it.
+
+    excess  |z| - 1 of the largest root, by K and B
+    wall, size  (2,)  [K, B], and the largest of a chart
+    band    how far off counts
+    """
+    here = excess(*wall)
+    if abs(here) <= band:
+        return False
+    steps = NOTHING * np.diag(size)
+    beside = [excess(*(wall + sign * step)) for step in steps for sign in (1.0, -1.0)]
+    return all(np.sign(one) == np.sign(here) for one in beside)
+
+
 def exact_matrix(loop, k, b):
     """`multi_loops.reference_matrix` with 40 digits in sampling and in all sums."""
     plant, controller, m = loop.plant, loop.controller, loop.plant.count

@@ -16,7 +16,7 @@ from zwidth.chart.robust.chart import robust_chart
 from zwidth.chart.robust.instability import softening, unstable
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.verdict import judge, spectral_radius
-from zwidth.loop.controller import Controller
+from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
@@ -42,7 +42,10 @@ def similar_loops(rng, count=None):
     for _ in range(count or int(rng.integers(2, 7))):
         p, c, f = base.plant, base.controller, np.exp(rng.normal(0.0, 0.3, 5))
         if rng.random() < 0.3:
-            c = replace(c, sampling_period=c.sampling_period * f[3])
+            period, low_pass = c.sampling_period * f[3], c.velocity_filter
+            if isinstance(low_pass, Butterworth):  # below half of a slower rate, too
+                low_pass = replace(low_pass, cutoff_Hz=min(low_pass.cutoff_Hz, 0.45 / period))
+            c = replace(c, sampling_period=period, velocity_filter=low_pass)
         if rng.random() < 0.5:
             c = replace(c, delay=c.delay * f[4])
         plant = replace(p, mass=p.mass * f[0], damping=p.damping * f[1], stiffness=p.stiffness * f[2])

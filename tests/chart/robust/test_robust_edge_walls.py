@@ -7,9 +7,10 @@ import pytest
 from systems import reference_transition_matrix
 
 from tests.apart import ExactLoop
-from tests.chart.exact_radii import joined_excess, walls_beside_origin
+from tests.chart.exact_radii import is_off, joined_excess, walls_beside_origin
 from tests.chart.robust.test_robust import similar_loops
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
+from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import robust_chart
 
@@ -29,7 +30,8 @@ def roots(loop, walls):
 def walls_off_edge(loops):
     """Walls of the edge off the circle for the member that binds, or beyond it for another, in 40 digits.
 
-    [] of what is not decided. Roots that meet are judged by their mean, and K = B = 0 is left out.
+    [] of what is not decided. Roots that meet are judged by their mean, and K = B = 0 is left out. So is a member
+    with a motion that its chart names as unobserved: the matrix built apart has it.
     """
     try:
         chart = robust_chart(loops)
@@ -39,21 +41,26 @@ def walls_off_edge(loops):
         return []
     walls = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in chart.boundary])
     binding = np.repeat([arc.member for arc in chart.boundary], [len(arc.stiffness) for arc in chart.boundary])
-    walls, binding = walls[~walls_beside_origin(walls)], binding[~walls_beside_origin(walls)]
+    size, judged = np.abs(walls).max(axis=0), ~walls_beside_origin(walls)
+    walls, binding = walls[judged], binding[judged]
     off = []
     for index, loop in chart.members.items():
-        z = roots(loop, walls)
-        away = joined_excess(z)
+        if stability_chart(loop, decay=False).unobserved_modes:
+            continue
+        away = joined_excess(roots(loop, walls))
         away = np.where(binding == index, np.abs(away), away)
         exact = ExactLoop(loop)
-        for n in np.argsort(-away)[:MOST]:
-            near = z[n][np.abs(z[n]) > 1.0 - 1e-4]
-            if away[n] > OFF and len(near):
-                radius = exact.radius(*walls[n], near)
-                if radius > OFF or (binding[n] == index and radius < -OFF):
-                    off.append((index, *walls[n].tolist()))
-            elif away[n] > OFF:
-                off.append((index, *walls[n].tolist()))
+
+        def excess(K, B, loop=loop, exact=exact):
+            z = roots(loop, np.array([[K, B]]))[0]
+            return exact.radius(K, B, z[np.abs(z) > np.abs(z).max() - 1e-4])
+
+        worst = np.argsort(-away)[:MOST]
+        off += [
+            (index, *walls[n].tolist())
+            for n in worst[away[worst] > OFF]
+            if (binding[n] == index or excess(*walls[n]) > 0.0) and is_off(excess, walls[n], size, OFF)
+        ]
     return off
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from multi_loops import random_multi, random_unlike, reference_matrix
 
-from tests.chart.exact_radii import exact_matrix, exact_radius, joined_excess, walls_beside_origin
+from tests.chart.exact_radii import exact_matrix, exact_radius, is_off, joined_excess, walls_beside_origin
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.chart.several_directions.chart import multi_chart
 
@@ -25,14 +25,14 @@ def walls_off_circle(loop, most=MOST):
     if not chart.boundary or len(chart.doubtful) or len(chart.off_circle) or len(chart.missed):
         return []
     walls = np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in chart.boundary])
-    walls = walls[~walls_beside_origin(walls)]
+    walls, size = walls[~walls_beside_origin(walls)], np.abs(walls).max(axis=0)
     away = np.abs(joined_excess(np.linalg.eigvals([reference_matrix(loop, K, B) for K, B in walls.tolist()])))
     worst = np.argsort(-away)[:most]
-    return [
-        (float(K), float(B))
-        for K, B in walls[worst[away[worst] > OFF]]
-        if abs(exact_radius(lambda K=K, B=B: exact_matrix(loop, K, B))) > OFF
-    ]
+
+    def excess(K, B):
+        return exact_radius(lambda: exact_matrix(loop, K, B))
+
+    return [tuple(wall.tolist()) for wall in walls[worst[away[worst] > OFF]] if is_off(excess, wall, size, OFF)]
 
 
 def loop_of_seed(seed):
@@ -43,6 +43,14 @@ def loop_of_seed(seed):
 @pytest.mark.parametrize("seed", EVERYDAY_SEEDS)
 def test_every_wall_of_an_edge_is_on_the_circle(seed):
     assert walls_off_circle(loop_of_seed(seed), EVERYDAY_MOST) == []
+
+
+@pytest.mark.parametrize("seed", [4092, 4344])
+def test_an_edge_round_the_origin_has_a_corner_there(seed):
+    """On a free motion, K = 0 meets there the curve of an undamped mode, or one that ends in a double root."""
+    boundary = multi_chart(loop_of_seed(seed)).boundary
+    walls = np.abs(np.vstack([np.column_stack([arc.stiffness, arc.damping]) for arc in boundary]))
+    assert np.min(np.max(walls / walls.max(axis=0), axis=1)) < 1e-10
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Where a curve of pairs of roots ends: at theta = 0 or pi, in a wall with a double root at z = 1 or -1.
 
-Walls are even functions of the angle from there, so that the limit follows from a few angles close by: nearer ones
-are all rounding, and further ones see the curve turn.
+Walls are even functions of the angle from there, so that the limit follows from a few angles close by. Nearer ones
+are all rounding, and further ones see the curve turn: those are taken of which four tell the same as three.
 """
 
 from __future__ import annotations
@@ -17,10 +17,17 @@ from zwidth.chart.several_directions.traced_curve import CurvePoints, TracedCurv
 
 Floats = NDArray[np.float64]
 
-# Angles from which a limit is extrapolated, in units of the first sample's.
-ANGLES: Final = np.array([4.0, 8.0, 16.0, 32.0])
-# Weights of a polynomial's values in the squares of these angles for its value at 0.
-WEIGHTS: Final = np.array([np.prod([x**2 / (x**2 - y**2) for x in ANGLES if x != y]) for y in ANGLES])
+# Angles from which a limit is extrapolated, in units of the first sample's: each twice the one before.
+ANGLES: Final = 2.0 ** np.arange(-2, 6)
+
+
+def _weights(count: int) -> Floats:
+    """Weights of a polynomial's values in the squares of so many of these angles for its value at 0."""
+    x = ANGLES[:count]
+    return np.array([np.prod([o**2 / (o**2 - y**2) for o in x if o != y]) for y in x])
+
+
+THREE, FOUR = _weights(3), _weights(4)
 # What is extrapolated from these angles lies this close, in units of the curve's scale, to what the slope says.
 NEAR_PARABOLA: Final = 1e-3
 # A limit further away from the first sample than this, in units of the curve's scale, is none.
@@ -57,7 +64,11 @@ def _limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
         guess[:, 1:] = point[1:] + parabola * (ANGLES[:, None] ** 2 - 1.0)
         upright = np.tile([1.0, 0.0, 0.0], (len(ANGLES), 1))
         near, _, settled = correct(curve.equation, guess, upright, curve.scale)
-    walls = WEIGHTS @ near[:, 1:] if settled.all() else point[1:] - parabola
+    near[~settled] = np.nan
+    windows = np.lib.stride_tricks.sliding_window_view(near[:, 1:], 4, axis=0)
+    by_four = windows @ FOUR
+    apart = np.abs((by_four - windows[..., :3] @ THREE) / curve.scale[1:]).max(axis=1)
+    walls = by_four[np.nanargmin(apart)] if np.isfinite(apart).any() else point[1:] - parabola
     if np.abs((walls - point[1:] + parabola) / curve.scale[1:]).max() > NEAR_PARABOLA:
         walls = point[1:] - parabola
     return np.array([[end, *walls]])

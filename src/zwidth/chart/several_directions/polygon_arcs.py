@@ -33,6 +33,10 @@ ONE_PLACE = 1e-6
 # A step that moves a wall by less than this share of the ring's size is rounding; so is one of less than the other
 # that grows no smaller.
 SETTLED, NEARLY = 1e-16, 1e-10
+# Where a smaller step of Newton's method, as a share of the ring's size, takes two curves farther apart, one of
+# them cannot be evaluated: at K = B = 0 on an undamped mode every wall solves its equation. The tangents from the
+# place before then tell the corner, to the square of this.
+TANGENT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -198,12 +202,15 @@ def _meet(
     On one curve p(s) = p(t) holds wherever s = t, too: what must vanish there is (p(s) - p(t)) / (s - t).
     """
     s, t, last = start_a, start_b, np.inf
+    meant, apart = np.zeros(2), np.inf
     if a is b and abs(s - t) <= ONE_PLACE * abs(s):
         return None
     for _ in range(40):
         (p, dp), (q, dq) = _wall(a, s), _wall(b, t)
         if np.abs(p - q).max() <= SETTLED * size:
             break
+        if a is not b and np.abs(p - q).max() > apart and last < TANGENT * size:
+            return meant, s, t
         slope = (p - q) / (s - t) if a is b and s != t else np.zeros(2)
         matrix = np.stack([dp - slope, slope - dq], axis=1)
         if not np.isfinite(matrix).all() or np.linalg.det(matrix) == 0.0:
@@ -212,6 +219,7 @@ def _meet(
         if not (abs(step[0]) < a.reach(s) and abs(step[1]) < b.reach(t)):
             return None
         s, t = _on(a, s + float(step[0])), _on(b, t + float(step[1]))
+        meant, apart = 0.5 * (p + dp * step[0] + q + dq * step[1]), np.abs(p - q).max()
         moved = max(np.abs(dp * step[0]).max(), np.abs(dq * step[1]).max())
         if moved <= SETTLED * size or (moved > 0.5 * last and moved < NEARLY * size):
             break
