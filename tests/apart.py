@@ -276,7 +276,7 @@ class ExactLoop(ApartLoop):
 
     @cached_property
     def exactly_sampled(self):
-        """F - 1, what a force of 1 N does now and one sample later, and the sensor; free motions are no exception."""
+        """F - 1, what a force of 1 N does now and one sample later, and the sensor; free motions count, too."""
         plant, controller = self.loop.plant, self.loop.controller
         with mpmath.workdps(self.DIGITS):
             A, source = exact_generator(plant, controller)
