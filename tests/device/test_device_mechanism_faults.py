@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 
 import pytest
@@ -210,3 +211,14 @@ def test_a_loop_that_cannot_close_says_by_how_much(length):
     said = re.search(r"at least (\S+) m apart", fault.message)
     assert said
     assert float(said[1]) == pytest.approx(length - 0.147 - 0.199 - 0.199, rel=5e-3)
+
+
+@pytest.mark.parametrize("place", [0, 2])
+def test_a_drive_beyond_the_freedom_that_loops_leave_is_a_surplus_one(place):
+    """Of three drives of a five-bar the third; of its own two none."""
+    device = load("five-bar")
+    document = copy.deepcopy(device.document)
+    more = {"name": "more", "joint": "distal-right", "motor_inertia_kg_m2": 1e-6, "transmission_ratio": 4.0}
+    document["mechanism"]["drives"].insert(place, more | {"stiffness_Nm_per_rad": 0.5})
+    assert from_document(document, "three drives").mechanism.drives.surplus == (2,)
+    assert device.mechanism.drives.surplus == ()
