@@ -33,6 +33,14 @@ def joined_excess(z):
     return np.abs(joined).max(axis=-1) - 1.0
 
 
+def exact_joined_excess(L):
+    """`joined_excess` of a matrix (N, N), its roots in 40 digits: in double precision the mean of two that meet is
+    moved by rounding of large entries, too."""
+    with mp.workdps(DIGITS):
+        roots = mpmath.eig(mp.matrix(L.tolist()), left=False, right=False)
+    return float(joined_excess(np.array([[complex(root) for root in roots]]))[0])
+
+
 def walls_beside_origin(walls):
     """Whether walls (k, 2) are K = B = 0 but for a chart's last digits; free motions have a double root there."""
     return np.all(np.abs(walls) <= NOTHING * np.abs(walls).max(axis=0), axis=1)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.apart import ApartLoop
-from tests.chart.exact_radii import exact_radius, joined_excess
+from tests.chart.exact_radii import exact_joined_excess, exact_radius, joined_excess
 from tests.chart.test_fixed_feedback_charts import KINDS
 from tests.control_apart import ControlledLoop, random_controlled_loop
 from tests.loop.estimators_cases import random_method
@@ -76,14 +76,15 @@ def controlled_case(kind, seed):
 
 
 def is_off(matrices, K, B, band):
-    """Whether the largest root of a wall is farther off the circle than a band, in 40 digits, and on the same side
-    those of all walls that differ from it in the last digits that a computed wall has."""
+    """Whether the largest root of a wall is farther off the circle than a band, in 40 digits, and so is its mean
+    with one that it meets; and on the same side those of all walls that differ from it in the last digits that a
+    computed wall has."""
 
     def excess(K, B):
         return exact_radius(lambda: mpmath.matrix((matrices[0] + K * matrices[1] + B * matrices[2]).tolist()))
 
     here = excess(K, B)
-    if abs(here) <= band:
+    if abs(here) <= band or abs(exact_joined_excess(matrices[0] + K * matrices[1] + B * matrices[2])) <= band:
         return False
     less, more = 1.0 - WALL_DIGITS, 1.0 + WALL_DIGITS
     beside = [excess(K * k, B * b) for k, b in ((less, 1.0), (more, 1.0), (1.0, less), (1.0, more))]
