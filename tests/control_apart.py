@@ -2,7 +2,8 @@
 
 Nothing is shared with `zwidth.loop` but the numbers of plant, operator and controller: the plant moves by the
 exponential of its matrix (`systems.held_step`), filters are second-order sections of scipy, everything else is a
-list of past values. A transition matrix is what a period makes of each unit vector.
+list of past values. A transition matrix is what a period makes of each unit vector. The same period is played in
+decimal arithmetic by `tests/chart/exact_control.py`, which brings its own numbers, filters and exponentials.
 """
 
 from __future__ import annotations
@@ -21,6 +22,28 @@ from zwidth.model.operator import Operator, attach
 from zwidth.model.plant import Plant
 
 
+class DoublePrecision:
+    """What a period is computed with: numbers, filters, windows and steps of the plant."""
+
+    def number(self, x):
+        return float(x)
+
+    def array(self, x):
+        return np.asarray(x, dtype=float)
+
+    def sections(self, low_pass, T):
+        return systems.low_pass_sections(low_pass, T)
+
+    def weights(self, method, T):
+        return systems.velocity_weights(method, T)
+
+    def held_step(self, plant, time, lag):
+        return systems.held_step(plant, time, lag)
+
+    def solve(self, matrix, right):
+        return np.linalg.solve(matrix, right)
+
+
 @dataclass
 class ControlledLoop:
     """A device, whoever holds it, and its computer."""
@@ -29,7 +52,7 @@ class ControlledLoop:
     operator: Operator | None
     controller: Controller
     loop: Loop = field(init=False)
-    steps: dict[float, tuple[np.ndarray, np.ndarray]] = field(init=False, default_factory=dict)
+    steps: dict[tuple[type, float], tuple[np.ndarray, np.ndarray]] = field(init=False, default_factory=dict)
 
     def __post_init__(self):
         held = self.device if self.operator is None else attach(self.device, self.operator)
@@ -44,10 +67,11 @@ class ControlledLoop:
         LK, LB = (self.transition_matrix(*wall) - L0 for wall in ((K, 0.0), (0.0, B)))
         return L0, LK / K, LB / B
 
-    def transition_matrix(self, K, B):
+    def transition_matrix(self, K, B, arithmetic=None):
         """What a period makes of each unit vector."""
-        size = Period(self, K, B, None).size
-        return Period(self, K, B, np.eye(size)).after()
+        arithmetic = arithmetic or DoublePrecision()
+        size = Period(self, K, B, None, arithmetic).size
+        return Period(self, K, B, arithmetic.array(np.eye(size)), arithmetic).after()
 
 
 class Memory:
@@ -103,11 +127,11 @@ class Past:
 class Velocity:
     """A velocity estimate behind a low pass."""
 
-    def __init__(self, memory, method, low_pass, T):
-        self.T, self.weights = T, systems.velocity_weights(method, T)
-        self.method = method.alpha_beta(T) if isinstance(method, Kalman) else method
+    def __init__(self, memory, method, low_pass, T, arithmetic):
+        self.T, self.weights = T, arithmetic.weights(method, T)
+        self.method = method.alpha_beta(float(T)) if isinstance(method, Kalman) else method
         self.past = Past(memory, 2 if self.weights is None else len(self.weights) - 1)
-        self.filter = Filter(memory, systems.low_pass_sections(low_pass, T))
+        self.filter = Filter(memory, arithmetic.sections(low_pass, T))
 
     def __call__(self, y):
         if self.weights is not None:
@@ -127,9 +151,9 @@ class Velocity:
 class Held:
     """Commands that wait; `before` is what acts just before the next sample."""
 
-    def __init__(self, memory, delay):
+    def __init__(self, memory, delay, arithmetic):
         self.whole = int(np.floor(delay + 1e-12))
-        self.part = max(delay - self.whole, 0.0)
+        self.part = max(arithmetic.number(delay) - self.whole, arithmetic.number(0.0))
         self.past = Past(memory, self.whole + 1)
 
     @property
@@ -147,55 +171,59 @@ class Held:
 class Period:
     """One sampling period from given states (N, k)."""
 
-    def __init__(self, case, K, B, states):
+    def __init__(self, case, K, B, states, arithmetic):
         plant, c = case.loop.plant, case.controller
         self.case, self.plant, self.c, self.K, self.B = case, plant, c, K, B
-        T, memory = c.sampling_period, Memory(states)
-        self.generator, _ = systems.generator(plant, c.actuator_time_constant)
+        self.arithmetic = arithmetic
+        self.T = T = arithmetic.number(c.sampling_period)
+        memory = Memory(states)
+        states_of_plant, _ = systems.generator(plant, c.actuator_time_constant)
         self.speeds = slice(plant.size, 2 * plant.size)
         # velocities are kept in metres per sample
-        self.x = memory.take(len(self.generator)).copy()
-        self.x[self.speeds] /= T
-        self.velocity = Velocity(memory, c.velocity, c.velocity_filter, T)
-        self.force_filter = Filter(memory, systems.low_pass_sections(c.force_filter, T))
-        self.slow = Held(memory, c.delay)
+        self.x = memory.take(len(states_of_plant)).copy()
+        self.x[self.speeds] = self.x[self.speeds] / T
+        self.velocity = Velocity(memory, c.velocity, c.velocity_filter, T, arithmetic)
+        self.force_filter = Filter(memory, arithmetic.sections(c.force_filter, T))
+        self.slow = Held(memory, c.delay, arithmetic)
         self.parts = [self.velocity, self.force_filter, self.slow]
         if c.force_sensor is not None:
             self.late = Past(memory, c.force_sensor.delay)
-            self.on_sensor = Filter(memory, systems.low_pass_sections(c.force_sensor.filter, T))
+            self.on_sensor = Filter(memory, arithmetic.sections(c.force_sensor.filter, T))
             self.parts += [self.late, self.on_sensor]
         if c.feedforward is not None:
             own = c.feedforward
-            self.own_velocity = Velocity(memory, own.velocity, own.velocity_filter, T)
+            self.own_velocity = Velocity(memory, own.velocity, own.velocity_filter, T, arithmetic)
             self.before = Past(memory, 1)
-            self.acceleration = Filter(memory, systems.low_pass_sections(own.acceleration_filter, T))
+            self.acceleration = Filter(memory, arithmetic.sections(own.acceleration_filter, T))
             self.parts += [self.own_velocity, self.before, self.acceleration]
         if c.local_loop is not None:
             own = c.local_loop
-            self.fast_velocity = Velocity(memory, own.velocity, own.velocity_filter, T / own.rate_multiple)
-            self.fast = Held(memory, own.delay)
+            self.fast_velocity = Velocity(
+                memory, own.velocity, own.velocity_filter, T / own.rate_multiple, arithmetic
+            )
+            self.fast = Held(memory, own.delay, arithmetic)
             self.parts += [self.fast_velocity, self.fast]
         self.size = memory.count
 
     def after(self):
         """The states at the end, (N, k)."""
-        c, T = self.c, self.c.sampling_period
+        c, T, number = self.c, self.T, self.arithmetic.number
         slow_first, slow_later = self.slow(self.slow_command())
-        zero = np.zeros_like(slow_first)
+        zero = 0.0 * slow_first
         N = 1 if c.local_loop is None else c.local_loop.rate_multiple
         for k in range(N):
-            start, end = k / N, (k + 1) / N
+            start, end = number(k) / N, number(k + 1) / N
             first, later = self.fast(self.fast_command()) if c.local_loop is not None else (zero, zero)
-            change = start + (self.fast.part / N if c.local_loop is not None else 0.0)
+            change = start + (self.fast.part / N if c.local_loop is not None else number(0.0))
             instants = sorted({start, change, min(max(self.slow.part, start), end), end})
             for a, b in pairwise(instants):
-                middle = 0.5 * (a + b)
+                middle = (a + b) / 2
                 command = (slow_first if middle < self.slow.part else slow_later) + (
                     first if middle < change else later
                 )
                 self.move((b - a) * T, command)
         memory = Memory(None)
-        self.x[self.speeds] *= T
+        self.x[self.speeds] = self.x[self.speeds] * T
         memory.put(self.x)
         for part in self.parts:
             part.save(memory)
@@ -212,7 +240,7 @@ class Period:
             command = command + c.force_sensor.gain * self.on_sensor(measured)
         if c.feedforward is not None:
             new, old = self.before(self.own_velocity(y))
-            a = self.acceleration((new - old) / c.sampling_period)
+            a = self.acceleration((new - old) / self.T)
             command = command + c.feedforward.damping * new + c.feedforward.inertia * a
         return self.force_filter(command)
 
@@ -221,21 +249,23 @@ class Period:
         return -(own.stiffness * y + own.damping * self.fast_velocity(y))
 
     def reading(self):
-        return self.plant.sensor @ self.x[: self.plant.size]
+        return self.arithmetic.array(self.plant.sensor) @ self.x[: self.plant.size]
 
     def measured_force(self):
         """Hand force less inertia force of the mass beyond the sensor, from Newton's law at this instant."""
         n, plant, operator, device = self.plant.size, self.plant, self.case.operator, self.case.device
+        array = self.arithmetic.array
         if self.c.actuator_time_constant > 0.0:
             acting = self.x[-1]
         else:
             acting = self.slow.before + (self.fast.before if self.c.local_loop is not None else 0.0)
         x, v = self.x[:n], self.x[self.speeds]
-        forces = np.multiply.outer(plant.actuator, acting) - plant.damping @ v - plant.stiffness @ x
+        forces = np.multiply.outer(array(plant.actuator), acting)
+        forces = forces - array(plant.damping) @ v - array(plant.stiffness) @ x
         for damper, force in zip(plant.lagged_dampers, self.x[2 * n :], strict=False):
-            forces = forces - np.multiply.outer(damper.along, force)
-        a = np.linalg.solve(plant.mass, forces)
-        h = device.handle
+            forces = forces - np.multiply.outer(array(damper.along), force)
+        a = self.arithmetic.solve(plant.mass, forces)
+        h = array(device.handle)
         k = len(h)
         hand = 0.0
         if operator is not None and operator.grasp_stiffness is None:
@@ -250,9 +280,9 @@ class Period:
 
     def move(self, time, command):
         if time > 0.0:
-            known, key = self.case.steps, float(f"{time:.13g}")
+            known, key = self.case.steps, (type(self.arithmetic), float(f"{float(time):.13g}"))
             if key not in known:
-                known[key] = systems.held_step(self.plant, time, self.c.actuator_time_constant)
+                known[key] = self.arithmetic.held_step(self.plant, time, self.c.actuator_time_constant)
             F, g = known[key]
             self.x = F @ self.x + np.multiply.outer(g, command)
 

@@ -49,7 +49,10 @@ def pins() -> dict[str, Requirement]:
 
 
 def required_packages(names: list[str]) -> set[str]:
-    """The named requirements and all that they need on this machine, the installed ones followed."""
+    """The named requirements and all that they need on this machine, the installed ones followed.
+
+    One that is installed in another version than its pin may need others, which are not asked for.
+    """
     found: set[tuple[str, frozenset[str]]] = set()
     queue = [Requirement(name) for name in names]
     while queue:
@@ -64,6 +67,9 @@ def required_packages(names: list[str]) -> set[str]:
         try:
             inner = [Requirement(line) for line in requires(requirement.name) or []]
         except PackageNotFoundError:  # the build backend stays in pip's own environment
+            continue
+        pin = pins().get(canonicalize_name(requirement.name))
+        if pin is not None and not pin.specifier.contains(version(requirement.name)):
             continue
         for one in inner:
             if one.marker is None or any(one.marker.evaluate({"extra": extra}) for extra in extras):

@@ -5,7 +5,8 @@
 Numba translates the kernels with pointers as arguments. Everything is inlined and optimised as wasm64, for numba
 lays out memory for 64-bit addresses; what is left keeps no address in memory, so that it can be emitted as wasm32.
 No fused multiplications and no vectors: products and sums are rounded one by one, as on the processor. `wasm-ld`
-links; the module imports nothing. The same sources and releases of numba and llvmlite give the same bytes.
+links; the module imports nothing. The same sources and releases of numba and llvmlite give the same bytes; releases
+before those that the module was built with (they stand in it) write a text that cannot be assembled for it.
 """
 
 from __future__ import annotations
@@ -40,7 +41,15 @@ STACK = 16384  # bytes
 def main(file: Path) -> None:
     """Build the module into the file."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(link(machine_code()))
+    try:
+        module = machine_code()
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0]
+        raise SystemExit(
+            f"numba {numba.__version__} with llvmlite {llvmlite.__version__} does not translate the kernels for "
+            f"WebAssembly ({reason}); install the releases of constraints.txt"
+        ) from None
+    file.write_bytes(link(module))
     print(f"{file}: {file.stat().st_size} bytes")
 
 

@@ -34,10 +34,9 @@ def joined_excess(z):
 
 
 def exact_joined_excess(L):
-    """`joined_excess` of a matrix (N, N), its roots in 40 digits: in double precision the mean of two that meet is
-    moved by rounding of large entries, too."""
+    """`joined_excess` of an mpmath matrix, its roots in 40 digits."""
     with mp.workdps(DIGITS):
-        roots = mpmath.eig(mp.matrix(L.tolist()), left=False, right=False)
+        roots = mpmath.eig(L, left=False, right=False)
     return float(joined_excess(np.array([[complex(root) for root in roots]]))[0])
 
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 import pytest
 
 from tests.apart import ApartLoop
+from tests.chart.exact_control import exact_matrices
 from tests.chart.exact_radii import exact_joined_excess, exact_radius, joined_excess
 from tests.chart.test_fixed_feedback_charts import KINDS
 from tests.control_apart import ControlledLoop, random_controlled_loop
@@ -75,33 +75,38 @@ def controlled_case(kind, seed):
     return ControlledLoop(plant, None, controller)
 
 
-def is_off(matrices, K, B, band):
+def is_off(matrix, K, B, band):
     """Whether the largest root of a wall is farther off the circle than a band, in 40 digits, and so is its mean
     with one that it meets; and on the same side those of all walls that differ from it in the last digits that a
-    computed wall has."""
+    computed wall has.
+
+    matrix  the transition matrix by K and B, as of `exact_matrices`
+    """
 
     def excess(K, B):
-        return exact_radius(lambda: mpmath.matrix((matrices[0] + K * matrices[1] + B * matrices[2]).tolist()))
+        return exact_radius(lambda: matrix(K, B))
 
     here = excess(K, B)
-    if abs(here) <= band or abs(exact_joined_excess(matrices[0] + K * matrices[1] + B * matrices[2])) <= band:
+    if abs(here) <= band or abs(exact_joined_excess(matrix(K, B))) <= band:
         return False
     less, more = 1.0 - WALL_DIGITS, 1.0 + WALL_DIGITS
     beside = [excess(K * k, B * b) for k, b in ((less, 1.0), (more, 1.0), (1.0, less), (1.0, more))]
     return all(np.sign(one) == np.sign(here) and abs(one) > band for one in beside)
 
 
-def vertices_off(chart, matrices, seen, most):
+def vertices_off(chart, case, matrices, seen, most):
     """Vertices and corners of a chart's rings whose largest root is off the unit circle; what is judged is
     counted.
 
-    most  so many of each arc at most
+    case      the loop, as `exact_matrices` takes it
+    matrices  L0, LK, LB of its transition matrix in double precision
+    most      so many of each arc at most
 
     K = B = 0 is left out: a free device alone has a double root z = 1, which rounding of its matrix sets apart.
     Roots that meet elsewhere are judged by their mean.
     """
     L0, LK, LB = matrices
-    off = []
+    off, exact = [], None
     for arc in chart.boundary:
         count = len(arc.stiffness)
         chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
@@ -113,17 +118,18 @@ def vertices_off(chart, matrices, seen, most):
         for k in np.flatnonzero(np.abs(excess) > BAND).tolist():
             seen["in 40 digits"] += 1
             band = max(BAND, 10.0 * chart.corner_blur if chart.corner_blur > 1e-7 else 0.0)
-            if is_off(matrices, float(K[k]), float(B[k]), band):
+            exact = exact or exact_matrices(case)
+            if is_off(exact, float(K[k]), float(B[k]), band):
                 off.append((float(K[k]), float(B[k]), float(excess[k])))
     return off
 
 
-def judge(loop, matrices, seen, most):
+def judge(loop, case, matrices, seen, most):
     """The walls that are off on the edge of one loop; a chart that is refused has none."""
     seen["loops"] += 1
     try:
         chart = stability_chart(loop, decay=False)
-        off = vertices_off(chart, matrices(), seen, most)
+        off = vertices_off(chart, case, matrices(), seen, most)
     except ChartError:
         seen["refused"] += 1
         return []
@@ -138,12 +144,12 @@ def judge(loop, matrices, seen, most):
 
 def judge_long(seed, seen, most=10_000):
     loop = long_loop(seed)
-    return judge(loop, lambda: ApartLoop(loop).matrices, seen, most)
+    return judge(loop, loop, lambda: ApartLoop(loop).matrices, seen, most)
 
 
 def judge_controlled(kind, seed, seen, most=10_000):
     case = controlled_case(kind, seed)
-    return judge(case.loop, case.matrices, seen, most)
+    return judge(case.loop, case, case.matrices, seen, most)
 
 
 @pytest.mark.parametrize("seed", EVERYDAY_SEEDS)
@@ -178,6 +184,28 @@ def test_no_vertex_of_thousands_of_loops_with_fixed_feedback_is_off(kind, batch)
     print(dict(seen))
     assert off == {}, seen
     assert seen["refused"] <= max(2, 0.02 * count), seen
+
+
+CASES = [
+    *(pytest.param(lambda seed, kind=kind: controlled_case(kind, seed), id=kind) for kind in KINDS),
+    pytest.param(
+        lambda seed: (loop := long_loop(seed)) and ControlledLoop(loop.plant, None, loop.controller), id="long"
+    ),
+]
+
+
+@pytest.mark.parametrize("case_of", CASES)
+@pytest.mark.parametrize("seed", EVERYDAY_SEEDS)
+def test_a_matrix_in_40_digits_has_the_roots_of_that_in_double_precision(case_of, seed):
+    case = case_of(seed)
+    L0, LK, LB = case.matrices()
+    K, B = 1.0 / np.abs(LK).max(), 1.0 / np.abs(LB).max()
+    exact = np.array(exact_matrices(case)(K, B).tolist(), dtype=float)
+    outside = 1.5 * np.exp(1j * np.array([0.0, 0.4, 1.9]))[:, None, None] * np.eye(len(L0))  # no root is near
+    signs, sizes = np.linalg.slogdet(outside - exact)
+    expected_signs, expected_sizes = np.linalg.slogdet(outside - (L0 + K * LK + B * LB))
+    np.testing.assert_allclose(sizes, expected_sizes, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(signs, expected_signs, atol=1e-9)
 
 
 def test_an_arc_that_runs_beyond_its_corner_is_found_off_the_circle():

@@ -73,7 +73,8 @@ def test_a_killed_scheduler_ends_the_run_and_the_store_goes_on(tmp_path):
             if done == 30:
                 os.killpg(cluster.scheduler.pid, signal.SIGKILL)
 
-        with pytest.raises(ClusterEnded, match=r"the scheduler at tcp://127\.0\.0\.1:.* has ended"):
+        # whether the lost connection or the missing answer is noticed first, the processor's load decides
+        with pytest.raises(ClusterEnded, match=r"the scheduler at tcp://127\.0\.0\.1:.* has (ended|not answered)"):
             run(job, Store(path, job), progress, batch=5, cluster=cluster.address)
     again = RootsJob(100)
     assert same_cells(run(again, Store(path, again), workers=1), RootsJob(100).compute(0, 100))
