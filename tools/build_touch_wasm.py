@@ -5,8 +5,8 @@
 Numba translates the kernels with pointers as arguments. Everything is inlined and optimised as wasm64, for numba
 lays out memory for 64-bit addresses; what is left keeps no address in memory, so that it can be emitted as wasm32.
 No fused multiplications and no vectors: products and sums are rounded one by one, as on the processor. `wasm-ld`
-links; the module imports nothing. The same sources and releases of numba and llvmlite give the same bytes; releases
-before those that the module was built with (they stand in it) write a text that cannot be assembled for it.
+links; the module imports nothing. The same sources and releases of numba and llvmlite give the same bytes; of
+older releases the text may be none that this can be done with.
 """
 
 from __future__ import annotations

@@ -248,7 +248,7 @@ def _is_column(value: Any) -> bool:
 
 
 def _all_digits(release: str) -> dict[str, Any]:
-    """What makes a release of pandas read every digit: before 3.1 half of the numbers came out off in the last one."""
+    """What makes a release of pandas read every digit: before 3.1 half of all numbers are off in the last one."""
     major, minor = (int(part) for part in release.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
