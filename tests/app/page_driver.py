@@ -43,8 +43,8 @@ class Page:
         """What an expression is in the page."""
         return (tab or self.page).evaluate(f"() => ({expression})")
 
-    def wait(self, expression: str, tab: Any = None, seconds: float = 30.0) -> None:
-        """Wait until an expression is true; the page's policy forbids Playwright's own way."""
+    def wait(self, expression: str, tab: Any = None, seconds: float = 120.0) -> None:
+        """Wait until an expression is true, also on a busy machine; the page's policy forbids Playwright's way."""
         end = time.monotonic() + seconds
         while not self.value(f"Boolean({expression})", tab):
             assert time.monotonic() < end, f"{expression} did not become true: {self.complaints}"
