@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from systems import mass, two_mass
 
-from tests.control_apart import ControlledLoop, Memory, Period, random_controlled_loop
+from tests.control_apart import ControlledLoop, DoublePrecision, Memory, Period, random_controlled_loop
 from zwidth.contact.environments import wall
 from zwidth.contact.hand import Hand, Reflex
 from zwidth.contact.motion_verdict import judge_response
@@ -41,7 +41,7 @@ def played_through(case, K, B, start):
     n, first = case.loop.plant.size, float(case.loop.plant.sensor @ start)
     states = np.zeros((len(L), 1))
     states[:n, 0] = start
-    period = Period(case, K, B, states)
+    period = Period(case, K, B, states, DoublePrecision())
     estimates = [period.velocity]
     estimates += [period.own_velocity] if case.controller.feedforward is not None else []
     estimates += [period.fast_velocity] if case.controller.local_loop is not None else []
