@@ -51,6 +51,11 @@ def test_where_a_real_root_is_double_another_is_as_large(seed, positive, low, hi
     assert np.max(np.abs(roots[2:])) == pytest.approx(radius, abs=1e-5)
 
 
+def largest_roots(loop, K, B):
+    """Largest |z| of each wall, the root z = 1 of a position that nothing holds among them."""
+    return np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max(axis=-1)
+
+
 def smallest_by_eigenvalues(loop, regions):
     """Smallest spectral radius over K, B >= 0: a grid over each region's box, and simplex searches from there."""
     best = np.inf
@@ -59,10 +64,10 @@ def smallest_by_eigenvalues(loop, regions):
         if not (corner > 0.0).all():
             continue
         walls = np.stack(np.meshgrid(*(share * shares for share in corner)), axis=-1).reshape(-1, 2)
-        radii = spectral_radius(loop, *walls.T)
+        radii = largest_roots(loop, *walls.T)
 
         def radius(at, corner=corner):
-            return float(spectral_radius(loop, *(np.maximum(at, 0.0) * corner)))
+            return float(largest_roots(loop, *(np.maximum(at, 0.0) * corner)))
 
         for start in walls[np.argsort(radii)[:2]] / corner:
             first = start + 0.02 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

@@ -12,7 +12,7 @@ from zwidth.chart.hysteretic_edge import hysteretic_edge
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import HysteresisError
 
-CLOSE = 1e-4  # share of the largest damping; the sides of the chart's cells lie within 1e-5 of its window
+CLOSE = 1e-4  # share of the chart's dampings; the sides of the chart's cells lie within 1e-5 of its window
 
 
 def lossy_loop(seed):
@@ -27,7 +27,7 @@ def lossy_loop(seed):
 
 
 def largest_difference(loop):
-    """Between edge and chart, lower and upper, at 49 stiffnesses, over the largest damping; nan where the edge
+    """Between edge and chart, lower and upper, at 49 stiffnesses, over the chart's dampings; nan where the edge
     crosses a stiffness that the chart crosses nowhere, or the other way; None where nothing is stable."""
     rings = [np.asarray(ring) for ring in hysteretic_chart(loop).regions]
     if not rings:
@@ -40,7 +40,7 @@ def largest_difference(loop):
     for kind, near in (("lower", B0), ("upper", B1)):
         B = sides.crossings(K, np.full(49, near), kind)[0]
         on = np.isfinite(B)
-        difference = np.abs(edge.crossings(K[on], B[on], kind)[0] - B[on]) / B1
+        difference = np.abs(edge.crossings(K[on], B[on], kind)[0] - B[on]) / (B1 - B0)
         largest = float(np.max(difference, initial=largest))
     return largest
 

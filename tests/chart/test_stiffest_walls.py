@@ -12,12 +12,16 @@ from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
+from zwidth.chart.verdict import spectral_radius
+from zwidth.loop import AlphaBeta, Butterworth
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.sections import UnmovedError
+from zwidth.model.plant import Plant
 
 KINDS = ("chain", "dense", "coupled", "apart")
+ON_CIRCLE = 1e-12  # a motion without damping stays there, but for rounding, at K from 0 on
 
 
 def stiffest_of(*loops):
@@ -25,9 +29,19 @@ def stiffest_of(*loops):
     return chart_numbers(table_of_loops(*loops), STIFFEST)
 
 
+def undamped_between(loop, *stiffnesses):
+    """Whether the largest root of a wall without damping is on the circle, but for rounding, between two K."""
+    K = np.linspace(*stiffnesses, 9)
+    return (
+        np.max(np.abs(np.abs(np.linalg.eigvals(loop.transition_matrix(K, 0.0 * K))).max(axis=-1) - 1.0))
+        < ON_CIRCLE
+    )
+
+
 def compare_with_charts(seed, count, features=()):
     """How many loops were found, without wall and in doubt; the worst relative difference of those found.
 
+    Of a motion without damping, and a wall without, rounding says how stiff it may be: there no difference counts.
     What is in doubt is asked of the chart by whoever asks, and so is a loop without wall: neither can be wrong.
     """
     rng = np.random.default_rng(seed)
@@ -42,6 +56,10 @@ def compare_with_charts(seed, count, features=()):
             if status == FOUND:
                 peak = largest_stiffness(loop)
                 assert peak is not None
+                if found.damping[0] == peak.damping == 0.0 and undamped_between(
+                    loop, found.stiffness[0], peak.stiffness
+                ):
+                    continue
                 worst = max(worst, abs(found.stiffness[0] / peak.stiffness - 1.0))
                 assert found.damping[0] == pytest.approx(peak.damping, rel=1e-5, abs=1e-9 * peak.stiffness)
         except (UnmovedError, ChartError):
@@ -89,6 +107,36 @@ def test_an_edge_that_goes_on_to_softer_dampings_is_cut_at_no_damping():
     found, peak = stiffest_of(loop), largest_stiffness(loop)
     assert found.stiffness[0] == pytest.approx(peak.stiffness, rel=1e-12)
     assert found.damping[0] == peak.damping == 0.0
+
+
+def test_a_corner_is_where_two_branches_cross_and_not_beside_a_pole_of_one():
+    """A branch passes all its walls within 1e-7 of an angle, and Newton's steps vanish beside another's pole: the
+    wall 86.1 N/m, 34.2 N s/m was taken for a corner, and its largest root is 1.0101."""
+    M = [
+        [0.22132671459485195, -0.03478776056381456, -0.02740045672883758],
+        [-0.03478776056381456, 0.05150162698283096, -0.018415923020663662],
+        [-0.02740045672883758, -0.018415923020663662, 0.02652790042312661],
+    ]
+    C = [
+        [0.3750242339112224, 1.3501183965437482, -1.7251426304433726],
+        [1.3501183965437482, 4.860538386213646, -6.21065678271564],
+        [-1.7251426304433726, -6.21065678271564, 7.935799413105662],
+    ]
+    K = [
+        [4.816426477587764e07, -4.816426477587764e07, 0.0],
+        [-4.816426477587764e07, 4.8165147701796025e07, -882.9259183869484],
+        [0.0, -882.9259183869484, 882.9259183869484],
+    ]
+    plant = Plant(*map(np.array, (M, C, K)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]))
+    controller = Controller(
+        0.00011408313254047793,
+        velocity=AlphaBeta(alpha=0.7692496730165309, beta=0.3799194642380935),
+        velocity_filter=Butterworth(2, 134.6761235498769, "tustin-prewarped"),
+        actuator_time_constant=1.135323521922831e-05,
+    )
+    found, peak = stiffest_of(loop := Loop(plant, controller)), largest_stiffness(Loop(plant, controller))
+    assert found.status[0] == DOUBTFUL or found.stiffness[0] == pytest.approx(peak.stiffness, rel=1e-9)
+    assert spectral_radius(loop, peak.stiffness, peak.damping) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_braked_mass_is_limited_on_the_line_of_the_real_root():

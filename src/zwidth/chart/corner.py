@@ -28,6 +28,10 @@ NEAR: Final = 0.1  # longest step of Newton's method, as a share of t
 BESIDE_CORNER: Final = 1e-7
 # How far a corner may be from where halving on the flag has it, as a share of t.
 SAME_PLACE: Final = 1e-5
+# How far apart the walls of two branches may be where they cross, in shares of their K or B, and as an angle along
+# one of them: more, and Newton's method has stopped at a pole; less, and a branch that passes all its walls within
+# a sliver of angle has no corner, nor have branches that cross at K = B = 0.
+APART, LAST_DIGITS = 1e-3, 1e-9
 HALVINGS: Final = 36  # leave a step of rounding size
 
 
@@ -205,6 +209,13 @@ def solve_crossing(circle: CircleFactors, one: float, other: float) -> tuple[flo
         settled = abs(step_a) <= 4e-15 * a and abs(step_b) <= 4e-15 * b
         if settled:
             break
+    if settled:
+        # near a pole of the curve steps are small, and the walls far apart
+        Ka, Ba, dKa, dBa = wall_with_slopes(circle, a)
+        Kb, Bb, _, _ = wall_with_slopes(circle, b)
+        off_K = abs(Ka - Kb) > APART * (abs(Ka) + abs(Kb)) + LAST_DIGITS * abs(dKa)
+        off_B = abs(Ba - Bb) > APART * (abs(Ba) + abs(Bb)) + LAST_DIGITS * abs(dBa)
+        settled = not (off_K and off_B)
     return a, b, settled and abs(a - b) > 1e-6 * a
 
 
