@@ -23,7 +23,7 @@ def classes_of_several_modules(modules: list[Module]) -> Meanings:
     """Classes that more than one module defines at its top level: name -> module -> what it is derived from."""
     found: Meanings = defaultdict(dict)
     for module in modules:
-        for node in _top_level(module.tree):
+        for node in top_level(module.tree):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found[node.name][module.name] = f"class({', '.join(map(ast.unparse, node.bases))})"
     return _in_several(found)
@@ -36,8 +36,8 @@ def constants_of_several_modules(modules: list[Module]) -> Meanings:
     """
     found: Meanings = defaultdict(dict)
     for module in modules:
-        for node in _top_level(module.tree):
-            for name, value in _assigned(node):
+        for node in top_level(module.tree):
+            for name, value in assigned_names(node):
                 if CONSTANT.fullmatch(name):
                     found[name][module.name] = ast.unparse(value)
     return _in_several(found)
@@ -51,7 +51,7 @@ def functions_of_several_signatures(modules: list[Module]) -> Meanings:
     """
     found: Meanings = defaultdict(dict)
     for module in modules:
-        for node in _top_level(module.tree):
+        for node in top_level(module.tree):
             if isinstance(node, Function) and not node.name.startswith("_"):
                 returned = f" -> {ast.unparse(node.returns)}" if node.returns else ""
                 found[node.name][module.name] = f"({ast.unparse(node.args)}){returned}"
@@ -84,12 +84,12 @@ def public_names(top: Module) -> list[str] | None:
     """
     known: dict[str, Any] = dict(ALLOWED_FUNCTIONS)
     bound: set[str] = set()
-    for node in _top_level(top.tree):
+    for node in top_level(top.tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             bound.update(alias.asname or alias.name.partition(".")[0] for alias in node.names)
         elif isinstance(node, Function | ast.ClassDef):
             bound.add(node.name)
-        for name, value in _assigned(node):
+        for name, value in assigned_names(node):
             bound.add(name)
             try:
                 known[name] = eval(compile(ast.Expression(value), top.path, "eval"), known)
@@ -104,16 +104,16 @@ def _in_several(found: Meanings) -> Meanings:
     return {name: said for name, said in sorted(found.items()) if len(said) > 1}
 
 
-def _top_level(node: ast.AST) -> Iterator[ast.stmt]:
+def top_level(node: ast.AST) -> Iterator[ast.stmt]:
     """Statements of a module outside functions and classes, those below `if`, `try` and `with` included."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.stmt):
             yield child
         if isinstance(child, ast.If | ast.Try | ast.ExceptHandler | ast.With):
-            yield from _top_level(child)
+            yield from top_level(child)
 
 
-def _assigned(node: ast.stmt) -> Iterator[tuple[str, ast.expr]]:
+def assigned_names(node: ast.stmt) -> Iterator[tuple[str, ast.expr]]:
     """Names and values of an assignment; a name that is only annotated has none."""
     match node:
         case ast.Assign(targets=targets, value=value):

@@ -39,6 +39,16 @@ def lines_of(module: Module) -> tuple[int, int]:
     return len(code - documented - blank), len(documented - blank)
 
 
+def import_lines(modules: Iterable[Module]) -> int:
+    """Lines that import statements take, those inside functions and below `if TYPE_CHECKING` included."""
+    return sum(
+        len(_span(node))
+        for module in modules
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    )
+
+
 def file_lines(modules: Iterable[Module]) -> int:
     """Lines of files as `wc -l` counts them, blank ones and comments included."""
     return sum(module.text.count("\n") for module in modules)
@@ -54,6 +64,16 @@ def function_lengths(modules: Iterable[Module], docstrings: bool = True) -> dict
         name: len(_span(function)) - (0 if docstrings else len(_docstring(function)))
         for module in modules
         for name, function, _ in functions(module)
+    }
+
+
+def undocumented_functions(modules: Iterable[Module]) -> set[str]:
+    """Functions without a docstring."""
+    return {
+        name
+        for module in modules
+        for name, function, _ in functions(module)
+        if ast.get_docstring(function, clean=False) is None
     }
 
 

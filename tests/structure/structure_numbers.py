@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
+from tests.structure.constants import function_literals, numeric_constants
 from tests.structure.imports import circles, import_graph, single_importers
 from tests.structure.modules import Module
 from tests.structure.names import (
@@ -17,12 +18,21 @@ from tests.structure.names import (
     public_names,
     stub_names,
 )
-from tests.structure.sizes import argument_counts, file_lines, function_lengths, lines_of, percentile
+from tests.structure.sizes import (
+    argument_counts,
+    file_lines,
+    function_lengths,
+    import_lines,
+    lines_of,
+    percentile,
+    undocumented_functions,
+)
 
 LONG = 40  # lines that a function may have
 ARGUMENT_PERCENTILE = 0.9  # of all functions, whose number of arguments is told
 MOST_ARGUMENTS = "arguments of a function, at most"
 COMMAND_LINE = "show/cli/"
+THOUSAND = 1000  # lines, the unit in which the density of numbers is told
 
 
 @dataclass
@@ -33,7 +43,7 @@ class Structure:
     lists    what -> name -> what is said of it, for numbers that count names
     """
 
-    numbers: dict[str, int | None] = field(default_factory=dict)
+    numbers: dict[str, float | None] = field(default_factory=dict)
     lists: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def count(self, what: str, names: Mapping[str, str]) -> None:
@@ -47,6 +57,7 @@ def structure(modules: list[Module], excluded: Collection[str], stub: str | None
     found = Structure()
     _sizes(found, modules)
     _functions(found, modules)
+    _numbers(found, modules)
     _imports(found, modules, excluded)
     _names(found, modules, stub)
     return found
@@ -61,6 +72,8 @@ def _sizes(found: Structure, modules: list[Module]) -> None:
         code, documented = code + lines, documented + docstrings
         command_line += lines if module.path.startswith(COMMAND_LINE) else 0
     found.numbers["files"] = len(modules)
+    found.numbers["lines"] = file_lines(modules)
+    found.numbers["lines of imports"] = import_lines(modules)
     found.numbers["lines of code"] = code
     for part in sorted(parts):
         found.numbers[f"lines of code, {part}"] = parts[part]
@@ -78,11 +91,25 @@ def _functions(found: Structure, modules: list[Module]) -> None:
     found.numbers["functions"] = len(whole)
     found.count(f"functions over {LONG} lines", _too_long(whole))
     found.count(f"functions over {LONG} lines, docstrings not counted", _too_long(bare))
+    undocumented = undocumented_functions(modules)
+    found.count(
+        f"functions over {LONG} lines, docstrings not counted, without a docstring",
+        {name: said for name, said in _too_long(bare).items() if name in undocumented},
+    )
     found.numbers[f"arguments of a function, {ARGUMENT_PERCENTILE:.0%} have at most"] = percentile(
         arguments.values(), ARGUMENT_PERCENTILE
     )
     found.numbers[MOST_ARGUMENTS] = most
     found.lists[MOST_ARGUMENTS] = with_most
+
+
+def _numbers(found: Structure, modules: list[Module]) -> None:
+    constants, literals = numeric_constants(modules), function_literals(modules)
+    found.count("numeric constants", constants)
+    found.count("numbers inside functions", literals)
+    found.numbers[f"constants and numbers inside functions, in {THOUSAND} lines"] = round(
+        THOUSAND * (len(constants) + len(literals)) / max(file_lines(modules), 1), 2
+    )
 
 
 def _imports(found: Structure, modules: list[Module], left_out: Collection[str]) -> None:
@@ -92,6 +119,11 @@ def _imports(found: Structure, modules: list[Module], left_out: Collection[str])
     found.count(
         "modules in import circles",
         {name: f"circle {i} of {len(group)}" for i, group in enumerate(groups, 1) for name in group},
+    )
+    with_all = circles(import_graph(modules)) if left_out else groups
+    found.count(
+        "modules in import circles, those through what is left out included",
+        {name: f"circle of {len(group)}" for group in with_all for name in group},
     )
     found.count(
         "modules with a single importer",

@@ -9,6 +9,8 @@ import pytest
 
 from tests import revisions
 from tests.structure.__main__ import main, merged_keys
+from tests.structure.constants import function_literals, numeric_constants
+from tests.structure.crossings import traced
 from tests.structure.imports import circles, import_graph, single_importers
 from tests.structure.modules import functions, modules_of
 from tests.structure.names import (
@@ -19,7 +21,15 @@ from tests.structure.names import (
     public_names,
     stub_names,
 )
-from tests.structure.sizes import argument_counts, file_lines, function_lengths, lines_of, percentile
+from tests.structure.sizes import (
+    argument_counts,
+    file_lines,
+    function_lengths,
+    import_lines,
+    lines_of,
+    percentile,
+    undocumented_functions,
+)
 from tests.structure.structure_numbers import LONG, structure
 
 
@@ -125,6 +135,56 @@ def test_a_percentile_is_one_of_the_values():
     assert [percentile(range(1, 11), share) for share in (0.1, 0.85, 0.9, 0.91, 1.0)] == [1, 9, 9, 10, 10]
     assert percentile([5], 0.0) == 5
     assert percentile([], 0.9) == 0
+
+
+def test_a_constant_is_a_name_in_capitals_with_a_number():
+    text = (
+        "FEW: Final = 3\nNEAR = -1e-9\nHALF = 1 / 2\nTWO = (1, 2)\nNAME = 'a'\nx = 5\nYES = True\n"
+        "if x:\n    LATE = 7"
+    )
+    assert numeric_constants([module(text)]) == {
+        "house.a.FEW": "3",
+        "house.a.NEAR": "-1e-09",
+        "house.a.HALF": "1 / 2",
+        "house.a.LATE": "7",
+    }
+
+
+def test_numbers_inside_functions_are_those_that_decide():
+    text = (
+        "x = 5\ndef f(a=7):\n    '9'\n    def g():\n        return 1e-3\n    return 0, 4.0, 0.5, True, a[2:6], -8"
+    )
+    found = function_literals([module(text)])
+    assert sorted(found.values()) == ["0.001", "6", "7", "8"]
+    assert "house.a:2:8" in found
+
+
+def test_lines_of_imports_are_those_they_take():
+    text = "import a\nfrom b import (\n    c,\n    d,\n)\ndef f():\n    import e\n    return 'import g'\n"
+    assert import_lines([module(text)]) == 6
+
+
+def test_a_function_without_a_docstring_is_found_in_a_class_too():
+    text = "class A:\n    def f(self): ...\n    def g(self):\n        'Say.'\n"
+    assert undocumented_functions([module(text)]) == {"house.a.A.f"}
+
+
+def test_what_a_question_crosses_is_followed_through_other_code(tmp_path, monkeypatch):
+    house = tmp_path / "crossed_house"
+    texts = {
+        "top.py": "from crossed_house.loop.a import f\ndef ask():\n    return sorted([2, 1], key=f)\n",
+        "loop/a.py": "from crossed_house.chart.b import g\ndef f(x):\n    return g(x) + g(x) + h()\n"
+        "def h():\n    return 0\n",
+        "chart/b.py": "def g(x):\n    return x\n",
+    }
+    for path, text in texts.items():
+        (house / path).parent.mkdir(parents=True, exist_ok=True)
+        (house / path).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    from crossed_house.top import ask
+
+    # Each of two numbers: from the top into loop, and from there twice into chart.
+    assert traced(ask, house) == {"files": 3, "package changes": 6}
 
 
 # --- imports ----------------------------------------------------------------------------------------
@@ -302,6 +362,8 @@ def test_all_numbers_of_a_small_package():
     )
     assert found.numbers == {
         "files": 4,
+        "lines": 47,
+        "lines of imports": 3,
         "lines of code": 1 + 1 + LONG + 3 + 3,
         "lines of code, (top)": 2,
         "lines of code, chart": LONG + 3,
@@ -312,10 +374,15 @@ def test_all_numbers_of_a_small_package():
         "functions": 2,
         "functions over 40 lines": 1,
         "functions over 40 lines, docstrings not counted": 1,
+        "functions over 40 lines, docstrings not counted, without a docstring": 1,
         "arguments of a function, 90% have at most": 2,
         "arguments of a function, at most": 2,
+        "numeric constants": 2,
+        "numbers inside functions": 0,
+        "constants and numbers inside functions, in 1000 lines": 42.55,
         "import circles": 0,
         "modules in import circles": 0,
+        "modules in import circles, those through what is left out included": 3,
         "modules with a single importer": 1,
         "public names at the top": 1,
         "class names with two meanings": 0,
