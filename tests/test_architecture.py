@@ -45,7 +45,6 @@ MAY_IMPORT["identify"].add("device")
 MAY_IMPORT["study"].add("device")
 MAY_IMPORT["show"].add("device")
 MAY_IMPORT["__main__"] = {"show"}
-MAY_IMPORT["_old_names"] = {*FLOW, "device"}  # above all, and imported by nothing but the package itself
 
 VERBS = "_verbs"
 FOR_PEOPLE = {"matplotlib", "click", "rich", "jinja2"}

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import subprocess
 import sys
-import warnings
 from importlib import import_module
 from pathlib import Path
 
@@ -16,7 +14,6 @@ import xarray as xr
 from matplotlib import pyplot
 
 import zwidth
-from zwidth._old_names import old_names
 
 PACKAGES = sorted(
     path.parent.name
@@ -72,91 +69,15 @@ def test_a_script_that_draws_nothing_loads_no_plotting_library():
     assert not set(done.stdout.split()) & {"matplotlib", "click", "rich", "jinja2"}
 
 
-# --- old names ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", old_names())
-def test_an_old_name_still_works_and_tells_the_new_one(name):
-    with pytest.warns(DeprecationWarning, match=rf"zwidth\.{name} goes with the next release; write ") as told:
-        found = getattr(zwidth, name)
-    assert found is not None
-    assert name not in zwidth.__all__
-    assert Path(told[0].filename) == Path(__file__)  # the warning points at the line to be changed
-
-
-def test_moved_names_are_what_the_warning_says():
-    with pytest.warns(DeprecationWarning, match=r"write zwidth\.loop\.Kalman") as told:
-        assert zwidth.Kalman is zwidth.loop.Kalman
-    assert len(told) == 1
-
-
-def test_old_functions_about_circumstances_answer_as_before():
-    device = zwidth.load("five-bar")
-    position, direction = (0.02, 0.2, 0.0), (1.0, 0.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        place = zwidth.place_of(device, position, direction, model="two-mass")
-        found = zwidth.sensitivities(device, position, direction, model="two-mass")
-        fits = zwidth.validity(device, position, direction)
-        around = zwidth.largest_stiffness_by_direction(
-            device.mechanism, device.at(position).posture, np.eye(3)[:2], device.controller, "full", device.damping
-        )
-    point = device.at(position, direction, model="two-mass")
-    assert np.array_equal(place.plant.mass, point.plant.mass)
-    assert found.table()["path"] == device.sensitivities(point).table()["path"]
-    assert found.peak == device.sensitivities(point).peak
-    assert fits.first_natural == zwidth.study.validity(device.at(position, direction)).first_natural
-    assert around.stiffness[0] == pytest.approx(device.at(position, direction).chart().stiffness_max, rel=1e-12)
+@pytest.mark.parametrize(
+    ("name", "home"), [("Kalman", "loop"), ("manipulability", "measures"), ("Store", "study")]
+)
+def test_a_name_of_a_package_asked_of_the_top_is_an_error_that_says_where_it_is(name, home):
+    with pytest.raises(AttributeError, match=rf"write zwidth\.{home}\.{name}$"):
+        getattr(zwidth, name)
 
 
 # --- the lines that keep working ---------------------------------------------------------------------
-
-
-def test_the_old_way_to_simulate_a_mechanism_gives_the_same_motion():
-    device = zwidth.load("five-bar")
-    settings = {"push": (0.02, 1.0, 0.0), "duration": 0.1}
-    with pytest.warns(DeprecationWarning, match=r"write device\.at\(position\)\.move\(wall, surface\)"):
-        old = zwidth.simulate_mechanism(
-            device.mechanism, device.damping, device.controller, at=(0.02, 0.24), encoders="link", **settings
-        )
-    point = dataclasses.replace(device.at((0.02, 0.24)), encoders="link")
-    assert np.array_equal(old.position, point.move(**settings).position)
-    assert not np.array_equal(old.position, device.at((0.0, 0.25)).move(**settings).position)
-
-
-def test_old_methods_of_a_device_warn_and_answer():
-    device = zwidth.load("published-two-mass", operator="thesis-arm")
-    with pytest.warns(DeprecationWarning, match=r"write device\.at\(\.\.\.\)\.plant"):
-        assert np.array_equal(device.plant(model="rigid").mass, device.at(model="rigid").plant.mass)
-    with pytest.warns(DeprecationWarning, match=r"\.ungripped_plant"):
-        assert device.plant(held=False) is device.given_plant
-    arms = zwidth.load("five-bar")
-    with pytest.warns(DeprecationWarning, match=r"write device\.at\(\.\.\.\)\.posture") as told:
-        assert np.array_equal(arms.posture((0.02, 0.2)).angles, arms.at((0.02, 0.2)).posture.angles)
-    assert Path(told[0].filename) == Path(__file__)
-
-
-def test_files_of_measures_of_one_s_own_written_before_still_run(tmp_path):
-    file = tmp_path / "my.py"
-    file.write_text(
-        "from zwidth.measures.own import measure\n@measure(unit='kg')\ndef mass(place):\n"
-        "    return place.effective.rigid_mass\n"
-    )
-    with pytest.warns(DeprecationWarning, match="write from zwidth import measure"):
-        own = zwidth.load_measures(str(file))
-    device = zwidth.load("published-two-mass")
-    assert float(device.measure(own["mass"])) == pytest.approx(0.287, rel=1e-12)
-
-
-def test_a_study_given_to_sweep_is_computed_with_a_warning(tmp_path):
-    file = tmp_path / "study.toml"
-    file.write_text(
-        'device = "published-two-mass"\nmeasures = ["rigid_mass"]\n[[axis]]\nkey = "loop.sampling_period_s"\n'
-        "values = [0.001, 0.002]\n"
-    )
-    with pytest.warns(DeprecationWarning, match=r"write zwidth\.run_study\(study\)"):
-        found = zwidth.sweep(file)
-    assert found.dataset()["rigid_mass"].values == pytest.approx([0.287, 0.287], rel=1e-12)
 
 
 def test_the_readme_s_lines_of_python_print_what_they_say(capsys):

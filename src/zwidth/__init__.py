@@ -12,6 +12,7 @@ What most scripts need is here; the rest is in the packages `chart`, `conditions
 `guarantees`, `loop`, `measures`, `model` and `study`. Names are imported when they are first used.
 """
 
+from pathlib import Path
 from typing import Any
 
 import lazy_loader
@@ -27,9 +28,12 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """A name of `__all__`, imported now; an old one with a warning. Raises AttributeError for any other."""
+    """A name of `__all__`, imported now. Raises AttributeError for any other, with the package that has it."""
     if name in __all__:
         return _named(name)
-    from zwidth._old_names import old_name
-
-    return old_name(name)
+    message = f"module 'zwidth' has no attribute {name!r}"
+    if not name.startswith("_"):
+        packages = [found.parent.name for found in Path(__file__).parent.glob("*/__init__.pyi")]
+        homes = [package for package in packages if name in _named(package).__all__]
+        message += "".join(f"; write zwidth.{package}.{name}" for package in homes)
+    raise AttributeError(message)

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from zwidth.measures.description import Description
     from zwidth.measures.felt import FeltWall
     from zwidth.model.load import Load
-    from zwidth.model.plant import Plant
-    from zwidth.model.posture import Posture
     from zwidth.progress import Progress
     from zwidth.result import Result
     from zwidth.study.boundary.experiment_plan import Plan
@@ -232,24 +230,6 @@ def environment_named(source: str) -> Environment:
     from zwidth.contact.environments.load import load_environment
 
     return load_environment(source)
-
-
-def old_plant(device: Device, *arguments: Any, **options: Any) -> Plant:
-    from zwidth._old_names import plant_of
-
-    return plant_of(device, *arguments, **options)
-
-
-def old_posture(device: Device, *arguments: Any, **options: Any) -> Posture:
-    from zwidth._old_names import posture_of
-
-    return posture_of(device, *arguments, **options)
-
-
-def old_sweep(study: Any, *more: Any) -> Any:
-    from zwidth._old_names import sweep_of_study
-
-    return sweep_of_study(study, *more)
 
 
 def plot(result: Result, ax: Axes | None) -> Axes:

@@ -247,14 +247,6 @@ class Device:
             load=self.load,
         )
 
-    def plant(self, *arguments: Any, **options: Any) -> Any:
-        """`at(...).plant`, which this was before; goes with the next release."""
-        return _verbs.old_plant(self, *arguments, **options)
-
-    def posture(self, *arguments: Any, **options: Any) -> Any:
-        """`at(...).posture`, which this was before; goes with the next release."""
-        return _verbs.old_posture(self, *arguments, **options)
-
     def at_point(self, point: OperatingPoint) -> OperatingPoint:
         """This device at the operating point of another, a single one: the same requested position (or the same
         joint angles), directions, assembly and model. Raises what `at` raises."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth import _verbs
 from zwidth.device.device import Device
 from zwidth.device.faults import plural
 from zwidth.measures.definition import OK, STATUS, Measure
@@ -111,8 +110,8 @@ class Sweep(Result):
 
 def sweep(
     device: Device,
-    axes: Mapping[str, Sequence[Any] | ArrayLike] | None = None,
-    measures: str | Measure | Sequence[str | Measure] = (),
+    axes: Mapping[str, Sequence[Any] | ArrayLike],
+    measures: str | Measure | Sequence[str | Measure],
     *,
     position: Position | None = None,
     direction: Sequence[float] | None = None,
@@ -176,12 +175,9 @@ def sweep(
                    TypeError     for arguments of another kind
                    what `executor.run` and `Store` raise
     """
-    if isinstance(device, Study | str | os.PathLike) and not axes:  # what was swept before there were axes
-        old: xr.Dataset = _verbs.old_sweep(device, axes, measures)
-        return old
     study = study_over(
         device,
-        axes or {},
+        axes,
         measures,
         position=position,
         direction=direction,
