@@ -79,7 +79,7 @@ def compile_for(*lines: str) -> None:
     """
     from numba.core import event
 
-    from zwidth.show.cli.main import run
+    from zwidth.show import run
 
     functions: dict[str, int] = {}
     kernels: dict[str, float] = {}

@@ -23,7 +23,7 @@ SMOOTHED = 101  # samples of the peers' polynomials
 def with_zwidth(kind: str, file: Path) -> dict[str, float]:
     """Our numbers. Raises SystemExit where the record was refused."""
     from benchmarks._records import BENCHES  # the peers' processes are to load nothing of zwidth
-    from zwidth.identify.kinds import identify
+    from zwidth.identify import identify
 
     bench = BENCHES[kind]
     result = identify(bench.device(), kind, file, **bench.options)

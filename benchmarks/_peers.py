@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from zwidth.model.plant import Plant
+from zwidth.model import Plant
 
 
 def held_force_step(plant: Plant, period: float):

@@ -20,7 +20,7 @@ from benchmarks._identify import RATE
 from tests.identify.arm_benches import Chains, chain_device, random_chains
 from tests.identify.spring_bench import bench_record
 from tests.identify.virtual_joint import Joint, records_of
-from zwidth.device.device import Device
+from zwidth.device import Device
 from zwidth.device.load import load
 
 STRETCH_S = 20

@@ -5,14 +5,14 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Any
 
-from zwidth.chart import peak_search
+from zwidth.chart import MOST_DEGREE, peak_search
 from zwidth.chart.circle_sampling import fill_computer_features, fill_features, fill_samples
 from zwidth.chart.curve_refinement import refine_samples
 from zwidth.chart.edge_memory import MOST_SAMPLES, SAMPLES, EdgeMemory, edge_memory
 from zwidth.chart.edge_samples import fill_curve, fill_loop, flag_quadrant
 from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_polynomials
 from zwidth.chart.peak_search import NEAR_END, WIDE_SHARE, WIDE_STEP, search_peak
-from zwidth.chart.wall_samples import MOST_DEGREE, walls_of_samples
+from zwidth.chart.wall_samples import walls_of_samples
 from zwidth.compiled import compiled
 from zwidth.loop.circle_factors import COMPUTER, fill_computer, fill_plant
 from zwidth.loop.loop_table import LoopTable

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from zwidth.contact.touch_numbers import TouchNumbers
-from zwidth.contact.touch_step import OUTPUTS
+from zwidth.contact import OUTPUTS, TouchNumbers
 
 WASM = Path(__file__).parents[1] / "src" / "zwidth" / "show" / "app" / "page" / "touch.wasm"
 PROGRAM = """

@@ -24,10 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table
-from zwidth.show.app.frames import pack_frame
+from zwidth.show import State, pack_frame
 from zwidth.show.app.layers import view
 from zwidth.show.app.opened import OpenedDevices
-from zwidth.show.app.request import State, Wall
+from zwidth.show.app.request import Wall
 
 PATH = "drives.motor-right.stiffness_Nm_per_rad"
 INPUTS, PAUSE_MS = 300, 16.0

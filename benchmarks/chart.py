@@ -24,11 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._peers import by_eigenvalues, by_jury, by_python_control
 from benchmarks._timing import machine, median_time, print_table, seconds, verdict
-from zwidth.chart.chart import StabilityChart, boundary_points, stability_chart
+from zwidth.chart import StabilityChart, boundary_points, stability_chart
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
 
 GRID = 1000
 COARSE = 50

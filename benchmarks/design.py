@@ -37,15 +37,12 @@ from benchmarks._peers import (
 from benchmarks._peers import by_python_control as walls_by_python_control
 from benchmarks._stages import stage_times
 from benchmarks._timing import machine, print_table, seconds, verdict
-from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.peak import Peak
+from zwidth.chart import Peak, largest_stiffness
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop import Controller, Loop, OperatingPoint
 from zwidth.loop.point_loops import table_of_points
-from zwidth.model.plant import Plant
-from zwidth.study.designs.sweep import sweep
+from zwidth.model import Plant
+from zwidth.study import sweep
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 WANTED = 1_000_000

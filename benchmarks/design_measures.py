@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import zwidth
 from benchmarks._cases import Cases, TimedCase, run
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop import OperatingPoint
 
 DESIGNS, SAMPLE = 100, 12
 WALL = {"stiffness": 1500.0, "damping": 6.0}

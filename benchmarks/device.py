@@ -20,9 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import zwidth
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
-from zwidth.loop.loop import Loop
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
+from zwidth.loop import Loop
+from zwidth.model import reduce_mechanism, solve_posture
 
 NAME, TARGET = "five-bar", 2e-3  # s
 DEVICE = zwidth.load(NAME)

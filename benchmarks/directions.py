@@ -22,13 +22,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
-from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.polar import circle, largest_stiffness_by_direction
-from zwidth.chart.several_directions.chart import multi_chart
+from zwidth.chart import circle, largest_stiffness, largest_stiffness_by_direction, multi_chart
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.model.plant import Plant
+from zwidth.loop import Loop, MultiLoop
+from zwidth.model import Plant
 
 COUNT = 72
 TARGET = 0.1  # s

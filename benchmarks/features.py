@@ -20,13 +20,19 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds
-from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart import StabilityChart, stability_chart
 from zwidth.device.load import load
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.estimators import AlphaBeta, CentralDifference, Kalman, LeastSquaresSlope, SavitzkyGolay
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.loop import (
+    AlphaBeta,
+    Butterworth,
+    CentralDifference,
+    Controller,
+    Kalman,
+    LeastSquaresSlope,
+    Loop,
+    SavitzkyGolay,
+)
+from zwidth.model import LaggedDamper, Operator, Plant, attach
 
 COARSE = 100
 MILLION = 1_000_000

@@ -29,7 +29,7 @@ from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._identify import PEERS, RATE, masses_by_curve_fit, modes_by_curve_fit, response_by_csd
 from benchmarks._records import BENCHES, columns_of, write_csv
 from benchmarks._timing import machine, median_time, print_table, seconds, verdict
-from zwidth.identify.kinds import identify
+from zwidth.identify import identify
 
 ROOT = Path(__file__).parents[1]
 HOUR, MINUTE = 3600, 60

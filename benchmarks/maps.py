@@ -27,11 +27,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._peers import observed_part, sampled_plants, stiffest_by_eigenvalues, stiffest_near
 from benchmarks._timing import machine, median_time, print_table, seconds, verdict
-from zwidth.chart.chart_batch import ALL_NUMBERS
-from zwidth.chart.point_numbers import numbers_of_points
-from zwidth.device.device import Device
+from zwidth.chart import ALL_NUMBERS, numbers_of_points
+from zwidth.device import Device
 from zwidth.device.load import load
-from zwidth.measures.definition import OK, MeasureValues
+from zwidth.measures import OK, MeasureValues
 
 SIZES = (50, 100, 200, 400)
 WANTED = 200

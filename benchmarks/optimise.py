@@ -25,15 +25,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
-from zwidth.study.designs.sampling import Axis, Sampling
-from zwidth.study.designs.study import Study
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.jobs.executor import run as run_job
-from zwidth.study.optimise.evaluation import Judge, Judgement
-from zwidth.study.optimise.front import hypervolume
+from zwidth.study import Axis, Judge, Sampling, Study, hypervolume, problem_of, settle, study_of, values_at
+from zwidth.study import run as run_job
+from zwidth.study.optimise.evaluation import Judgement
 from zwidth.study.optimise.optimise import optimise
-from zwidth.study.optimise.problem import Problem, problem_of
-from zwidth.study.optimise.variables import settle, values_at
+from zwidth.study.optimise.problem import Problem
 
 BUDGET, SEEDS, WORKERS = 4000, 3, 2
 WANTED = 60.0  # s for 4000 designs

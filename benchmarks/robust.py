@@ -21,11 +21,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.robust.chart import robust_chart
+from zwidth.chart import robust_chart, stability_chart
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
+from zwidth.loop import Loop
+from zwidth.model import Operator, attach
 
 MEMBERS, GRID, GRIDDED = 1000, 100, 20
 TARGET = 3.0

@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds, verdict
 from zwidth.device.load import load
-from zwidth.show.safe_walls.header import HEADER_NAME, header_text
+from zwidth.show import HEADER_NAME, header_text
+from zwidth.study import SafeWalls
 from zwidth.study.safe_walls.safe_walls import safe_walls
-from zwidth.study.safe_walls.table import SafeWalls
 
 TARGET = 1e-6  # s
 QUERIES = 1_000_000

@@ -32,12 +32,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
 from tests.study.cluster_cases import running_cluster
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.designs.sweep_job import sweep_job
-from zwidth.study.jobs.executor import run as run_job
-from zwidth.study.jobs.executor_interface import Executor, open_executor
-from zwidth.study.jobs.store import Store
-from zwidth.study.jobs.workers import PackedJob, pack_job
+from zwidth.study import Store, open_executor, pack_job, study_of, sweep_job
+from zwidth.study import run as run_job
+from zwidth.study.jobs.executor_interface import Executor
+from zwidth.study.jobs.workers import PackedJob
 
 BATCH, BATCHES, REPEATS = 0.1, 40, 7
 DASK_TARGET, TWO_TARGET, MEMORY_TARGET = 1.10, 1 / 1.7, 1.3

@@ -24,11 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._simulators import TwoMassDevice, by_events, by_mujoco
 from benchmarks._timing import machine, print_table, seconds
+from zwidth.contact import Run, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.simulate import Run, simulate_batch
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.loop import Loop
+from zwidth.model import Counter, Friction, Nonlinear
 
 STIFFNESS, DAMPING, START, SUBSTEPS = 6000.0, 12.0, 0.003, 20
 FRICTION, STEP, LIMIT = 0.1, 1e-5, 20.0

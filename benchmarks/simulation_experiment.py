@@ -14,9 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds
 from zwidth.device.load import load
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.study.boundary.experiment import measure_boundary
-from zwidth.study.boundary.experiment_plan import Plan
+from zwidth.loop import OperatingPoint
+from zwidth.study import Plan, measure_boundary
 
 TARGET = 10.0  # s
 

@@ -32,9 +32,8 @@ from contact.mechanism_cases import (
 )
 
 from benchmarks._cases import Cases, TimedCase, run
-from zwidth.contact.mechanism.surfaces import Plane
-from zwidth.contact.mechanism.walls import SurfaceWall
-from zwidth.model.damping import ModalDamping
+from zwidth.contact import Plane, SurfaceWall
+from zwidth.model import ModalDamping
 
 PERIOD, SAMPLES, ALLOWED, TARGET, ROUNDS = 1.25e-3, 400, 1e-6, 20.0, 15
 STEPS = (8, 4, 2, 1)

@@ -13,7 +13,7 @@ from gallery import fig_3_11_filter as low_pass
 from gallery import fig_3_12_operator as hand
 from gallery import transition_matrices as matrices
 from gallery.brute_force import BruteForceLoop, butterworth
-from zwidth.chart.chart import StabilityChart
+from zwidth.chart import StabilityChart
 
 T = wall.loop.period
 

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from zwidth.show.figures.style import save
+from zwidth.show import save
 
 HERE = Path(__file__).parent
 PAGE = HERE / "examples.md"

@@ -19,15 +19,11 @@ from gallery import (
     identified_five_bar,
     slender_links,
 )
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.device.load import load
-from zwidth.show.figures.caption import caption_of_result, write_caption
-from zwidth.show.figures.load_path import load_path_figure
-from zwidth.show.figures.stability import draw_chart
-from zwidth.show.figures.style import context, figure, save
+from zwidth.show import caption_of_result, context, draw_chart, figure, load_path_figure, save, write_caption
 from zwidth.show.figures.tolerance import tolerance_figure
-from zwidth.study.tolerances.question import question_of
-from zwidth.study.tolerances.tolerance_study import run_tolerances
+from zwidth.study import question_of, run_tolerances
 
 IMAGES = Path(__file__).parent / "images"
 PAGE = Path(__file__).parent / "tolerance.md"  # whose example is drawn

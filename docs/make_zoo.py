@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import zwidth
 from docs._markdown import table
 from docs.make_examples import run
-from zwidth.device.read import bundled_names
+from zwidth.device import bundled_names
 from zwidth.measures.bindings.dexterity import isotropy
 
 HERE = Path(__file__).parent

@@ -18,7 +18,7 @@ import numpy as np
 
 from gallery.table_3_4 import on_the_axes, rods
 from zwidth.device.load import load
-from zwidth.model.posture import inertia_terms
+from zwidth.model import inertia_terms
 
 
 class AppendixB:

@@ -19,7 +19,7 @@ import numpy as np
 from gallery.appendix_b import POSITIONS, RATES, distances, relative_difference
 from gallery.appendix_b import device as thesis_device
 from zwidth.device.load import load
-from zwidth.model.posture import inertia_terms
+from zwidth.model import inertia_terms
 
 COUNT = 20
 NAMES = ("upper-right", "distal-right", "upper-left", "distal-left")

@@ -23,9 +23,7 @@ from numpy import cos, cosh, sin, sinh
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
-from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
-from zwidth.model.beam_section import BeamProperties
-from zwidth.model.flexible_body import FlexibleBody
+from zwidth.model import BeamProperties, FlexibleBody, assumed_modes, finite_elements, lumped_tip
 
 L, MASS, EI = 0.2, 0.05, 10.0
 # so stiff in all but bending in the x-y plane that the first frequency is one of that
@@ -106,7 +104,7 @@ def order(few: float, many: float) -> float:
 
 def draw(made: Any) -> None:
     """Error of the first frequency over the number, of a beam on a hub and of one with a mass on its tip."""
-    from zwidth.show.figures.style import GREY, LINES, legend_above
+    from zwidth.show import GREY, LINES, legend_above
 
     counts = (1, 2, 3, 4, 6, 8, 12, 16)
     found = errors(counts)

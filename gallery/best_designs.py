@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from gallery import optimal_mass
-from zwidth.study.designs.study_file import study_of
+from zwidth.study import study_of
 from zwidth.study.optimise.optimise import optimise
 
 

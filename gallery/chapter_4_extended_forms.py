@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from gallery.brute_force import BruteForceLoop
 from gallery.shared_loops import unit_mass
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.conditions import thesis_damped, thesis_whole_delay
 
 # Below the printed tip's end, between it and the axis, and beyond: tip, corner with z = -1, d = 0.

@@ -22,8 +22,8 @@ Run `python -m gallery.estimators` to draw gain, phase delay and charts.
 from __future__ import annotations
 
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.loop.estimators import (
+from zwidth.chart import StabilityChart, stability_chart
+from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
     CentralDifference,
@@ -31,8 +31,8 @@ from zwidth.loop.estimators import (
     LeastSquaresSlope,
     SavitzkyGolay,
     WindowedDifference,
+    quantisation_noise,
 )
-from zwidth.loop.estimators.parameter_checks import quantisation_noise
 
 PERIOD = 0.00125  # s
 RESOLUTION = 10e-6  # m
@@ -86,7 +86,7 @@ def draw(ax) -> None:
 
 def draw_walls(ax) -> None:
     """What is stable with two masses."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     first = flexible["backward difference"]
     window = (0.0, 1.05 * first.stiffness_max, 0.0, 1.05 * first.damping_max)

@@ -23,13 +23,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gallery.shared_loops import published, write_page
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import eigenvalues, spectral_radius
+from zwidth.chart import eigenvalues, spectral_radius, stability_chart
+from zwidth.contact import Judgement, TimeResponse, judge_response
 from zwidth.contact.environments import wall
-from zwidth.contact.motion_verdict import Judgement, judge_response
 from zwidth.contact.simulate import simulate
-from zwidth.contact.time_response import TimeResponse
-from zwidth.loop.loop import Loop
+from zwidth.loop import Loop
 
 loop = published()
 chart = stability_chart(loop)
@@ -85,8 +83,7 @@ rigid_frequency = float(
 
 def draw(figure) -> None:
     """The chart with the walls on it, and the two masses' motion at each."""
-    from zwidth.show.figures.stability import draw_chart
-    from zwidth.show.figures.style import BLUE, VERMILION, label
+    from zwidth.show import BLUE, VERMILION, draw_chart, label
 
     places = [["chart", "A", "B"], ["chart", "D", "C"], ["chart", "none", "E"]]
     axes = figure.subplot_mosaic(places, width_ratios=(1.4, 1, 1))

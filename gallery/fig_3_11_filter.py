@@ -14,8 +14,8 @@ Run `python -m gallery.fig_3_11_filter` to draw it.
 from __future__ import annotations
 
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.chart import stability_chart
-from zwidth.loop.controller import Butterworth
+from zwidth.chart import stability_chart
+from zwidth.loop import Butterworth
 
 plain = Butterworth(order=2, cutoff_Hz=20.0)
 prewarped = Butterworth(order=2, cutoff_Hz=20.0, discretisation="tustin-prewarped")
@@ -32,7 +32,7 @@ two_mass_unfiltered = stability_chart(published(), decay=False)
 
 def draw(ax) -> None:
     """Rigid and two-mass with the filter, in the window of what is stable with K > 0, B > 0."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     window = (0.0, 1.1 * two_mass.stiffness_max, 0.0, 1.1 * two_mass.damping_max)
     draw_models(ax, {"two masses, filtered": two_mass, "rigid, filtered": rigid}, window)

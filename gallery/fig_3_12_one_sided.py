@@ -22,12 +22,10 @@ import numpy as np
 
 from gallery.fig_3_12_operator import ARM, ASSUMED, GRASP, chart, damper, edge
 from gallery.shared_loops import PUBLISHED, write_figure
-from zwidth.contact.boundary_experiment import StableExtent, measure_edges
-from zwidth.contact.hand import Hand, Reflex
-from zwidth.contact.stability_trial import StabilityTrial
+from zwidth.contact import Hand, Reflex, StabilityTrial, StableExtent, measure_edges
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator
+from zwidth.loop import Loop
+from zwidth.model import Operator
 
 PUSH = 5.0  # N
 STIFFNESS = np.array([500.0, 1000.0, 3000.0, 6000.0])
@@ -66,8 +64,7 @@ two_sided = exact_lower_edge()
 
 def draw(ax) -> None:
     """Chart and measured lower edges."""
-    from zwidth.show.figures.stability import draw_chart
-    from zwidth.show.figures.style import BLUE, VERMILION, legend_above
+    from zwidth.show import BLUE, VERMILION, draw_chart, legend_above
 
     draw_chart(ax, chart)
     for found, text, colour, marker in (

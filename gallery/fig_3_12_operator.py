@@ -30,11 +30,11 @@ import numpy as np
 
 from gallery.brute_force import BruteForceLoop
 from gallery.shared_loops import PUBLISHED, write_figure
-from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart import StabilityChart, stability_chart
 from zwidth.conditions import thesis_flexible
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
-from zwidth.model.modes import natural_frequencies
+from zwidth.loop import Loop
+from zwidth.model import natural_frequencies
 
 OPERATOR = "thesis-arm"
 LINK, MOTOR, SPRING = 0.2616, 0.0254, 15620.0  # m_e1, m_e2 [kg], k_e [N/m]
@@ -124,7 +124,7 @@ static_edge_by_hand = -1.0 / (1.0 / SPRING + 1.0 / GRASP[0] + 1.0 / ARM[1])
 
 def draw(ax) -> None:
     """With and without the operator, and without him at 5 %."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     charts = {
         "in the operator's hand, 7.5 % damping": chart,

@@ -19,9 +19,8 @@ from __future__ import annotations
 import numpy as np
 
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.verdict import judge
-from zwidth.model.modes import natural_frequencies
+from zwidth.chart import StabilityChart, judge, stability_chart
+from zwidth.model import natural_frequencies
 
 R_K = 0.00012
 R_K_PRINTED = 0.0012
@@ -69,7 +68,7 @@ crossings_at_4000 = crossings_at(chart, 4000.0)
 
 def draw(ax) -> None:
     """The chart."""
-    from zwidth.show.figures.stability import draw_chart
+    from zwidth.show import draw_chart
 
     draw_chart(ax, chart)
 

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from gallery.fig_3_7_bilateral_wall import chart
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.chart_base import BoundaryArc
+from zwidth.chart import BoundaryArc, stability_chart
 
 NYQUIST = 0.5 / chart.loop.period
 
@@ -45,7 +44,7 @@ delayed_corner_Hz = delayed.frequencies_at_stiffness_max
 
 def draw(ax) -> None:
     """Frequency along the edge."""
-    from zwidth.show.figures.frequency import draw_frequency
+    from zwidth.show import draw_frequency
 
     draw_frequency(ax, chart)
 

@@ -9,7 +9,7 @@ Run `python -m gallery.fig_3_9_no_damping` to draw it.
 from __future__ import annotations
 
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 
 flexible = stability_chart(published(stiffness_damping=0.0), decay=False)
 rigid = stability_chart(published("rigid", stiffness_damping=0.0), decay=False)
@@ -20,7 +20,7 @@ flexible_delayed = stability_chart(published(stiffness_damping=0.0, delay=1.0), 
 
 def draw(ax) -> None:
     """Both edges, in the window of the flexible one."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     draw_models(ax, {"two masses, undamped": flexible, "rigid, undamped": rigid})
 

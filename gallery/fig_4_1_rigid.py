@@ -19,8 +19,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from gallery.shared_loops import label_dimensionless, unit_mass, write_figure
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import judge
+from zwidth.chart import judge, stability_chart
 from zwidth.conditions import thesis_rigid
 
 BETA = 0.2
@@ -121,7 +120,7 @@ conservative_up_to = float(
 
 def draw(ax) -> None:
     """Both charts; p and d on the axes."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     draw_models(ax, {"beta = 0.2": damped, "beta = 0": free})
     label_dimensionless(ax)

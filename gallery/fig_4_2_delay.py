@@ -11,7 +11,7 @@ Run `python -m gallery.fig_4_2_delay` to draw it.
 from __future__ import annotations
 
 from gallery.shared_loops import label_dimensionless, unit_mass, write_figure
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.conditions import thesis_unit_delay
 
 DELAYS = (0, 1, 2, 3, 5)
@@ -29,7 +29,7 @@ closed_largest_d = float(thesis_unit_delay.largest_damping(1.0, 1.0))
 
 def draw(ax) -> None:
     """No delay and one sample."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     draw_models(ax, {"no delay (l = 0)": charts[0], "one sample (l = 1)": charts[1]})
     label_dimensionless(ax)

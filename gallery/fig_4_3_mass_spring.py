@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from gallery.shared_loops import label_dimensionless, unit_mass, write_figure
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.conditions import thesis_flexible as closed
 
 RATES = (0.2, 0.5, 0.8, 1.1, 1.4, np.pi / 2 - 0.01)
@@ -87,7 +87,7 @@ order_of_4_48 = float(np.log2(_error_of_4_48(0.2) / _error_of_4_48(0.1)))
 
 def draw(ax) -> None:
     """Edges for several W, with the maxima of (4.44), (4.45) across them."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     shown = {f"W = {rate:.2f}": charts[rate] for rate in RATES[:5]}
     draw_models(ax, shown, (-0.8, 0.8, -0.5, 2.2))

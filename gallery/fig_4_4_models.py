@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from gallery.fig_3_7_bilateral_wall import crossings_at
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.conditions import thesis_flexible
 
 two_mass = stability_chart(published(), decay=False)
@@ -34,7 +34,7 @@ high_edge_motor_mass = crossings_at(motor_mass, HALFWAY)[-1]
 
 def draw(ax) -> None:
     """The four models over each other."""
-    from zwidth.show.figures.stability import draw_models
+    from zwidth.show import draw_models
 
     charts = {
         "two masses, damped": two_mass,

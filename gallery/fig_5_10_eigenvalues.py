@@ -17,8 +17,9 @@ import numpy as np
 
 from gallery.fig_3_7_bilateral_wall import chart, loop
 from gallery.shared_loops import published, write_page
-from zwidth.chart.verdict import eigenvalues, spectral_radius
-from zwidth.measures.eigenvalue_paths import Crossing, wall_paths
+from zwidth.chart import eigenvalues, spectral_radius
+from zwidth.measures import wall_paths
+from zwidth.measures.eigenvalue_paths import Crossing
 
 K = 4000.0  # N/m
 LOWEST, HIGHEST = -2.0, 35.0  # N s/m
@@ -66,8 +67,7 @@ rigid_at_A = float(spectral_radius(published("rigid", stiffness_damping=0.0), *p
 
 def draw(figure) -> None:
     """The chart and the way."""
-    from zwidth.show.figures.decay import draw_decay_contours
-    from zwidth.show.figures.style import BLACK
+    from zwidth.show import BLACK, draw_decay_contours
 
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 0.95))
     draw_decay_contours(left, loop, RADII, (-2000.0, 8000.0, LOWEST - 1.0, HIGHEST), chart)
@@ -78,7 +78,8 @@ def draw(figure) -> None:
 
 def draw_paths(ax) -> None:
     """Eigenvalues in the complex plane, along the way and at A."""
-    from zwidth.show.figures.style import BLUE, GREEN, VERMILION, legend_above
+    from zwidth.show import BLUE, VERMILION, legend_above
+    from zwidth.show.figures.style import GREEN
 
     draw_circle(ax)
     for path in range(paths.eigenvalues.shape[1]):
@@ -102,7 +103,7 @@ def draw_paths(ax) -> None:
 
 def draw_circle(ax) -> None:
     """The unit circle, with its axes."""
-    from zwidth.show.figures.style import GREY
+    from zwidth.show import GREY
 
     t = np.linspace(0.0, 2.0 * np.pi, 361)
     ax.plot(np.cos(t), np.sin(t), color=GREY, linewidth=0.8, zorder=0.8)

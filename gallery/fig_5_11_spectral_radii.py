@@ -16,9 +16,8 @@ from gallery import optimal_mass
 from gallery.fig_3_7_bilateral_wall import chart as two_mass
 from gallery.fig_4_4_models import motor_mass_undamped as motor_mass
 from gallery.shared_loops import published, write_page
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import spectral_radius
-from zwidth.measures.vibration_decay import with_motor_side_mass
+from zwidth.chart import spectral_radius, stability_chart
+from zwidth.measures import with_motor_side_mass
 
 WALLS = {name: optimal_mass.WALLS[name] for name in "BCD"}
 RADII = (0.99, 0.98, 0.97, 0.96)
@@ -47,9 +46,9 @@ stiffness_ratio = optimised.stiffness_max / two_mass.stiffness_max
 
 def draw(figure) -> None:
     """Both charts beside each other, with the points."""
+    from zwidth.show import VERMILION
     from zwidth.show.figures.decay import draw_level
     from zwidth.show.figures.stability import frame
-    from zwidth.show.figures.style import VERMILION
 
     axes = figure.subplots(1, 2, sharey=True)
     for ax, (model, found) in zip(axes, charts.items(), strict=True):

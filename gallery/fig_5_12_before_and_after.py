@@ -24,12 +24,11 @@ import numpy as np
 
 from gallery import optimal_mass
 from gallery.shared_loops import published, write_page
-from zwidth.chart.verdict import eigenvalues, judge
+from zwidth.chart import eigenvalues, judge
+from zwidth.contact import Judgement, TimeResponse, judge_response
 from zwidth.contact.environments import wall
-from zwidth.contact.motion_verdict import Judgement, judge_response
 from zwidth.contact.simulate import simulate
-from zwidth.contact.time_response import TimeResponse
-from zwidth.loop.loop import Loop
+from zwidth.loop import Loop
 
 WALLS = {name: optimal_mass.WALLS[name] for name in "BCD"}
 START = 1e-3  # m
@@ -83,7 +82,7 @@ after = {name: vibration(optimal_mass.optimum[name][0], *where) for name, where 
 
 def draw(figure) -> None:
     """One panel for each wall."""
-    from zwidth.show.figures.style import BLUE, VERMILION, label, legend_above
+    from zwidth.show import BLUE, VERMILION, label, legend_above
 
     axes = figure.subplots(3, 1, sharex=True)
     for ax, (name, (K, B)) in zip(axes, WALLS.items(), strict=True):

@@ -24,10 +24,9 @@ from gallery.brute_force import BruteForceLoop
 from gallery.fig_5_10_eigenvalues import draw_circle
 from gallery.fig_5_11_spectral_radii import LOOPS, WALLS
 from gallery.shared_loops import write_page
-from zwidth.chart.verdict import eigenvalues
-from zwidth.loop.loop import Loop
-from zwidth.measures.eigenvalue_paths import EigenvaluePaths, loop_paths
-from zwidth.measures.vibration_decay import fastest_mass, with_motor_side_mass
+from zwidth.chart import eigenvalues
+from zwidth.loop import Loop
+from zwidth.measures import EigenvaluePaths, fastest_mass, loop_paths, with_motor_side_mass
 
 LIGHTEST, HEAVIEST = 0.01, 0.2  # kg
 MODELS = ("two masses", "motor's mass")
@@ -122,7 +121,7 @@ def draw(figure) -> None:
 
 def draw_model_paths(ax, name: str) -> None:
     """The upper half plane; below it all is mirrored."""
-    from zwidth.show.figures.style import BLACK, BLUE, VERMILION
+    from zwidth.show import BLACK, BLUE, VERMILION
 
     draw_circle(ax)
     ax.set_ylim(-0.25, 1.25)

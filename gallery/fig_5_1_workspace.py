@@ -22,9 +22,8 @@ import numpy as np
 from gallery.five_bar import brute_force_loop, bundled
 from gallery.five_bar_designs import REFERENCE, device, measure_values
 from gallery.shared_loops import write_page
-from zwidth.measures.impedance_range import rigid_range, sprung_range
-from zwidth.study.workspace.map import workspace_map
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import rigid_range, sprung_range
+from zwidth.study import plane_of, workspace_map
 
 ASSEMBLY = device.reference_assembly
 plane = plane_of(device, cells=(121, 61))
@@ -156,7 +155,7 @@ rim = {
 
 def draw(figure) -> None:
     """Fig. 5.1 in the first row, 5.2 and 5.3 in the second and third, the exact answer beside them."""
-    from zwidth.show.figures.map import draw_map
+    from zwidth.show import draw_map
 
     panels = (
         (dexterity, "manipulability"),

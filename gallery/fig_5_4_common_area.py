@@ -25,8 +25,7 @@ from gallery import fig_5_1_workspace as maps
 from gallery.five_bar import bundled
 from gallery.five_bar_designs import REFERENCE, device
 from gallery.shared_loops import write_page
-from zwidth.study.designs.requirement import parse_requirement
-from zwidth.study.workspace.common_area import common_area
+from zwidth.study import common_area, parse_requirement
 
 BOUNDS = {"manipulability": 0.015, "isotropy": 1.3, "mass": 0.2}
 MASSES = ("link_side_mass", "rigid_mass")
@@ -99,7 +98,7 @@ distance_from_reference = _distance()
 
 def draw(figure) -> None:
     """The requirements over the largest stiffness of the rigid body, with the mass that (5.4) names."""
-    from zwidth.show.figures.map import draw_map
+    from zwidth.show import draw_map
 
     ax = figure.subplots()
     dataset = maps.dexterity.assign({"stiffness_max_closed_form": maps.rigid["stiffness_max_closed_form"]})

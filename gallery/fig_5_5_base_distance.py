@@ -25,11 +25,10 @@ import numpy as np
 from gallery import five_bar_designs
 from gallery.five_bar import bundled
 from gallery.shared_loops import write_page
-from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
+from zwidth.device import Device, DeviceError
 from zwidth.device.load import load
-from zwidth.measures.impedance_range import rigid_range, sprung_range
-from zwidth.model.posture import PostureError
+from zwidth.measures import rigid_range, sprung_range
+from zwidth.model import PostureError
 
 Y = five_bar_designs.REFERENCE[1]
 REACH = float(
@@ -141,7 +140,7 @@ asymmetries_with_equal_drives = {
 
 def draw(figure) -> None:
     """Rigid and flexible, as in the thesis, and the full model exactly."""
-    from zwidth.show.figures.style import LINES, label, legend_above
+    from zwidth.show import LINES, label, legend_above
 
     axes = figure.subplots(3, 1, sharex=True)
     titles = {

@@ -27,7 +27,7 @@ import numpy as np
 from gallery import five_bar_designs
 from gallery.five_bar import SIDES, bundled, closed_form
 from gallery.shared_loops import write_page
-from zwidth.measures.impedance_range import rigid_range, sprung_range
+from zwidth.measures import rigid_range, sprung_range
 
 PERIOD = five_bar_designs.device.controller.sampling_period
 distance = np.linspace(-0.475, 0.475, 191)
@@ -110,7 +110,7 @@ def draw(figure) -> None:
     """Both models, stiffness and area; below, what the full model has."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    from zwidth.show.figures.style import LINES
+    from zwidth.show import LINES
 
     panels = {
         "flexible": ("Flexible (5.7): largest stiffness", "kN/m", 1e3, (0.03, 100.0)),

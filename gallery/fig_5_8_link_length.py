@@ -31,7 +31,7 @@ from scipy.optimize import brentq
 from gallery import five_bar_designs
 from gallery.five_bar import SIDES, bundled
 from gallery.shared_loops import write_page
-from zwidth.measures.impedance_range import rigid_range, sprung_range
+from zwidth.measures import rigid_range, sprung_range
 
 PERIOD = five_bar_designs.device.controller.sampling_period
 LENGTH, Y = five_bar_designs.LENGTH, five_bar_designs.REFERENCE[1]
@@ -132,7 +132,7 @@ fall = value(DOWN, "flexible", LENGTH + 1e-3) / value(DOWN, "flexible", length[0
 
 def draw(figure) -> None:
     """L1 alone and L1 = L3, all assemblies, mass and inertia kept."""
-    from zwidth.show.figures.style import GREY, LINES
+    from zwidth.show import GREY, LINES
 
     titles = {"rigid": "Rigid (5.4)", "flexible": "Flexible (5.7)", "exact": "Full model, exact"}
     axes = figure.subplots(3, 2, sharex=True, sharey="row")

@@ -27,7 +27,7 @@ from gallery import five_bar_designs
 from gallery.brute_force import BruteForceLoop
 from gallery.five_bar import bundled, closed_form
 from gallery.shared_loops import write_page
-from zwidth.measures.impedance_range import sprung_range
+from zwidth.measures import sprung_range
 
 device = five_bar_designs.device
 PERIOD = device.controller.sampling_period
@@ -99,7 +99,7 @@ doubled = tuple(
 
 def draw(figure) -> None:
     """(a) and (b)."""
-    from zwidth.show.figures.style import BLACK, BLUE, GREY, VERMILION, legend_above
+    from zwidth.show import BLACK, BLUE, GREY, VERMILION, legend_above
 
     left, right = figure.subplots(1, 2)
     left.plot(W, p_max, color=BLACK)

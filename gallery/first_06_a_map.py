@@ -22,7 +22,7 @@ print(f"at least 6 kN/m and a condition number of at most 1.5: {1e4 * good.commo
 
 def figure():
     """The largest stiffness, the requirements over it, and the mechanism in its reference posture."""
-    from zwidth.show.figures.map import map_figure
+    from zwidth.show import map_figure
 
     return map_figure(maps, "stiffness_max", device, good).axes[0]
 

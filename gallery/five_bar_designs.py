@@ -11,11 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from gallery.five_bar import SIDES, bundled
-from zwidth.device.device import Device
+from zwidth.device import Device
 from zwidth.device.load import load
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.catalogue import find_measure
-from zwidth.measures.definition import MeasureValues
+from zwidth.loop import OperatingPoint
+from zwidth.measures import MeasureValues, find_measure
 from zwidth.measures.evaluate import evaluate
 
 device = load("five-bar")

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from gallery.brute_force import BruteForceLoop
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 
 LENGTH, OUTER, WALL = 0.2, 8e-3, 0.5e-3  # of an aluminium tube [m]
 YOUNGS_MODULUS, DENSITY = 68.9e9, 2700.0

@@ -21,8 +21,9 @@ from scipy.optimize import fsolve
 
 from gallery.five_bar import bundled
 from zwidth.device.load import load
-from zwidth.measures.load_effect import fastest_sideways_motion, load_change
-from zwidth.model.load import Load
+from zwidth.measures import fastest_sideways_motion
+from zwidth.measures.load_effect import load_change
+from zwidth.model import Load
 
 POSITION, PUSH, GRAVITY = (0.05, 0.2), -5.0, (0.0, -9.81)
 STIFFNESS, DAMPING = 4000.0, 10.0  # of the wall whose roots are compared

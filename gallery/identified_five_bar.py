@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 import zwidth
-from zwidth.chart.chart import StabilityChart
-from zwidth.device.device import Device
-from zwidth.identify.identification import Identification
-from zwidth.measures.description import Description
+from zwidth.chart import StabilityChart
+from zwidth.device import Device
+from zwidth.identify import Identification
+from zwidth.measures import Description
 
 DRIVES = ("motor-right", "motor-left")
 LARGEST, AVERAGE = (0.45, 0.75), (0.40, 0.65)  # N m/rad, Table 3.3

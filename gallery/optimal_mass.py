@@ -22,10 +22,9 @@ from __future__ import annotations
 import numpy as np
 
 from gallery.shared_loops import published
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.measures.vibration_decay import fastest_mass, optimal_mass
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop
+from zwidth.measures import fastest_mass, optimal_mass
+from zwidth.model import Plant
 
 T = published().period
 K_E = float(published().plant.stiffness[0, 0])

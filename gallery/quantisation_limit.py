@@ -29,15 +29,12 @@ from math import ceil, inf
 import numpy as np
 
 from gallery.shared_loops import published, write_figure
-from zwidth.chart.verdict import STABLE, judge
+from zwidth.chart import judge
+from zwidth.chart.verdict import STABLE
+from zwidth.contact import Hand, Run, limit_cycles, resting_limit, simulate_batch
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.friction_quantisation_plane import resting_limit
-from zwidth.contact.hand import Hand
-from zwidth.contact.harmonic_balance import limit_cycles
-from zwidth.contact.simulate import Run, simulate_batch
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.loop import Controller, Loop
+from zwidth.model import Counter, Friction, Nonlinear
 
 PRINTED = 26_700.0  # N/m
 PRINTED_ONSET = 50_000.0  # N/m, at 0.1 ms
@@ -151,7 +148,7 @@ def predicted(name: str, wall_stiffness: float) -> bool:
 
 def draw(ax) -> None:
     """One line for each case: hollow where it came to rest, full where it kept moving."""
-    from zwidth.show.figures.style import BLACK, VERMILION
+    from zwidth.show import BLACK, VERMILION
 
     for row, found in enumerate(moves.values()):
         for K, alive in zip(stiffness, found, strict=True):

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from zwidth.device.load import load
-from zwidth.model.multi_plant import decompose, reduce_directions
+from zwidth.model import decompose, reduce_directions
 
 SIZES = ((1, 3), (1, 5), (2, 3), (2, 5), (3, 4), (3, 6))  # m of n
 

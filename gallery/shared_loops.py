@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
 
 PUBLISHED = "published-two-mass"
 
@@ -45,7 +44,7 @@ def unit_mass(damping: float = 0.0, stiffness: float = 0.0, delay: float = 0.0) 
 
 def write_figure(draw: Callable[..., None], name: str) -> None:
     """Save what `draw(ax)` draws into the folder named on the command line (left out: out/)."""
-    from zwidth.show.figures.style import context, figure, save
+    from zwidth.show import context, figure, save
 
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     folder.mkdir(parents=True, exist_ok=True)
@@ -57,7 +56,7 @@ def write_figure(draw: Callable[..., None], name: str) -> None:
 
 def write_page(draw: Callable[..., None], name: str, width: float, height: float) -> None:
     """The same for `draw(figure)`, which places its own axes; width and height in inches."""
-    from zwidth.show.figures.style import context, figure, save
+    from zwidth.show import context, figure, save
 
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     folder.mkdir(parents=True, exist_ok=True)

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.chart.chart import StabilityChart
-from zwidth.device.device import Device
-from zwidth.device.load import from_document, load
-from zwidth.study.load.bending import BendingNumbers, bending
+from zwidth.chart import StabilityChart
+from zwidth.device import Device, from_document
+from zwidth.device.load import load
+from zwidth.study import bending
+from zwidth.study.load.bending import BendingNumbers
 
 DISTAL, DRIVEN = ("distal-right", "distal-left"), ("upper-right", "upper-left")
 RIGID = "rigid links"
@@ -86,8 +87,7 @@ def charts(tubes: str) -> dict[str, StabilityChart]:
 
 def draw(made: Any) -> None:
     """Charts with tubes as driven links, whole and close to the stiffest walls, and as distal links."""
-    from zwidth.show.figures.stability import draw_models
-    from zwidth.show.figures.style import legend_above
+    from zwidth.show import draw_models, legend_above
 
     driven, distal = charts("driven, 12 x 1 mm"), charts("distal, 8 x 0.5 mm")
     panels = made.subplots(3, 1, height_ratios=(1.2, 1.0, 1.0))

@@ -11,7 +11,7 @@ import numpy as np
 
 from gallery import fig_4_1_rigid as rigid
 from gallery.brute_force import BruteForceLoop
-from zwidth.conditions.spring_stability import spring_stable
+from zwidth.conditions import spring_stable
 
 BETA = rigid.BETA
 NYQUIST_SPRING = np.pi**2

@@ -20,9 +20,9 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.device.load import load
+from zwidth.model import natural_frequencies, plant_effective_parameters
 from zwidth.model.effective_parameters import EffectiveParameters
-from zwidth.model.modes import natural_frequencies
-from zwidth.model.reduction import effective_parameters, plant_effective_parameters
+from zwidth.model.reduction import effective_parameters
 
 DEVICE = "five-bar"
 DISTAL = ("distal-right", "distal-left")

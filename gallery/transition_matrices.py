@@ -25,9 +25,8 @@ from scipy.signal import bilinear
 
 from gallery.brute_force import BruteForceLoop, butterworth
 from gallery.shared_loops import published
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
 
 T = published().period
 R_M, R_K = 0.5, 0.00012  # 1/s and s; 3.2.1 has r_m = 0

@@ -16,8 +16,7 @@ import scipy.linalg
 from scipy.optimize import brentq
 
 from tests.systems import FEATURES, random_loop, reference_transition_matrix, velocity_weights
-from zwidth.loop.controller import FirstOrder
-from zwidth.loop.estimators import Kalman
+from zwidth.loop import FirstOrder, Kalman
 
 KINDS = ("chain", "dense", "coupled", "apart")
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(10)

@@ -14,12 +14,17 @@ from itertools import pairwise
 import numpy as np
 
 from tests import systems
-from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import AlphaBeta, BackwardDifference, Kalman
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
+from zwidth.loop import (
+    AlphaBeta,
+    BackwardDifference,
+    Controller,
+    Feedforward,
+    ForceSensor,
+    Kalman,
+    LocalLoop,
+    Loop,
+)
+from zwidth.model import Operator, Plant, attach
 
 
 class DoublePrecision:

@@ -27,13 +27,9 @@ from tests.model.joints_apart import FOURTH, Joints, travel, travel_rates
 from zwidth.contact.mechanism.acceleration import accelerate, configure
 from zwidth.contact.mechanism.motion_kernel import ready
 from zwidth.contact.mechanism.system import memory_of, system_of
-from zwidth.loop.low_pass import Butterworth
-from zwidth.model.damping import GivenDamping
+from zwidth.loop import Butterworth
+from zwidth.model import BALL_Z, GivenDamping, attach, pack, reduce_mechanism
 from zwidth.model.effective_parameters import screw
-from zwidth.model.mechanism import BALL_Z
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.operator import attach
-from zwidth.model.reduction import reduce_mechanism
 
 STEP = 5e-5  # of a joint, for differences [rad], [m]
 

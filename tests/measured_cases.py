@@ -6,8 +6,8 @@ import numpy as np
 import scipy.signal
 
 from tests import systems
-from zwidth.loop.controller import Controller
-from zwidth.model.response import Response
+from zwidth.loop import Controller
+from zwidth.model import Response
 
 
 def sampled_response(loop, frequency):

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from tests.measured_cases import sampled_response
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
-from zwidth.model.response import MeasuredHandle, MeasuredPath, Response
+from zwidth.loop import Controller, Loop
+from zwidth.model import MeasuredHandle, Plant, Response
+from zwidth.model.response import MeasuredPath
 
 # What is measured, and what is stated to be the same place.
 EVERY, RECIPROCAL, AT_SENSOR, COLLOCATED = "four paths", "actuator at sensor", "handle at sensor", "all one place"

@@ -6,10 +6,8 @@ import numpy as np
 import scipy.linalg
 from systems import random_controller, random_plant, velocity_filter
 
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.wall_matrices import WallMatrices
-from zwidth.model.multi_plant import MultiPlant
-from zwidth.model.plant import Plant
+from zwidth.loop import MultiLoop, WallMatrices
+from zwidth.model import MultiPlant, Plant
 
 
 def as_multi(plant: Plant) -> MultiPlant:

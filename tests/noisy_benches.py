@@ -8,8 +8,7 @@ import numpy as np
 import scipy.signal
 
 from tests import systems
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Butterworth, Controller, Loop
 
 BLOCK = 64  # samples simulated at once
 

@@ -12,19 +12,20 @@ import numpy as np
 import scipy.linalg
 import scipy.signal
 
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import (
+from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
+    Butterworth,
     CentralDifference,
+    Controller,
+    FirstOrder,
     Kalman,
     LeastSquaresSlope,
+    Loop,
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.model import LaggedDamper, Operator, Plant, attach
 
 RATIOS = (0.0, 0.001, 0.01, 0.05, 0.3, 1.0, 1.5)
 

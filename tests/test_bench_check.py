@@ -16,8 +16,8 @@ from benchmarks._cases import TimedCase
 from benchmarks._check import LIMIT, Measurement, check, keep, read_kept, verdict_of, without_tools, write_ratios
 from benchmarks._workload import fixed_work
 from zwidth.compile_events import compiling
-from zwidth.measures.definition import OK
-from zwidth.model.posture import OK as SOLVED
+from zwidth.measures import OK
+from zwidth.model import OK as SOLVED
 
 WORK_S = 0.025  # of the fixed work
 SECONDS = 0.06  # of a call of what is measured: a turn

@@ -19,8 +19,8 @@ import zwidth
 from tests.model.model_engines import mass_matrix
 from tests.pages import sections
 from zwidth.device.schema import device_file
-from zwidth.measures.catalogue import MEASURES
-from zwidth.show.cli.group import zwidth as commands
+from zwidth.measures import MEASURES
+from zwidth.show import zwidth as commands
 
 DOCS = Path(__file__).parents[1] / "docs"
 

@@ -25,7 +25,7 @@ import numba
 from numba import types
 
 from zwidth.compiled import linked_module
-from zwidth.contact.touch_step import touch, touch_periods
+from zwidth.contact import touch, touch_periods
 
 ROOT = Path(__file__).parent.parent
 FILE = ROOT / "src" / "zwidth" / "show" / "app" / "page" / "touch.wasm"

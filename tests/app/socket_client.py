@@ -7,7 +7,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from zwidth.show.app.frames import unpack_frame
+from zwidth.show import unpack_frame
 
 FIVE_BAR = {"device": "five-bar", "wall": {"stiffness": 4000.0, "damping": 10.0}}
 

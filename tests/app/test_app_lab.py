@@ -13,8 +13,8 @@ from app.stated_numbers import left_over, stated_numbers
 from app.tour_steps import STEPS
 
 import zwidth
-from zwidth.device.read import OPERATORS, bundled_names
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.device import OPERATORS, bundled_names
+from zwidth.loop import OperatingPoint
 
 SHEET = (Path(__file__).parents[2] / "docs/lab.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"^## (?:\d )?(.+?)\n(.*?)(?=^## |\Z)", SHEET, re.MULTILINE | re.DOTALL))

@@ -14,7 +14,7 @@ from app.paddle_simulation import MASS, SKETCH, compile_sketch, cpp_compiler, ru
 from lazy_module import LazyModule
 
 import zwidth
-from zwidth.study.boundary.points_file import read_points
+from zwidth.study import read_points
 
 PAGE = SKETCH.parent
 make_paddle_record = LazyModule("docs.make_paddle_record")

@@ -14,7 +14,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from tests.cli.command_runner import refusal_lines
-from zwidth.show.app.server import LARGEST_REPORT, MOST_REPORTS, TYPES, Settings, page_files
+from zwidth.show import page_files
+from zwidth.show.app.server import LARGEST_REPORT, MOST_REPORTS, TYPES, Settings
 
 
 def get(port: int, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:

@@ -13,10 +13,9 @@ import pytest
 from app.socket_client import FIVE_BAR, SocketClient
 
 import zwidth
-from zwidth.model.modes import undamped_modes
-from zwidth.model.operator import Operator
-from zwidth.show.app.frames import pack_frame, unpack_frame
-from zwidth.show.app.request import FileRequest, State, ViewRequest
+from zwidth.model import Operator, undamped_modes
+from zwidth.show import State, pack_frame, unpack_frame
+from zwidth.show.app.request import FileRequest, ViewRequest
 from zwidth.show.app.worker import ANSWER, ComputeLost, ComputeProcess, SparePool
 
 PLANT = """name = "paddle"

@@ -9,7 +9,7 @@ from app.page_driver import Page
 import zwidth
 from zwidth.contact.environments import wall as wall_law
 from zwidth.contact.simulate import simulate
-from zwidth.model.operator import Operator
+from zwidth.model import Operator
 
 MOUSE = Operator(0.05, 300.0, 4.0)
 # Let go 1 mm inside a wall, the periods of one call at a time, by the page's own machine.
@@ -91,7 +91,7 @@ def test_what_is_touched_is_what_python_simulates(page, stiffness, damping, stab
 
 def hand(push: float):
     """A hand whose push is constant."""
-    from zwidth.contact.hand import Hand
+    from zwidth.contact import Hand
 
     return Hand(push=push)
 

@@ -11,8 +11,7 @@ from app.stated_numbers import left_over, stated_numbers
 from app.tour_steps import STEPS, answer
 
 import zwidth
-from zwidth.device.device import Device
-from zwidth.device.numbers import device_numbers
+from zwidth.device import Device, device_numbers
 
 TITLES = [step["title"] for step in STEPS]
 KEYS = ("text", "question", "hint", "answer")

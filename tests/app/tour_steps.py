@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 import zwidth
-from zwidth.show.app.server import page_files
+from zwidth.show import page_files
 
 STEPS = json.loads(page_files()["tour.json"])["steps"]
 

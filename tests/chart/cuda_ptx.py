@@ -23,12 +23,11 @@ import numba.cuda.dispatcher
 import numpy as np
 from numba import cuda, typeof, types
 
-from zwidth.chart import chart_cuda
+from zwidth.chart import MOST_DEGREE, chart_cuda
 from zwidth.chart.chart_batch import empty_numbers
 from zwidth.chart.edge_memory import MOST_SAMPLES, edge_memory
-from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.cuda_kernels import rounding_each_step
-from zwidth.loop.controller import Controller
+from zwidth.loop import Controller
 from zwidth.loop.loop_table import loop_table
 
 

@@ -15,11 +15,8 @@ from tests.systems import mass, published, random_loop
 from zwidth.chart.chart_batch import DECAY, STIFFEST, WHOLE_EDGE, chart_numbers
 from zwidth.chart.chart_cuda import numbers_on_gpu
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.study.workspace.map import workspace_map
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.loop import Controller, Loop, table_of_loops
+from zwidth.study import plane_of, workspace_map
 
 RANDOM = 3  # loops besides the two known ones
 

@@ -8,7 +8,7 @@ import scipy.linalg
 from mpmath import mp
 from systems import velocity_filter
 
-from zwidth.loop.wall_matrices import WallMatrices
+from zwidth.loop import WallMatrices
 
 DIGITS = 40
 STEPS = 8  # of inverse iteration with one decomposition

@@ -5,8 +5,7 @@ import pytest
 
 from tests.chart.test_chart_against_eigenvalues import DAMPED
 from tests.systems import FEATURES, RATIOS, random_loop
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart import ChartError, stability_chart
 
 KINDS = ("chain", "dense", "coupled", "apart")
 # Farthest that double precision can tell the two roots of a double one apart from one, by several roundings

@@ -8,18 +8,15 @@ import shapely
 from scipy.optimize import brentq
 
 from tests.systems import published, random_loop
+from zwidth.chart import Box, TracedEdge, Tracer, trace_curves
 from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.peak import find_peak, largest_damping, stiffest_index
 from zwidth.chart.rings import cut_at_holes
-from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.branch import Branch
-from zwidth.chart.several_directions.curve_set import trace_curves
-from zwidth.chart.traced_edge import TracedEdge
-from zwidth.chart.tracer import Tracer
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.model.multi_plant import MultiPlant
+from zwidth.loop import MultiLoop
+from zwidth.model import MultiPlant
 
 
 def star(rng, corners=12):

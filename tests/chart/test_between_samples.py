@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 from systems import FEATURES, random_loop, reference_transition_matrix, two_mass
 
-from zwidth.chart.chart_batch import ALL_NUMBERS, STIFFEST, ChartNumbers, chart_numbers
+from zwidth.chart import ALL_NUMBERS, numbers_of_points
+from zwidth.chart.chart_batch import STIFFEST, ChartNumbers, chart_numbers
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
-from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.chart.roots import real_root
 from zwidth.compiled import compiled
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sections import UnmovedError
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop, OperatingPoint, UnmovedError, table_of_loops
+from zwidth.model import Plant
 
 # Link-side and motor-side mass, spring, damper, sampling period, delay in samples, and the largest stiffness: by
 # samples twenty times denser.

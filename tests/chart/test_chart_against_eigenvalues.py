@@ -7,12 +7,9 @@ import pytest
 import shapely
 
 from tests.systems import mass, random_loop, reference_transition_matrix, two_mass
-from zwidth.chart.chart import boundary_points, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.hurwitz import QUOTIENT, hurwitz, work_array
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import CentralDifference
-from zwidth.loop.loop import Loop
+from zwidth.chart import ChartError, boundary_points, stability_chart, work_array
+from zwidth.chart.hurwitz import QUOTIENT, hurwitz
+from zwidth.loop import Butterworth, CentralDifference, Controller, FirstOrder, Loop
 
 # Damping of real structures; loops with undamped modes have a set of their own, since an undamped mode that the
 # wall hardly moves stays within rounding of the circle whatever the wall does.

@@ -8,18 +8,13 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, published, random_controller, random_loop, random_plant
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.chart_batch import ALL_NUMBERS, STIFFEST, chart_numbers
+from zwidth.chart import ALL_NUMBERS, MOST_DEGREE, TracedEdge, Tracer, closed_rings, stability_chart, work_array
+from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.curve import trace, walls
-from zwidth.chart.edge_by_eigenvalues import closed_rings
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
-from zwidth.chart.hurwitz import edges_stable_set, work_array
-from zwidth.chart.traced_edge import TracedEdge
-from zwidth.chart.tracer import Tracer
-from zwidth.chart.wall_samples import HIDDEN, MOST_DEGREE
-from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.sections import UnmovedError
+from zwidth.chart.hurwitz import edges_stable_set
+from zwidth.chart.wall_samples import HIDDEN
+from zwidth.loop import Loop, UnmovedError, table_of_loops
 
 KINDS = ("chain", "dense", "coupled", "apart")
 

@@ -5,11 +5,9 @@ import pytest
 import shapely
 
 from tests.systems import mass, published, random_loop, two_mass
-from zwidth.chart.chart import boundary_points, largest_stiffness, stability_chart
-from zwidth.chart.verdict import judge, spectral_radius
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.chart import boundary_points, judge, largest_stiffness, spectral_radius, stability_chart
+from zwidth.loop import Butterworth, Controller, Loop
+from zwidth.model import Plant
 
 DAMPED = (0.01, 0.05, 0.3, 1.0)
 

@@ -9,15 +9,10 @@ import pytest
 from tests.measured_cases import measured_response
 from tests.multi_loops import random_multi, side_by_side
 from tests.systems import mass, published, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.chart_base import BoundaryArc, Chart
-from zwidth.chart.measured.chart import measured_chart
-from zwidth.chart.robust.chart import robust_chart
-from zwidth.chart.several_directions.chart import multi_chart
-from zwidth.chart.verdict import STABLE, UNSTABLE, judge
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
+from zwidth.chart import BoundaryArc, judge, measured_chart, multi_chart, robust_chart, stability_chart
+from zwidth.chart.chart_base import Chart
+from zwidth.chart.verdict import STABLE, UNSTABLE
+from zwidth.loop import Controller, Loop, MultiLoop
 
 SHARED = {
     "regions",

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 from tests.systems import published, random_loop
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.edge_crossings import EdgeChords, exact_edge
-from zwidth.chart.verdict import judge
+from zwidth.chart import ChartError, EdgeChords, exact_edge, judge, stability_chart
 
 
 def charts(count, seed):

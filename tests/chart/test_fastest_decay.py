@@ -7,12 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from tests.systems import FEATURES, mass, published, random_loop
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import Tracer, spectral_radius, stability_chart
 from zwidth.chart.decay import double_root_wall
-from zwidth.chart.tracer import Tracer
-from zwidth.chart.verdict import spectral_radius
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
 
 
 def test_a_grounded_mass_is_fastest_without_a_spring():

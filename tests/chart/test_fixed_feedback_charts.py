@@ -15,9 +15,8 @@ from scipy.linalg import matrix_balance
 
 from tests.control_apart import random_controlled_loop
 from tests.study_sizes import study_size
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.loop.sections import UnmovedError
+from zwidth.chart import ChartError, stability_chart
+from zwidth.loop import UnmovedError
 
 KINDS = {
     "force-sensor": ("force-sensor",),

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, published
+from zwidth.chart import Tracer
 from zwidth.chart.arcs import CHORD, PAIR, PLUS
 from zwidth.chart.edge_arcs import SAME_CORNER
 from zwidth.chart.edge_by_eigenvalues import MOST_SAMPLES, bridge_gaps, find_arcs, join
 from zwidth.chart.edge_memory import ARCS, edge_memory
-from zwidth.chart.tracer import Tracer
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
 
 
 def tracer_and_memory(loop):

@@ -8,14 +8,10 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from tests.systems import mass, published, random_plant, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.hysteretic import hysteretic_chart
+from zwidth.chart import hysteretic_chart, stability_chart
 from zwidth.chart.hysteretic_response import SampledResponse
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.sections import HysteresisError
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
+from zwidth.loop import Butterworth, Controller, HysteresisError, Loop
+from zwidth.model import Operator, Plant, attach
 
 
 def with_loss(plant, factor):

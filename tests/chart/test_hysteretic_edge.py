@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from tests.systems import random_controller, random_plant
-from zwidth.chart.edge_crossings import EdgeChords
-from zwidth.chart.hysteretic import hysteretic_chart
+from zwidth.chart import EdgeChords, hysteretic_chart
 from zwidth.chart.hysteretic_edge import hysteretic_edge
-from zwidth.loop.loop import Loop
-from zwidth.loop.sections import HysteresisError
+from zwidth.loop import HysteresisError, Loop
 
 CLOSE = 1e-4  # share of the chart's dampings; the sides of the chart's cells lie within 1e-5 of its window
 

@@ -15,12 +15,8 @@ from tests.systems import (
     velocity_filter,
     velocity_weights,
 )
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.hysteretic import hysteretic_chart
-from zwidth.loop.controller import Butterworth
-from zwidth.loop.estimators import Kalman
-from zwidth.loop.loop import Loop
-from zwidth.loop.sections import HysteresisError
+from zwidth.chart import hysteretic_chart, stability_chart
+from zwidth.loop import Butterworth, HysteresisError, Kalman, Loop
 
 SMALLEST = 1e-5
 MARGIN = 1e-9  # least |1 + L| over 1 + |L| that is counted

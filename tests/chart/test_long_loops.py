@@ -6,14 +6,10 @@ import pytest
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
 from tests.study_sizes import study_size
 from tests.systems import published, random_plant
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError, decided_trace
-from zwidth.chart.nyquist import phase_flags, terms_along
-from zwidth.chart.tracer import Tracer
-from zwidth.chart.wall_samples import MOST_DEGREE
-from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import LeastSquaresSlope, SavitzkyGolay, WindowedDifference
-from zwidth.loop.loop import Loop
+from zwidth.chart import MOST_DEGREE, ChartError, Tracer, stability_chart, terms_along
+from zwidth.chart.edge_by_eigenvalues import decided_trace
+from zwidth.chart.nyquist import phase_flags
+from zwidth.loop import Controller, LeastSquaresSlope, Loop, SavitzkyGolay, WindowedDifference
 
 
 def long_loop(rng, longest):

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
-from zwidth.chart.robust.instability import softening, softenings, unstable, unstable_walls
-from zwidth.chart.table_radii import radii_and_leverages, spectral_radii
-from zwidth.chart.tracer import Tracer
-from zwidth.chart.verdict import spectral_radius
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.table_states import CHAINED, state_spaces
+from zwidth.chart import Tracer, softening, spectral_radii, spectral_radius, unstable
+from zwidth.chart.robust.instability import softenings, unstable_walls
+from zwidth.chart.table_radii import radii_and_leverages
+from zwidth.loop import CHAINED, table_of_loops
+from zwidth.loop.table_states import state_spaces
 
 
 def loops_without_chains(seed, count):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, published, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
+from zwidth.chart import stability_chart
+from zwidth.loop import Butterworth, Controller, Loop
 
 RIGID = mass(0.287)
 T = 0.00125

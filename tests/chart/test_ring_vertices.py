@@ -22,15 +22,11 @@ from tests.loop.estimators_cases import random_method
 from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
 from tests.systems import FEATURES, random_loop
 from zwidth import load
+from zwidth.chart import ChartError, TracedEdge, stability_chart
 from zwidth.chart.arcs import PAIR
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_judgement import walls_off_circle
-from zwidth.chart.traced_edge import TracedEdge
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.sections import UnmovedError
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop, UnmovedError
+from zwidth.model import Plant
 
 BAND = 1e-9
 # Relative: where two roots nearly coalesce, a corner in double precision has no more digits than this.

@@ -23,15 +23,12 @@ import pytest
 import shapely
 
 from tests.apart import ApartLoop, ExactLoop, curve_area, loop_of_every_kind, straight_area
+from zwidth.chart import ALL_NUMBERS, ChartError, Tracer, stability_chart
 from zwidth.chart.arcs import MINUS, PAIR, PLUS
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, chart_numbers
+from zwidth.chart.chart_batch import DECAY, chart_numbers
 from zwidth.chart.decay import fastest_decay
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
-from zwidth.chart.tracer import Tracer
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.sections import UnmovedError
+from zwidth.loop import UnmovedError, table_of_loops
 
 SEED = 20262
 TOLERANCE = 1e-9  # relative, of largest stiffness, largest damping and area

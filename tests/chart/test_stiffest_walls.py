@@ -8,17 +8,11 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, published, random_loop
 
-from zwidth.chart.chart import largest_stiffness
+from zwidth.chart import ChartError, largest_stiffness, spectral_radius
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
-from zwidth.chart.verdict import spectral_radius
-from zwidth.loop import AlphaBeta, Butterworth
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.sections import UnmovedError
-from zwidth.model.plant import Plant
+from zwidth.loop import AlphaBeta, Butterworth, Controller, Loop, UnmovedError, table_of_loops
+from zwidth.model import Plant
 
 KINDS = ("chain", "dense", "coupled", "apart")
 ON_CIRCLE = 1e-12  # a motion without damping stays there, but for rounding, at K from 0 on

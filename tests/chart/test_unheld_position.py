@@ -11,15 +11,10 @@ import pytest
 import scipy.linalg
 
 from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
-from zwidth.chart.table_radii import spectral_radii
-from zwidth.chart.verdict import judge
+from zwidth.chart import judge, spectral_radii
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.multi_plant import MultiPlant
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop, MultiLoop, OperatingPoint
+from zwidth.model import MultiPlant, Plant
 
 ONE, NONE = np.ones(1), np.zeros((1, 1))
 

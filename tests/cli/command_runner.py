@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Any
 
-from zwidth.show.cli.main import run
+from zwidth.show import run
 
 MECHANISM, TWO_MASS, ONE_MASS = "five-bar", "published-two-mass", "hapkit-course"
 

@@ -10,9 +10,9 @@ import pytest
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from tests.frozen.toml_text import toml_text
 from tests.model.beam_devices import five_bar, with_beams, without_beams
-from zwidth.device.load import from_document
+from zwidth.device import from_document
+from zwidth.loop import SidewaysMotion
 from zwidth.loop.motion_names import listed_names
-from zwidth.loop.sideways import SidewaysMotion
 
 SECTION = "links.distal-right.beam.section.wall_m"
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from tests import systems
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
-from zwidth.chart.verdict import judge
+from zwidth.chart import judge
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m\n"
 

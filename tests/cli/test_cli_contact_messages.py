@@ -8,7 +8,7 @@ import pytest
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, document_of, refusal_lines, run_command
 from tests.device.device_cases import ARM_FILE
-from zwidth.show.figures.mechanism_motion import draw_mechanism_motion, mechanism_motion_figure
+from zwidth.show import draw_mechanism_motion, mechanism_motion_figure
 
 PLANT = "name = 'own'\n[plant]\nmass_kg = 0.1\ndamping_Ns_per_m = 0.5\n[loop]\nsampling_period_s = 0.001\n"
 RUBBING = PLANT + "[friction]\ncoulomb_N = 10\n"

@@ -11,8 +11,8 @@ import pytest
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, run_command
 from tests.identify.spring_bench import bench_record
 from tests.undrawn_figures import leave_undrawn
-from zwidth.show.cli.group import zwidth as group
-from zwidth.show.output import csv_text
+from zwidth.show import csv_text
+from zwidth.show import zwidth as group
 
 PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
 DEVICE = """

@@ -15,10 +15,9 @@ from scipy.optimize import brentq
 from tests.cli.command_runner import TWO_MASS, document_of, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
-from zwidth.contact.boundary_experiment import StableExtent
+from zwidth.contact import StableExtent
 from zwidth.show.cli.experiment_page import point_rows, sentences, warning
-from zwidth.study.boundary.experiment_plan import Plan
-from zwidth.study.boundary.measured_boundary import Experiment, MeasuredPoint
+from zwidth.study import Experiment, MeasuredPoint, Plan
 
 FEW = ("--stiffnesses", 2, "--tips", 1)
 FEWEST = ("--stiffnesses", 1, "--tips", 0)

@@ -11,16 +11,11 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.systems import published
-from zwidth.chart.chart import stability_chart
-from zwidth.contact.boundary_experiment import StableExtent
+from zwidth.chart import stability_chart
+from zwidth.contact import StableExtent
+from zwidth.show import ErrorBarPoint, amount, draw_experiment, figure
 from zwidth.show.cli.experiment_page import sentences
-from zwidth.show.figures.experiment import ErrorBarPoint, draw_experiment
-from zwidth.show.figures.style import figure
-from zwidth.show.units import amount
-from zwidth.study.boundary.experiment_plan import Plan
-from zwidth.study.boundary.measured_boundary import Experiment
-from zwidth.study.boundary.points_file import PointsError, read_points
-from zwidth.study.boundary.user_points import compare_points
+from zwidth.study import Experiment, Plan, PointsError, compare_points, read_points
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m,edge,verdict\n"
 EDGES = "4000,2.6,lower,\n4000,20.7,upper,\n"  # 0.18 and 0.95 N s/m off

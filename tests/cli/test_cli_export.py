@@ -13,7 +13,7 @@ import xarray as xr
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
 from zwidth.device.load import load
-from zwidth.show.safe_walls.header import header_text
+from zwidth.show import header_text
 from zwidth.study import safe_walls
 
 SMALL = ("--x", "-0.05,0.05", "--y", "0.2,0.25", "--cells", "2,1", "--levels", 4, "--workers", 1)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.cli.command_runner import run_command
 from zwidth.device.load import load
-from zwidth.show.safe_walls.header import header_text
+from zwidth.show import header_text
 from zwidth.study import safe_walls
 from zwidth.study.safe_walls import cell_walls, grid, limits
 

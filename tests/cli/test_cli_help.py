@@ -10,8 +10,8 @@ import pytest
 
 from tests.cli.command_runner import run_command
 from zwidth import __version__
-from zwidth.model.reduction import MODELS as MODEL_NAMES
-from zwidth.show.cli.group import zwidth as group
+from zwidth.model import MODELS as MODEL_NAMES
+from zwidth.show import zwidth as group
 from zwidth.show.cli.options import MODELS
 
 COMMANDS = sorted(group.commands)

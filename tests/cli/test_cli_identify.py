@@ -11,9 +11,9 @@ import pytest
 import zwidth
 from tests.cli.command_runner import run_command
 from tests.identify.spring_bench import bench_record
-from zwidth.device.edit_file import edited_text
-from zwidth.show.cli.group import zwidth as group
-from zwidth.show.output import csv_text
+from zwidth.device import edited_text
+from zwidth.show import csv_text
+from zwidth.show import zwidth as group
 
 STIFFNESS = "mechanism.drives.motor-right.stiffness_Nm_per_rad"
 SPRING = {"forward": 0.45, "backward": 0.35, "friction": 0.003, "amplitude": 0.045}

@@ -17,7 +17,7 @@ from tests.cli.command_runner import (
 )
 from tests.cli.test_cli_docs import PAGE, keys
 from tests.paddle import LENGTH, paddle
-from zwidth.contact.harmonic_balance import limit_cycles
+from zwidth.contact import limit_cycles
 from zwidth.device.load import load
 
 LIMITED = ("--set", "loop.saturation.force_N=5")

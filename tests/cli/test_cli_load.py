@@ -10,7 +10,7 @@ from command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_
 
 import zwidth as package
 from tests.interruption import stopped_by_ctrl_c
-from zwidth.model.load import Load
+from zwidth.model import Load
 from zwidth.show.cli.load import LoadCommand
 
 FEW = ("--push", "4", "--count", "3")

@@ -13,8 +13,7 @@ from scipy.io import loadmat
 
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
 from zwidth.device.load import load
-from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.definition import STATUS
+from zwidth.measures import MEASURES, STATUS
 from zwidth.show.cli.options import EXTREMES
 from zwidth.study.workspace import extreme_direction
 

@@ -7,7 +7,7 @@ import pytest
 
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, document_of, refusal_lines, run_command
-from zwidth.contact.environments import ENVIRONMENTS
+from zwidth.contact import ENVIRONMENTS
 
 PLANE = ("--plane", "0,0.252,0,-1")
 PUSH = ("--push", "0,1", "--duration", 0.1)

@@ -12,8 +12,9 @@ import pytest
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of, refusal_lines, run_command
 from tests.systems import random_operator, reference_transition_matrix
-from zwidth.device.read import DEVICES, OPERATORS, bundled_names
-from zwidth.model.operator import Operator, attach
+from zwidth.device import OPERATORS, bundled_names
+from zwidth.device.read import DEVICES
+from zwidth.model import Operator, attach
 
 PAGE = (Path(__file__).parents[2] / "docs" / "operators.md").read_text(encoding="utf-8")
 ARM = """arm_mass_kg = 0.8

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from tests.cli.command_runner import MECHANISM, run_command
-from zwidth.show.output import OutputError, csv_text, destination, json_text, json_value, replacing, write_text
+from zwidth.show import OutputError, csv_text, json_text, json_value
+from zwidth.show.output import destination, replacing, write_text
 
 
 def test_json_is_strict_whatever_the_numbers_are():

@@ -6,7 +6,7 @@ import pytest
 from command_runner import MECHANISM, TWO_MASS, run_command
 
 import zwidth as package
-from zwidth.chart.chart import largest_stiffness
+from zwidth.chart import largest_stiffness
 
 
 def test_each_direction_is_the_chart_of_its_own():

@@ -9,8 +9,8 @@ from threading import Event
 import pytest
 
 from zwidth.progress import watched
+from zwidth.show import run
 from zwidth.show.cli import progress
-from zwidth.show.cli.main import run
 from zwidth.show.cli.progress import show_progress
 
 

@@ -13,9 +13,8 @@ import pytest
 from tests.cli.command_runner import refusal_lines, run_command
 from tests.interruption import HANG_TIMEOUT_S
 from tests.study.cluster_cases import running_cluster
+from zwidth.study import FolderLock, RecoveredWarning
 from zwidth.study.jobs import cluster as clusters
-from zwidth.study.jobs.executor import RecoveredWarning
-from zwidth.study.jobs.store_lock import FolderLock
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 
@@ -158,7 +157,7 @@ def test_a_scheduler_that_is_killed_leaves_the_finished_work(folder):
 
 
 def test_a_full_disk_is_one_line_and_what_is_done_is_kept(folder, monkeypatch):
-    from zwidth.study.jobs.store import Store
+    from zwidth.study import Store
 
     write, full = Store.write_batch, OSError(28, "No space left on device")
 

@@ -11,7 +11,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of, run_command
-from zwidth.device.load import bundled, load
+from zwidth.device import bundled
+from zwidth.device.load import load
 from zwidth.device.load import schema as device_schema
 
 NUMBERS = ("link_side_mass_kg", "motor_side_mass_kg", "rigid_mass_kg", "stiffness_N_per_m")

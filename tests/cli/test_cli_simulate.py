@@ -11,9 +11,8 @@ import pytest
 
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of, parse_strict_json, run_command
-from zwidth.contact.harmonic_balance import limit_cycles
-from zwidth.contact.time_response import SOURCES
-from zwidth.show.cli.simulate import SimulateCommand
+from zwidth.contact import SOURCES, limit_cycles
+from zwidth.show import SimulateCommand
 
 WALL = ("--stiffness", 4000, "--damping", 10)
 SOFT = ("--stiffness", 500, "--damping", 1)

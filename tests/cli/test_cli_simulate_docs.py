@@ -11,10 +11,9 @@ import pytest
 
 import zwidth as package
 from tests.cli.command_runner import document_of, run_command
-from zwidth.contact.harmonic_balance import limit_cycles
+from zwidth.contact import SOURCES, limit_cycles
 from zwidth.contact.motion_verdict import Behaviour
-from zwidth.contact.time_response import SOURCES
-from zwidth.show.cli.simulate import SimulateCommand
+from zwidth.show import SimulateCommand
 from zwidth.show.cli.simulation_page import BEHAVIOUR_VERDICTS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")

@@ -14,9 +14,7 @@ import xarray as xr
 
 from tests.cli.command_runner import document_of, parse_strict_json, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
-from zwidth.study.designs.study_file import read_study
-from zwidth.study.designs.sweep_job import sweep_job
-from zwidth.study.jobs.store import Store
+from zwidth.study import Store, read_study, sweep_job
 
 PAGE = (Path(__file__).parents[2] / "docs" / "studies.md").read_text(encoding="utf-8")
 ZWIDTH = Path(sys.executable).with_name("zwidth")
@@ -274,9 +272,10 @@ def test_the_page_s_python_runs(arms):
 
 
 def test_the_page_names_every_key():
+    from zwidth.study import StudyFile
     from zwidth.study.designs.column import STATISTICS
     from zwidth.study.designs.sampling import CIRCUMSTANCES
-    from zwidth.study.designs.study_schema import AxisSection, StudyFile, StudyWorkspaceSection, TieSection
+    from zwidth.study.designs.study_schema import AxisSection, StudyWorkspaceSection, TieSection
 
     for section in (StudyFile, AxisSection, TieSection, StudyWorkspaceSection):
         for key in section.model_fields:

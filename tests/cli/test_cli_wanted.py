@@ -7,8 +7,9 @@ import pytest
 
 import zwidth
 from tests.cli.command_runner import MECHANISM, document_of, refusal_lines, run_command
-from zwidth.measures.wanted import WANTED_NUMBERS, WantedWall, WantedWalls
-from zwidth.study.designs.study_schema import StudyFile
+from zwidth.measures import WantedWall
+from zwidth.measures.wanted import WANTED_NUMBERS, WantedWalls
+from zwidth.study import StudyFile
 
 FEW = ("--cells", "3,2", "--x", "-0.05,0.05", "--y", "0.2,0.25")
 MARGINS = ("--stiffness-margin", "0.1", "--damping-margin", "0.2", "--delay-margin", "0.5")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
 
 
 def one_mass(m, T, b=0.0, k=0.0, delay=0.0, velocity_filter=None):

@@ -10,15 +10,11 @@ import pytest
 from conditions.conditions_cases import devices, one_mass
 from systems import FEATURES, random_loop
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import judge
+from zwidth.chart import judge, stability_chart
 from zwidth.conditions import assumptions, compare
 from zwidth.device.load import load
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import AlphaBeta, LeastSquaresSlope, WindowedDifference
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.loop import AlphaBeta, Butterworth, Controller, FirstOrder, LeastSquaresSlope, Loop, WindowedDifference
+from zwidth.model import LaggedDamper, Operator, Plant, attach
 
 NAMES = [bound.name for bound in compare(one_mass(1.0, 0.001))]
 RIGID, FRICTION, LATE, DELAYED, SPRUNG, ONE_MODE = (

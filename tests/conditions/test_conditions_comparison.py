@@ -6,11 +6,10 @@ from math import isnan
 
 import pytest
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart import ChartError, stability_chart
 from zwidth.conditions import compare
 from zwidth.conditions.comparison import bounds_of, compare_bounds
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 
 FRICTION = {"coulomb_N": 0.2}
 ENCODER = {"encoder": {"resolution_m": 1e-5}}

@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 from conditions.conditions_cases import one_mass
 
-from zwidth.chart.chart import stability_chart
-from zwidth.conditions import assumptions, compare, gil, thesis_whole_delay
-from zwidth.conditions.comparison import exact_stiffness_limit
-from zwidth.loop.controller import Controller
-from zwidth.loop.fixed_feedback import Feedforward
+from zwidth.chart import stability_chart
+from zwidth.conditions import assumptions, compare, exact_stiffness_limit, gil, thesis_whole_delay
+from zwidth.loop import Controller, Feedforward
 
 PAGE = (Path(__file__).parents[2] / "docs" / "conditions.md").read_text(encoding="utf-8")
 LOOP = one_mass(1.0, 0.001, b=0.1)

@@ -7,10 +7,9 @@ import pytest
 import shapely
 from systems import published, random_loop
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.verdict import STABLE, judge
-from zwidth.conditions.comparison import exact_stiffness_limit
+from zwidth.chart import ChartError, judge, stability_chart
+from zwidth.chart.verdict import STABLE
+from zwidth.conditions import exact_stiffness_limit
 
 
 def stiffness_from_regions(chart, damping):

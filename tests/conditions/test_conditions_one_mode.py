@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from conditions.conditions_cases import devices, one_mass
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import STABLE, judge, spectral_radius
-from zwidth.conditions import colgate_schenkel, thesis_damped, thesis_flexible
+from zwidth.chart import judge, spectral_radius, stability_chart
+from zwidth.chart.verdict import STABLE
+from zwidth.conditions import colgate_schenkel, spring_stable, thesis_damped, thesis_flexible
 from zwidth.conditions.one_mode import one_mode
-from zwidth.conditions.spring_stability import spring_stable
 
 
 def random_modes(seed, count):

@@ -6,19 +6,22 @@ import numpy as np
 import pytest
 from conditions.conditions_cases import devices, one_mass
 
-from zwidth.chart.verdict import STABLE, judge
+from zwidth.chart import judge
+from zwidth.chart.verdict import STABLE
 from zwidth.conditions import colgate_schenkel, diolaiti
 from zwidth.conditions.passivity import passive_set
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import (
+from zwidth.loop import (
     AlphaBeta,
+    Butterworth,
     CentralDifference,
+    Controller,
+    FirstOrder,
     Kalman,
     LeastSquaresSlope,
+    Loop,
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.loop.loop import Loop
 
 ANGLES = np.linspace(0.0, np.pi, 20002)[1:]
 

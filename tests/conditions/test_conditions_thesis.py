@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from conditions.conditions_cases import devices, one_mass
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import STABLE, UNSTABLE, judge, spectral_radius
+from zwidth.chart import judge, spectral_radius, stability_chart
+from zwidth.chart.verdict import STABLE, UNSTABLE
 from zwidth.conditions import (
     gil,
     hulin,

@@ -16,9 +16,8 @@ from systems import mass, two_mass
 
 from zwidth.contact.environments import one_sided_wall, wall
 from zwidth.contact.simulate import simulate
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Friction, Nonlinear
+from zwidth.loop import Controller, Loop
+from zwidth.model import Friction, Nonlinear
 
 PAGE = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
+from zwidth.model import reduce_mechanism, solve_posture
 
 
 class FiveBarByMultipliers:

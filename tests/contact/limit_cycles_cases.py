@@ -11,9 +11,8 @@ import numba
 import numpy as np
 
 from tests.systems import held_step, mass, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.chart import stability_chart
+from zwidth.loop import Controller, Loop
 
 SUBSTEPS = 40
 

@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tests.contact.limit_cycles_cases import random_wall, vibration
+from zwidth.contact import Run, TimeResponse, limit_cycles, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.harmonic_balance import LimitCycle, limit_cycles
-from zwidth.contact.simulate import Run, simulate_batch
-from zwidth.contact.time_response import TimeResponse
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.contact.harmonic_balance import LimitCycle
+from zwidth.loop import Loop
+from zwidth.model import Counter, Friction, Nonlinear
 
 
 def with_nonlinearities(loop: Loop, *, coulomb: float = 0.0, step: float = 0.0, limit: float = np.inf) -> Loop:

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 from systems import StateSpaceBuilder, low_pass_sections, velocity_filter, velocity_weights
 
-from zwidth.loop.estimators import Kalman
+from zwidth.loop import Kalman
 
 LONG = np.longdouble
 

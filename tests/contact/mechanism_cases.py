@@ -14,11 +14,8 @@ from model.model_cases import (
     planar_inertia,
 )
 
-from zwidth.loop.controller import Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.damping import GivenDamping
-from zwidth.model.mechanism import DriveNonlinearity, Mechanism
-from zwidth.model.posture import solve_posture
+from zwidth.loop import Controller, OperatingPoint
+from zwidth.model import DriveNonlinearity, GivenDamping, Mechanism, solve_posture
 
 UNDAMPED = GivenDamping()
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from zwidth.contact.boundary_experiment import StableExtent, measure_edges, measure_tips
+from zwidth.contact import StableExtent, measure_edges, measure_tips
 from zwidth.contact.stability_trial import Observation
 
 NOT_LINEAR = SimpleNamespace(linear=False)

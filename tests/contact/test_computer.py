@@ -15,6 +15,7 @@ from contact.mechanism_cases import (
 )
 from scipy.signal import lfilter
 
+from zwidth.contact import normal
 from zwidth.contact.computer import (
     arrived_command,
     clip,
@@ -27,27 +28,24 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.environments import wall
-from zwidth.contact.noise import normal
 from zwidth.contact.simulate import simulate
-from zwidth.loop.controller import Butterworth, FirstOrder
-from zwidth.loop.estimators import (
+from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
+    Butterworth,
     CentralDifference,
+    FirstOrder,
     Foaw,
     Kalman,
     LeastSquaresSlope,
     Levant,
+    Loop,
     SavitzkyGolay,
     WindowedDifference,
+    velocity_of,
 )
-from zwidth.loop.estimators.run_estimator import velocity_of
-from zwidth.loop.loop import Loop
-from zwidth.model.damping import GivenDamping
+from zwidth.model import Counter, GivenDamping, Nonlinear, reduce_mechanism, solve_posture
 from zwidth.model.drive_nonlinearity import nonlinear_of_drives
-from zwidth.model.nonlinear import Counter, Nonlinear
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
 
 PERIOD = 1e-3
 FREE = wall.values(stiffness=0.0)

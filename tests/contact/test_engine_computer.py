@@ -12,16 +12,12 @@ from contact.engine_cases import friction_of, one_mass, run, two_mass_loop
 from contact.test_ledger import with_all_nonlinearities
 from systems import FEATURES, random_loop
 
+from zwidth.contact import Hand, Reflex, Run, simulate_batch
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.hand import Hand, Reflex
-from zwidth.contact.simulate import Run, simulate, simulate_batch
-from zwidth.loop.estimators import BackwardDifference, Foaw, LeastSquaresSlope, Levant, SavitzkyGolay
-from zwidth.loop.estimators.run_estimator import velocity_of
-from zwidth.loop.loop import Loop
+from zwidth.contact.simulate import simulate
+from zwidth.loop import BackwardDifference, Foaw, LeastSquaresSlope, Levant, Loop, SavitzkyGolay, velocity_of
 from zwidth.memory_limit import TooLarge
-from zwidth.model.nonlinear import Counter, Nonlinear
-from zwidth.model.operator import Operator
-from zwidth.model.plant import LaggedDamper
+from zwidth.model import Counter, LaggedDamper, Nonlinear, Operator
 
 MOTOR = np.array([0.0, 1.0])
 WALL = wall.values(stiffness=3000.0, damping=5.0)

@@ -13,10 +13,8 @@ from contact.engine_cases import (
     two_sided,
 )
 
-from zwidth.contact.hand import Hand
-from zwidth.contact.motion_verdict import dominant_frequency
-from zwidth.contact.time_response import SOURCES
-from zwidth.model.nonlinear import Brake, Counter, Nonlinear, Spring
+from zwidth.contact import SOURCES, Hand, dominant_frequency
+from zwidth.model import Brake, Counter, Nonlinear, Spring
 
 DRIVE, MOTOR = np.array([1.0, -1.0]), np.array([0.0, 1.0])
 INSIDE = ([1e-3, 1e-3], [0.0, 0.0])

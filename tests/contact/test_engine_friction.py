@@ -16,12 +16,11 @@ from contact.engine_cases import (
 )
 from systems import random_loop
 
+from zwidth.contact import SOURCES, Hand, Run, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.hand import Hand
-from zwidth.contact.simulate import Run, simulate, simulate_batch
-from zwidth.contact.time_response import SOURCES
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.contact.simulate import simulate
+from zwidth.loop import Loop
+from zwidth.model import Counter, Friction, Nonlinear
 
 FRICTION = SOURCES.index("friction")
 NO_WALL = wall.values(stiffness=0.0, damping=0.0)  # a wall that does nothing

@@ -6,13 +6,14 @@ from contact.engine_cases import random_stable_wall, run, spectral_radius, two_m
 from contact.matrix_power_reference import fine_readings
 from systems import FEATURES, random_loop
 
+from zwidth.contact import Run, judge_response, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.motion_verdict import judge_response
-from zwidth.contact.simulate import Run, simulate, simulate_batch
-from zwidth.loop.controller import Butterworth, FirstOrder
-from zwidth.loop.estimators import (
+from zwidth.contact.simulate import simulate
+from zwidth.loop import (
     AlphaBeta,
+    Butterworth,
     CentralDifference,
+    FirstOrder,
     Kalman,
     LeastSquaresSlope,
     SavitzkyGolay,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from zwidth.contact.environments import ENVIRONMENTS
+from zwidth.contact import ENVIRONMENTS
 
 STATELESS = ("wall", "one_sided_wall", "slot", "nonlinear_wall", "hunt_crossley", "texture", "grating")
 ONE_SIDED = ("one_sided_wall", "nonlinear_wall", "hunt_crossley", "friction_patch", "texture", "grating")

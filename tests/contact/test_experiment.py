@@ -10,24 +10,11 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.systems import FEATURES, mass, published, random_loop
-from zwidth.chart.verdict import spectral_radius
-from zwidth.contact.boundary_experiment import (
-    NoStableWallError,
-    SearchWindow,
-    StableExtent,
-    find_stable_walls,
-    measure_edges,
-    measure_tips,
-    tip_dampings,
-)
-from zwidth.contact.hand import Hand
-from zwidth.contact.stability_trial import StabilityTrial, TrialError, observe
-from zwidth.loop.controller import Controller
-from zwidth.loop.estimators.foaw import Foaw
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
+from zwidth.chart import spectral_radius
+from zwidth.contact import Hand, StabilityTrial, StableExtent, TrialError, measure_edges, measure_tips, observe
+from zwidth.contact.boundary_experiment import NoStableWallError, SearchWindow, find_stable_walls, tip_dampings
+from zwidth.loop import Controller, Foaw, Loop
+from zwidth.model import Counter, Friction, Nonlinear, Operator, Plant, attach
 
 ARM = Operator(0.8, 580.0, 5.5, 10000.0, 5.0)
 PUBLISHED = StableExtent(7133.87, 9.97, 25.0, True)

@@ -9,19 +9,22 @@ import pytest
 from systems import mass, two_mass
 
 from tests.control_apart import ControlledLoop, DoublePrecision, Memory, Period, random_controlled_loop
+from zwidth.contact import Hand, Reflex, Run, StabilityTrial, judge_response, observe, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.hand import Hand, Reflex
-from zwidth.contact.motion_verdict import judge_response
 from zwidth.contact.predict_limit_cycles import predict_limit_cycles
-from zwidth.contact.simulate import Run, simulate, simulate_batch
-from zwidth.contact.stability_trial import StabilityTrial, observe
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import FeedbackError
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
-from zwidth.model.operator import Operator
+from zwidth.contact.simulate import simulate
+from zwidth.loop import (
+    Butterworth,
+    Controller,
+    FeedbackError,
+    Feedforward,
+    FirstOrder,
+    ForceSensor,
+    LocalLoop,
+    Loop,
+    OperatingPoint,
+)
+from zwidth.model import Counter, Friction, Nonlinear, Operator
 
 T = 0.001
 KINDS = {

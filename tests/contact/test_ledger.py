@@ -8,14 +8,11 @@ from contact.engine_cases import EventSolver, friction_of, one_mass, run, two_ma
 from contact.test_engine_friction import random_friction
 from systems import FEATURES, random_loop
 
+from zwidth.contact import SOURCES, Hand, PassivityController, Run, Tremor, simulate_batch
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.hand import Hand, Tremor
-from zwidth.contact.passivity_controller import PassivityController
-from zwidth.contact.simulate import Run, simulate, simulate_batch
-from zwidth.contact.time_response import SOURCES
-from zwidth.loop.estimators import Foaw, Levant
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Brake, Counter, Nonlinear, Spring
+from zwidth.contact.simulate import simulate
+from zwidth.loop import Foaw, Levant, Loop
+from zwidth.model import Brake, Counter, Nonlinear, Spring
 
 MOTOR = np.array([0.0, 1.0])
 

@@ -7,25 +7,14 @@ import pytest
 
 from tests.contact.limit_cycles_cases import random_wall, recovery_limit, simulate, vibration
 from tests.systems import mass, random_loop
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import eigenvalues, judge
-from zwidth.contact import describing_functions
-from zwidth.contact.friction_quantisation_plane import (
-    BOTH,
-    LARGE,
-    PASSIVE,
-    SMALL,
-    device_plane,
-    plane_region,
-    quiet_limit,
-    resting_limit,
-)
-from zwidth.contact.harmonic_balance import harmonic_balance, limit_cycles
+from zwidth.chart import eigenvalues, judge, stability_chart
+from zwidth.contact import describing_functions, device_plane, limit_cycles, quiet_limit, resting_limit
+from zwidth.contact.friction_quantisation_plane import BOTH, LARGE, PASSIVE, SMALL, plane_region
+from zwidth.contact.harmonic_balance import harmonic_balance
 from zwidth.contact.quasi_linear import equivalent_loop
 from zwidth.contact.vibration_kernel import vibrations
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear, Spring
+from zwidth.loop import Controller, Loop
+from zwidth.model import Counter, Friction, Nonlinear, Spring
 
 ONE_MASS = Loop(mass(0.1, 0.1), Controller(0.001))  # stable up to 200 N/m
 

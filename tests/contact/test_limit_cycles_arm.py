@@ -7,12 +7,11 @@ import pytest
 import scipy.linalg
 
 from tests.systems import mass
-from zwidth.chart.verdict import eigenvalues
+from zwidth.chart import eigenvalues
 from zwidth.contact.describing_functions import coulomb_damper
 from zwidth.contact.harmonic_balance import harmonic_balance
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
 
 ARM = """
 name = "Arm on a bench"

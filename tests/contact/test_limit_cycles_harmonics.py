@@ -6,10 +6,8 @@ import pytest
 from tests.contact.limit_cycles_cases import random_wall, simulate, vibration
 from tests.contact.limit_cycles_study import simulate_cycle, with_nonlinearities
 from tests.systems import mass
-from zwidth.contact.harmonic_balance import limit_cycles
-from zwidth.contact.harmonics import with_harmonics
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.contact import limit_cycles, with_harmonics
+from zwidth.loop import Controller, Loop
 
 SEED, DEVICES = 11, 7
 

@@ -12,7 +12,7 @@ from tests.contact.limit_cycles_study import (
     quantised_cycles,
     saturated_cycles,
 )
-from zwidth.contact.harmonics import with_harmonics
+from zwidth.contact import with_harmonics
 
 PAGE = " ".join((Path(__file__).parents[2] / "docs" / "limit-cycles.md").read_text(encoding="utf-8").split())
 

@@ -8,16 +8,12 @@ import pytest
 
 from tests.contact.mechanism_cases import with_friction
 from tests.model.model_cases import five_bar
-from zwidth.contact.environments import ENVIRONMENTS, wall
+from zwidth.contact import ENVIRONMENTS, ContactArgumentError
+from zwidth.contact.environments import wall
 from zwidth.contact.environments.pressed_wall import pressed_wall
 from zwidth.contact.simulate import simulate
-from zwidth.contact.simulate_contact import ContactArgumentError
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import FeedbackError
-from zwidth.model.damping import ModalDamping
-from zwidth.model.load import Load
-from zwidth.model.posture import solve_posture
+from zwidth.loop import Butterworth, Controller, FeedbackError, OperatingPoint
+from zwidth.model import Load, ModalDamping, solve_posture
 
 COUNTED = five_bar()
 FIVE_BAR = replace(COUNTED, drives=replace(COUNTED.drives, encoder_counts=np.full(2, np.nan)))

@@ -14,16 +14,10 @@ from contact.mechanism_cases import (
 from model.model_cases import rotation_about
 
 import zwidth
-from zwidth.contact.mechanism.motion_inputs import MotionError
-from zwidth.contact.mechanism.surface_reach import SurfaceOutOfReach
-from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
-from zwidth.contact.mechanism.walls import SurfaceWall
-from zwidth.loop.controller import FirstOrder
-from zwidth.loop.estimators import BackwardDifference, Foaw, Kalman, Levant, WindowedDifference
-from zwidth.loop.estimators.run_estimator import velocity_of
+from zwidth.contact import Box, MotionError, Plane, Sphere, SurfaceOutOfReach, SurfaceWall, depth_and_normal
+from zwidth.loop import BackwardDifference, FirstOrder, Foaw, Kalman, Levant, WindowedDifference, velocity_of
 from zwidth.memory_limit import TooLarge
-from zwidth.model.damping import ModalDamping
-from zwidth.model.posture import solve_posture
+from zwidth.model import ModalDamping, solve_posture
 
 FIVE_BAR, DAMPED = uncoupled_five_bar(), ModalDamping(0.05)
 INTO = Plane((0.0, 0.26), (0.0, -1.0))

@@ -15,18 +15,22 @@ from contact.mechanism_cases import (
 )
 from systems import random_controller, random_method
 
-from zwidth.contact.environments import ENVIRONMENTS, Parameter, environment
-from zwidth.contact.hand import Hand
-from zwidth.contact.mechanism.motion_inputs import MotionError
-from zwidth.contact.mechanism.surfaces import Box, Plane, Sphere, depth_and_normal
-from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
+from zwidth.contact import (
+    ENVIRONMENTS,
+    Box,
+    Hand,
+    MotionError,
+    Parameter,
+    Plane,
+    Sphere,
+    SurfaceEnvironment,
+    SurfaceWall,
+    depth_and_normal,
+)
+from zwidth.contact.environments import environment
 from zwidth.contact.simulate import simulate
-from zwidth.loop.controller import Butterworth
-from zwidth.loop.estimators import Foaw, Levant
-from zwidth.loop.loop import Loop
-from zwidth.model.damping import ModalDamping
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
+from zwidth.loop import Butterworth, Foaw, Levant, Loop
+from zwidth.model import ModalDamping, reduce_mechanism, solve_posture
 
 ALONG = np.array([0.0, 1.0, 0.0])
 LENGTH = 1e5  # m, of an arm whose handle goes straight over some millimetres, to 1e-15 of them

@@ -14,7 +14,7 @@ from contact.mechanism_cases import (
 from model.model_cases import spatial_arm
 from scipy.integrate import solve_ivp
 
-from zwidth.model.damping import ModalDamping
+from zwidth.model import ModalDamping
 
 LEVEL = 1e-3  # N m at the motor; 0.01 N m at the joint
 JOINT_LEVEL, LINK, ROTOR, LENGTH = 10.0 * LEVEL, 0.002, 1e-4, 0.1

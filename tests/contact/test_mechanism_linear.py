@@ -6,13 +6,9 @@ from contact.mechanism_cases import motion_of, sampled_controller, uncoupled_fiv
 from model.model_cases import KINDS
 from scipy.linalg import expm
 
-from zwidth.contact.mechanism.surfaces import Plane
-from zwidth.contact.mechanism.walls import SurfaceWall
-from zwidth.loop.controller import Butterworth, FirstOrder
-from zwidth.loop.loop import Loop
-from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
+from zwidth.contact import Plane, SurfaceWall
+from zwidth.loop import Butterworth, FirstOrder, Loop
+from zwidth.model import GivenDamping, ModalDamping, ProportionalDamping, reduce_mechanism, solve_posture
 
 SPEED = 1e-6  # m/s
 

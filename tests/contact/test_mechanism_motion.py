@@ -19,12 +19,8 @@ from contact.mechanism_cases import (
 from model.model_cases import KINDS, five_bar, random_five_bar, some_postures, spatial_arm
 from model.model_engines import mjcf
 
-from zwidth.contact.mechanism.surfaces import Plane, Sphere
-from zwidth.contact.mechanism.walls import SurfaceWall
-from zwidth.model.bias import bias_batch
-from zwidth.model.damping import ModalDamping
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.posture import link_points, solve_posture
+from zwidth.contact import Plane, Sphere, SurfaceWall
+from zwidth.model import ModalDamping, bias_batch, link_points, pack, solve_posture
 
 GRAVITY = np.array([1.3, -9.2, 2.8])
 

@@ -8,8 +8,8 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
-from zwidth.contact.mechanism.motion_inputs import MotionError
-from zwidth.device.load import from_document
+from zwidth.contact import MotionError
+from zwidth.device import from_document
 from zwidth.device.new_device import new_device
 
 ARM = {

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from contact.engine_cases import EventSolver, ReflexSpring, friction_of, one_mass, one_sided, run, two_mass_loop
 
+from zwidth.contact import Hand, Reach, Reflex, Tremor
 from zwidth.contact.environments import wall
-from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
 from zwidth.contact.simulate import simulate
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Nonlinear
-from zwidth.model.operator import Operator, attach
+from zwidth.loop import Loop
+from zwidth.model import Nonlinear, Operator, attach
 
 GRASPED = Operator(0.8, 580.0, 5.5, 10000.0, 5.0)
 RIGID = Operator(0.8, 580.0, 5.5)

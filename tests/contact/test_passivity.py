@@ -5,14 +5,8 @@ from math import exp, inf, nan
 import numpy as np
 import pytest
 
-from zwidth.contact.environments import ENVIRONMENTS
-from zwidth.contact.passivity_controller import (
-    ENERGY,
-    PASSIVITY_MEMORY,
-    PassivityController,
-    passivity_force,
-    rendered_stiffness,
-)
+from zwidth.contact import ENVIRONMENTS, PassivityController
+from zwidth.contact.passivity_controller import ENERGY, PASSIVITY_MEMORY, passivity_force, rendered_stiffness
 
 SPRING, TOUCHED = ENVIRONMENTS["wall"], ENVIRONMENTS["one_sided_wall"]
 

@@ -11,22 +11,20 @@ from systems import mass
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
-from zwidth.contact.friction_quantisation_plane import quiet_limit, resting_limit
-from zwidth.contact.limit_cycle_answer import answered_cycles
-from zwidth.contact.motion_verdict import judge_response
-from zwidth.contact.predict_limit_cycles import (
+from zwidth.contact import (
+    SOURCES,
     NoEncoderStepsError,
     NothingNonlinearError,
-    behaviour_at_the_end,
-    largest_motion,
-    predict_limit_cycles,
+    TimeResponse,
+    judge_response,
+    quiet_limit,
+    resting_limit,
 )
-from zwidth.contact.time_response import SOURCES, TimeResponse
-from zwidth.loop.controller import Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sections import HysteresisError
-from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear
-from zwidth.show.output import json_value
+from zwidth.contact.limit_cycle_answer import answered_cycles
+from zwidth.contact.predict_limit_cycles import behaviour_at_the_end, largest_motion, predict_limit_cycles
+from zwidth.loop import Controller, HysteresisError, OperatingPoint
+from zwidth.model import Brake, Counter, Friction, Nonlinear
+from zwidth.show import json_value
 
 ONE = np.ones(1)
 ROUGH = ("loop.encoder.resolution_m=2e-5", "friction.coulomb_N=0.03")

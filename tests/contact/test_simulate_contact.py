@@ -12,20 +12,24 @@ from systems import mass, random_loop
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
-from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.verdict import spectral_radius
-from zwidth.contact.contact_arguments import ContactArgumentError, OutOfWorkspaceError
-from zwidth.contact.environments.environment import environment
+from zwidth.chart import largest_stiffness, spectral_radius
+from zwidth.contact import (
+    ContactArgumentError,
+    Hand,
+    NoForceError,
+    OutOfWorkspaceError,
+    Reach,
+    Reflex,
+    Tremor,
+    environment,
+)
 from zwidth.contact.environments.slot import slot
-from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
 from zwidth.contact.run_length import bound_of_run, lengthened, needed_substeps, run_length
-from zwidth.contact.simulate_contact import NoForceError, simulate_contact
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.contact.simulate_contact import simulate_contact
+from zwidth.loop import Controller, Loop, OperatingPoint
 from zwidth.memory_limit import TooLarge
-from zwidth.model.nonlinear import Friction, Nonlinear
-from zwidth.show.output import json_value
+from zwidth.model import Friction, Nonlinear
+from zwidth.show import json_value
 
 SERIES = ("time", "position", "penetration", "velocity", "force", "handle", "energy")
 

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.contact.touch_numbers import touch_numbers, touch_obstacle
-from zwidth.device.load import from_document
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.contact import touch_obstacle
+from zwidth.contact.touch_numbers import touch_numbers
+from zwidth.device import from_document
+from zwidth.loop import OperatingPoint
 
 
 def two_masses(**tables: dict[str, Any]) -> OperatingPoint:

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 from contact.touch_cases import in_python, random_loop, random_touch, same_bits
 
+from zwidth.contact import OUTPUTS, Hand, normal, touch, touch_obstacle
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.hand import Hand
-from zwidth.contact.noise import normal
 from zwidth.contact.simulate import simulate
-from zwidth.contact.touch_numbers import touch_numbers, touch_obstacle
-from zwidth.contact.touch_step import FREE, ONE_SIDED, OUTPUTS, touch
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.low_pass import FirstOrder
-from zwidth.model.operator import Operator
-from zwidth.model.plant import Plant
+from zwidth.contact.touch_numbers import touch_numbers
+from zwidth.contact.touch_step import FREE, ONE_SIDED
+from zwidth.loop import Controller, FirstOrder, Loop
+from zwidth.model import Operator, Plant
 
 S, SEED = 400, 3
 

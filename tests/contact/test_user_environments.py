@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from zwidth.compiled import compiled
-from zwidth.contact.environments import ENVIRONMENTS, Environment, Parameter, environment, load_environment
+from zwidth.contact import ENVIRONMENTS, Environment, Parameter, load_environment
+from zwidth.contact.environments import environment
 from zwidth.contact.environments.environment import environment_at
 
 HEAD = "from zwidth.contact.environments import Parameter, environment\n"

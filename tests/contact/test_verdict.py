@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from contact.engine_cases import friction_of, one_mass, run, two_mass_loop
 
-from zwidth.contact.hand import Hand
-from zwidth.contact.motion_verdict import dominant_frequency, judge_response
-from zwidth.model.nonlinear import Counter, Nonlinear
+from zwidth.contact import Hand, dominant_frequency, judge_response
+from zwidth.model import Counter, Nonlinear
 
 MOTOR = np.array([0.0, 1.0])
 FRICTION_AND_ENCODER = Nonlinear(friction=(friction_of(0.1),), counters=(Counter(MOTOR, 1e-5),))

@@ -2,15 +2,10 @@
 
 import numpy as np
 
+from zwidth.contact import OUTPUTS, touch_periods
 from zwidth.contact.touch_numbers import touch_numbers
-from zwidth.contact.touch_step import OUTPUTS, touch_periods
-from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import LeastSquaresSlope
-from zwidth.loop.loop import Loop
-from zwidth.loop.low_pass import Butterworth, FirstOrder
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
-from zwidth.model.operator import Operator
-from zwidth.model.plant import Plant
+from zwidth.loop import Butterworth, Controller, FirstOrder, LeastSquaresSlope, Loop
+from zwidth.model import Counter, Friction, Nonlinear, Operator, Plant
 
 
 def random_loop(rng, frictions):

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from zwidth.device.faults import DeviceError, Fault
-from zwidth.device.load import from_document
+from zwidth.device import DeviceError, from_document
+from zwidth.device.faults import Fault
 
 PLANT_FILE = """
 name = "two masses"

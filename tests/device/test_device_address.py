@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
-from zwidth.device import address
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document, load
-from zwidth.device.read import bundled_names, read
-from zwidth.loop.controller import Butterworth, FirstOrder
+from zwidth.device import DeviceError, address, bundled_names, from_document
+from zwidth.device.load import load
+from zwidth.device.read import read
+from zwidth.loop import Butterworth, FirstOrder
 
 
 def error_message(setting: str, text: str = ARM_FILE) -> str:

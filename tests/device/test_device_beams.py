@@ -22,12 +22,10 @@ from tests.model.beam_devices import (
     with_beams,
     without_beams,
 )
-from zwidth.device.load import from_document, load
-from zwidth.device.plausibility import implausible
-from zwidth.device.read import bundled_names
-from zwidth.loop.loop import Loop
-from zwidth.model.load import Load
-from zwidth.model.plant import Plant
+from zwidth.device import bundled_names, from_document, implausible
+from zwidth.device.load import load
+from zwidth.loop import Loop
+from zwidth.model import Load, Plant
 
 UPPER, LOWER = "mechanism.links.upper", "mechanism.links.lower"
 GIVEN = numbers([3.0, 2.0], 0.1)

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from zwidth.device import unsupported
-from zwidth.device.load import from_document
+from zwidth.device import from_document, unsupported
 from zwidth.device.schema import device_file as schema
 
 PAGE = (Path(__file__).parents[2] / "docs" / "device-files.md").read_text(encoding="utf-8")

@@ -8,9 +8,8 @@ from datetime import date
 import pytest
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, REMOVED, faults, with_changes
-from zwidth.chart.chart import largest_stiffness
-from zwidth.device.device import Device
-from zwidth.device.load import from_document
+from zwidth.chart import largest_stiffness
+from zwidth.device import Device, from_document
 from zwidth.device.schema.magnitudes import HEAVIEST, LIGHTEST
 
 NAN, INF = float("nan"), float("inf")

@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device.faults import DeviceError
-from zwidth.loop.controller import Butterworth, FirstOrder
-from zwidth.loop.estimators import BackwardDifference, Kalman, WindowedDifference
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.loop.point_errors import OperatingPointError
-from zwidth.show.circumstances import computer_text
+from zwidth.device import DeviceError
+from zwidth.loop import (
+    BackwardDifference,
+    Butterworth,
+    Feedforward,
+    FirstOrder,
+    ForceSensor,
+    Kalman,
+    LocalLoop,
+    Loop,
+    OperatingPointError,
+    WindowedDifference,
+)
+from zwidth.show import computer_text
 
 LOW_PASS = {"type": "butterworth", "order": 2, "cutoff_Hz": 50.0}
 SLOW = {"type": "first-order", "time_constant_s": 0.002}

@@ -9,10 +9,10 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwidth.device import address
-from zwidth.device.faults import DeviceError, one_line
-from zwidth.device.load import from_document, load
-from zwidth.device.read import bundled_names, read
+from zwidth.device import DeviceError, address, bundled_names, from_document
+from zwidth.device.faults import one_line
+from zwidth.device.load import load
+from zwidth.device.read import read
 
 junk = st.recursive(
     st.none()

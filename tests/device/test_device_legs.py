@@ -13,12 +13,11 @@ from scipy.spatial.transform import Rotation
 
 import zwidth
 from tests.device.device_cases import faults
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 from zwidth.device.new_device import new_device
-from zwidth.measures.definition import BEYOND_LIMIT, OUT_OF_REACH
-from zwidth.model import handle_position
-from zwidth.model.posture import BeyondLimit, OutOfReach, solve_posture
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import BEYOND_LIMIT, OUT_OF_REACH
+from zwidth.model import BeyondLimit, OutOfReach, handle_position, solve_posture
+from zwidth.study import plane_of
 
 DELTA = tomllib.loads(new_device("Delta", "delta"))
 PLACES = np.array([[0.0, 0.0, -0.12], [0.01, 0.02, -0.13], [-0.02, 0.01, -0.115]])

@@ -10,26 +10,26 @@ import pytest
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, REMOVED, faults, with_changes
 from tests.systems import reference_transition_matrix
-from zwidth.chart.verdict import eigenvalues
-from zwidth.device import address
-from zwidth.device.load import from_document
+from zwidth.chart import eigenvalues
+from zwidth.device import address, from_document
 from zwidth.device.schema import device_file as schema
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import (
-    METHODS,
+from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
+    Butterworth,
     CentralDifference,
+    Controller,
+    FirstOrder,
     Foaw,
     Kalman,
     LeastSquaresSlope,
     Levant,
+    Loop,
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import LaggedDamper
+from zwidth.loop.estimators import METHODS
+from zwidth.model import LaggedDamper, Operator, attach
 
 NO_FILTER = {"loop__velocity__filter": REMOVED}
 VELOCITIES = {

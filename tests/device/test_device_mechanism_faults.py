@@ -8,9 +8,8 @@ import re
 import pytest
 
 from tests.device.device_cases import ARM_FILE, REMOVED, faults, with_changes
-from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document, load
+from zwidth.device import Device, DeviceError, from_document
+from zwidth.device.load import load
 
 NAN = float("nan")
 

@@ -9,9 +9,9 @@ import pytest
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, faults, with_changes
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
-from zwidth.device import address
-from zwidth.device.load import from_document, load
-from zwidth.loop.estimators import Kalman
+from zwidth.device import address, from_document
+from zwidth.device.load import load
+from zwidth.loop import Kalman
 
 INF = math.inf
 ONE = {"plant": {"mass_kg": 0.1}, "name": "m", "loop": {"sampling_period_s": 0.001}}

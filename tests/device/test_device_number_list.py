@@ -13,12 +13,8 @@ import pytest
 
 import zwidth
 from tests.frozen.devices import random_devices
-from zwidth.device import address
-from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
-from zwidth.device.numbers import DeviceNumber, device_numbers, unchangeable
-from zwidth.device.read import bundled
+from zwidth.device import Device, DeviceError, DeviceNumber, address, bundled, device_numbers, from_document
+from zwidth.device.numbers import unchangeable
 
 RANDOM = {one.word: one.files for one in random_devices() if one.kind in ("plant", "mechanism") and one.files}
 OWN_LIMIT = re.compile(r"must be (a (whole )?number|(at least|at most|greater than|less than) -?\d)")

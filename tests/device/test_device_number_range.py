@@ -10,12 +10,8 @@ from typing import Any
 import pytest
 
 import zwidth
-from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
+from zwidth.device import Device, DeviceError, DeviceNumber, bundled, device_numbers, from_document
 from zwidth.device.number_range import typical_size
-from zwidth.device.numbers import DeviceNumber, device_numbers
-from zwidth.device.read import bundled
 
 NAMES = [name for name, *_ in bundled()]
 MASS = "plant.mass_kg.0.1"

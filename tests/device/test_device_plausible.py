@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from tests.cli.command_runner import run_command
-from zwidth.device.load import bundled, from_document, load
-from zwidth.device.plausibility import ImplausibleNumber, implausible
-from zwidth.model.response import Response
-from zwidth.study.designs.study_file import study_of
+from zwidth.device import bundled, from_document, implausible
+from zwidth.device.load import load
+from zwidth.device.plausibility import ImplausibleNumber
+from zwidth.model import Response
+from zwidth.study import study_of
 
 PADDLE = """
 name = "Paddle"

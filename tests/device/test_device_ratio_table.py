@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.device.device_cases import ARM_FILE, REMOVED, faults, with_changes
+from zwidth.device import DeviceError, from_document
 from zwidth.device.design_batch import design_batch
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
 from zwidth.device.new_device import new_device
-from zwidth.model.posture import BEYOND_LIMIT, OK, BeyondLimit
+from zwidth.model import OK, BeyondLimit
+from zwidth.model.posture import BEYOND_LIMIT
 
 RATIO, TABLE = "mechanism__drives__0__transmission_ratio", "mechanism__drives__0__ratio_table"
 LIMITS = "mechanism__links__0__limits_rad"

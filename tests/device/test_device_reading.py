@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import bundled, load
+from zwidth.device import DeviceError, bundled
+from zwidth.device.load import load
 from zwidth.device.read import LARGEST_FILE, parse_document
 from zwidth.device.text_file import UnreadableFileError, decode
 

@@ -10,12 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
-from zwidth.device import address, build_mechanism
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import bundled, from_document, load
-from zwidth.device.read import bundled_names, read
+from zwidth.device import DeviceError, address, build_mechanism, bundled, bundled_names, from_document
+from zwidth.device.load import load
+from zwidth.device.read import read
+from zwidth.model import pack
 from zwidth.model.joint_space import joint_mass_matrix
-from zwidth.model.mechanism_arrays import pack
 
 
 @pytest.mark.parametrize("name", bundled_names())
@@ -224,7 +223,7 @@ def test_a_direction_may_have_any_length(direction, unit):
 @pytest.mark.parametrize("settings", [["reference.position_m=[0.34, 0.34]", "workspace=unset"], []])
 def test_a_posture_out_of_reach_is_no_fault_of_the_file(settings):
     """It loads: other postures may be asked for. The posture asked for has no answer."""
-    from zwidth.model.posture import OutOfReach
+    from zwidth.model import OutOfReach
 
     device = load("five-bar", settings)
     with pytest.raises(OutOfReach):
@@ -233,7 +232,7 @@ def test_a_posture_out_of_reach_is_no_fault_of_the_file(settings):
 
 def test_arms_that_lie_on_each_other_are_not_driven():
     """With the base joints in one place and both elbows on one side the drives turn the arms as one."""
-    from zwidth.model.posture import Singular
+    from zwidth.model import Singular
 
     with pytest.raises(Singular, match="do not determine the other joints"):
         load("five-bar").at(assembly="elbows-left")

@@ -7,9 +7,7 @@ from copy import deepcopy
 
 import pytest
 
-from zwidth.device import address
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
+from zwidth.device import DeviceError, address, from_document
 from zwidth.device.read import read
 
 

@@ -13,13 +13,10 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.model.model_engines import ask_mujoco, ask_pinocchio
+from zwidth.device import bundled_names, from_document
 from zwidth.device.legs import written
-from zwidth.device.load import from_document
-from zwidth.device.read import bundled_names, read
-from zwidth.model.mechanism import PRISMATIC
-from zwidth.model.modes import natural_frequencies
-from zwidth.model.posture import inertia_terms
-from zwidth.model.posture_failure import PostureError
+from zwidth.device.read import read
+from zwidth.model import PRISMATIC, PostureError, inertia_terms, natural_frequencies
 
 MECHANISMS = [name for name in bundled_names() if "mechanism" in read(name)[0]]
 POSTURES = 5

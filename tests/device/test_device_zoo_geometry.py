@@ -10,8 +10,8 @@ import pytest
 
 import zwidth
 from tests.cli.command_runner import run_command
-from zwidth.device.read import bundled_names
-from zwidth.loop.point_errors import MissingNumbersError
+from zwidth.device import bundled_names
+from zwidth.loop import MissingNumbersError
 
 GEOMETRY = [name for name in bundled_names() if zwidth.load(name).missing.get("dynamics")]
 WITH_WORKSPACE = [name for name in GEOMETRY if np.isfinite(zwidth.load(name).mechanism.workspace[:2]).all()]

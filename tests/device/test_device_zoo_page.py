@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.lazy_module import LazyModule
+from zwidth.device import bundled_names
 from zwidth.device.load import load
-from zwidth.device.read import bundled_names
 
 make_zoo = LazyModule("docs.make_zoo")
 

@@ -7,8 +7,7 @@ import difflib
 import pytest
 
 import zwidth
-from zwidth.device.edit_file import edited_text
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError, edited_text
 
 TEXT = """\
 # A device of mine.

@@ -8,16 +8,11 @@ import numpy as np
 import pytest
 
 from zwidth import __version__
-from zwidth.device import address
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError, address, from_document
 from zwidth.device.format_version import STORE_VERSION
-from zwidth.device.load import from_document, load, schema
+from zwidth.device.load import load, schema
 from zwidth.device.operator_choice import operator_table
-from zwidth.study.designs.study_file import read_study
-from zwidth.study.designs.study_schema import StudyFile
-from zwidth.study.jobs.job import CellValues
-from zwidth.study.jobs.journal import Journal, JournalError, fingerprint
-from zwidth.study.jobs.store import Store, StoreError
+from zwidth.study import CellValues, Journal, JournalError, Store, StoreError, StudyFile, fingerprint, read_study
 
 DEVICE = 'name = "m"\n{}\n[plant]\nmass_kg = 0.1\n{}\n[loop]\nsampling_period_s = 0.001\n'
 AXIS = '[[axis]]\nkey = "loop.delay_samples"\nvalues = [0]\n'

@@ -8,10 +8,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from zwidth.device.load import from_document
+from zwidth.device import bundled_names, from_document, implausible
 from zwidth.device.new_device import KINDS, new_device
-from zwidth.device.plausibility import implausible
-from zwidth.device.read import bundled_names
 
 OPTIONAL = re.compile(r"^#(?=[a-z\[])", re.MULTILINE)
 UNIT = re.compile(r"\w+?_(kg_m2|kg|m|s|N|rad|samples|Nm|N_per_m|Ns_per_m|Nm_per_rad|Nm_per_A) =")

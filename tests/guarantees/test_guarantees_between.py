@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from tests.measured_handle_cases import AT_SENSOR, COLLOCATED, EVERY, RECIPROCAL, frequencies, measured_device
-from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.chart import MeasuredLoop
+from zwidth.guarantees import passive_region
 from zwidth.guarantees.between_frequencies import BETWEEN, CubicPieces
 from zwidth.guarantees.measured import measured_passive_region
-from zwidth.guarantees.passive import passive_region
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
 from zwidth.loop.measured.measured_port import measured_port
-from zwidth.model.plant import Plant
-from zwidth.model.response import ResponseError
+from zwidth.model import Plant, ResponseError
 
 # What a promise may exceed the exact one by: the data themselves are fitted modes beyond half the sampling rate.
 # Of 16 devices of up to three masses one, measured at 60 frequencies, exceeds it by more than 1e-5, by 1.9e-5.

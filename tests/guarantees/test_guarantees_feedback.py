@@ -9,16 +9,21 @@ import pytest
 import shapely
 from systems import mass, random_operator, two_mass
 
+from zwidth.guarantees import find_guarantees, guarantees_of, passive_region
 from zwidth.guarantees.disks import Aliases
-from zwidth.guarantees.loop_guarantees import find_guarantees, guarantees_of
-from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import port
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.feedback_response import feedforward_response
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.operator import attach
+from zwidth.loop import (
+    Butterworth,
+    Controller,
+    Feedforward,
+    FirstOrder,
+    ForceSensor,
+    LocalLoop,
+    Loop,
+    OperatingPoint,
+    feedforward_response,
+)
+from zwidth.model import attach
 
 T = 0.001
 SMALL = Feedforward(0.002, 0.1, velocity_filter=FirstOrder(0.001), acceleration_filter=FirstOrder(0.002))

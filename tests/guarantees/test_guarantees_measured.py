@@ -9,12 +9,9 @@ import pytest
 
 from tests import systems
 from tests.measured_handle_cases import COLLOCATED, RECIPROCAL, frequencies, measured_device
-from zwidth.guarantees.passive import passive_region
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.plant import Plant
-from zwidth.model.response import ResponseError
+from zwidth.guarantees import passive_region
+from zwidth.loop import Controller, Loop, OperatingPoint
+from zwidth.model import Plant, ResponseError
 
 T = 0.00125
 PLANT = systems.published().plant

@@ -15,18 +15,14 @@ from scipy.optimize import minimize_scalar
 from tests.frozen.devices import random_devices
 from tests.guarantees.test_guarantees_passive import random_device, random_operator
 from tests.systems import mass, published
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.robust.instability import unstable
-from zwidth.chart.verdict import spectral_radius
+from zwidth.chart import ChartError, spectral_radius, unstable
 from zwidth.device.load import load
-from zwidth.guarantees.coupling import coupling_angles, coupling_region, couplings, softest_limit
-from zwidth.guarantees.loop_guarantees import find_guarantees
-from zwidth.guarantees.spring_family import SpringFamily
-from zwidth.guarantees.spring_stable import nyquist_spring, spring_stable_region
+from zwidth.guarantees import SpringFamily, couplings, find_guarantees, spring_stable_region
+from zwidth.guarantees.coupling import coupling_angles, coupling_region, softest_limit
+from zwidth.guarantees.spring_stable import nyquist_spring
 from zwidth.guarantees.two_port import allows, coupling_impedance, llewellyn_demand, sampled_demand
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
 
 ONE = np.ones(1)
 M, DRAG, T = 0.03, 1.0, 0.001

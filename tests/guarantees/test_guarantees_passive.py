@@ -9,16 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.systems import mass, published, random_controller, random_plant, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import spectral_radius
-from zwidth.guarantees.disks import force_filter_response, response_disks
+from zwidth.chart import spectral_radius, stability_chart
+from zwidth.guarantees import passive_region, response_disks
+from zwidth.guarantees.disks import force_filter_response
 from zwidth.guarantees.gauge import gauge
-from zwidth.guarantees.passive import passive_region
 from zwidth.guarantees.port import port, port_response
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import LeastSquaresSlope
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.loop import Butterworth, Controller, FirstOrder, LeastSquaresSlope, Loop
+from zwidth.model import LaggedDamper, Plant
 
 ONE = np.ones(1)
 

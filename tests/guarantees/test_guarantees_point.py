@@ -6,8 +6,8 @@ from math import inf, isinf, isnan
 
 import pytest
 
-from zwidth.device.load import from_document
-from zwidth.guarantees.loop_guarantees import guarantees_of
+from zwidth.device import from_document
+from zwidth.guarantees import guarantees_of
 from zwidth.guarantees.region import empty_region
 
 WITH_HANDLE = {"mass_kg": 0.03, "damping_Ns_per_m": 1.0, "handle": 1.0}

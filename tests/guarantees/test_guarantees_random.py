@@ -10,19 +10,20 @@ import pytest
 from tests.guarantees.test_guarantees_nested import scaled
 from tests.guarantees.test_guarantees_passive import random_operator, resonators_at
 from tests.systems import random_controller, random_method, random_plant
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.robust.instability import unstable
-from zwidth.chart.verdict import UNSTABLE, eigenvalues, judge
-from zwidth.guarantees.disks import response_disks
+from zwidth.chart import ChartError, eigenvalues, judge, stability_chart, unstable
+from zwidth.chart.verdict import UNSTABLE
+from zwidth.guarantees import (
+    SpringFamily,
+    passive_region,
+    response_disks,
+    spring_stable_region,
+    without_idle_motions,
+)
 from zwidth.guarantees.gauge import gauge
-from zwidth.guarantees.passive import passive_region
-from zwidth.guarantees.port import port, without_idle_motions
-from zwidth.guarantees.spring_family import SpringFamily, spring_for
-from zwidth.guarantees.spring_stable import spring_stable_region
-from zwidth.loop.controller import Butterworth
-from zwidth.loop.loop import Loop
-from zwidth.model.modes import undamped_modes
+from zwidth.guarantees.port import port
+from zwidth.guarantees.spring_family import spring_for
+from zwidth.loop import Butterworth, Loop
+from zwidth.model import undamped_modes
 
 # Walls are taken this share nearer to K = B = 0 than the outline has them.
 INSIDE = 1e-6

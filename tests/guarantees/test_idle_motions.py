@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.guarantees.passive import passive_region
-from zwidth.guarantees.port import _coupled_response, _modal_response, port, without_idle_motions
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.guarantees import passive_region, without_idle_motions
+from zwidth.guarantees.port import _coupled_response, _modal_response, port
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
 
 T = 1e-3
 

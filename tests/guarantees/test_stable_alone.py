@@ -9,16 +9,13 @@ import numpy as np
 import pytest
 
 from tests import study_sizes
-from zwidth.device.load import from_document, load
-from zwidth.guarantees.coupling import couplings
-from zwidth.guarantees.loop_guarantees import find_guarantees, guarantees_of
-from zwidth.guarantees.passive import passive_region
-from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.guarantees import couplings, find_guarantees, guarantees_of, passive_region, spring_stable_region
+from zwidth.guarantees.spring_stable import nyquist_region
 from zwidth.guarantees.stable_alone import stable_alone
-from zwidth.loop.controller import Controller
-from zwidth.loop.fixed_feedback import Feedforward, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.loop import Controller, Feedforward, LocalLoop, Loop
+from zwidth.model import LaggedDamper, Plant
 
 T = 1e-3
 ONE = np.ones(1)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 
 PERIOD = 0.002
 

@@ -14,9 +14,8 @@ from tests.identify.arm_benches import (
     random_chains,
     random_five_bar,
 )
-from zwidth.identify.arm import COLUMNS, identify_arm
-from zwidth.identify.arm.parameters import Parameters, base_parameters
-from zwidth.identify.records.record import record_of
+from zwidth.identify import Parameters, base_parameters, identify_arm, record_of
+from zwidth.identify.arm import COLUMNS
 from zwidth.model.effective_parameters import effective_parameters
 
 

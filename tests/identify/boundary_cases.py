@@ -7,10 +7,9 @@ import json
 import numpy as np
 
 import zwidth
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.edge_crossings import EdgeChords
+from zwidth.chart import ChartError, EdgeChords
+from zwidth.identify import record_of
 from zwidth.identify.boundary.identify import COLUMNS
-from zwidth.identify.records.record import record_of
 
 
 def random_document(rng):

@@ -23,7 +23,7 @@ from tests.identify.record_benches import (
     swept,
     three_masses,
 )
-from zwidth.show.output import csv_text
+from zwidth.show import csv_text
 
 
 @dataclass(frozen=True)

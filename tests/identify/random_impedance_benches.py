@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 
 SUBSTEPS = 4  # straight lines of the hand force in a sample
 PAST = 3  # commands that may be on their way

@@ -15,8 +15,7 @@ import numpy as np
 from tests.identify.faulty_records import FaultyRecord
 from tests.identify.impedance_bench import DOCUMENT
 from tests.identify.record_benches import DELAY, arm
-from zwidth.show.cli.main import run
-from zwidth.show.output import csv_text
+from zwidth.show import csv_text, run
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from tests.identify.impedance_bench import DOCUMENT, pushed
 from tests.identify.modes_bench import quantised, readings
 from tests.identify.spring_bench import bench_record
 from tests.identify.virtual_joint import Joint, records_of
-from zwidth.chart.edge_crossings import EdgeChords
-from zwidth.device.load import from_document
-from zwidth.model.plant import Plant
+from zwidth.chart import EdgeChords
+from zwidth.device import from_document
+from zwidth.model import Plant
 
 PERIOD = 1e-3
 STEP = 1e-7  # m, of the benches' encoder

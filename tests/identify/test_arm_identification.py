@@ -9,15 +9,12 @@ import pytest
 
 from tests.identify.arm_benches import chain_device, five_bar_columns, five_bar_device, random_five_bar
 from tests.identify.arm_truth import chain_results, five_bar_results, held, link_parameters, one_chain, true_values
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
-from zwidth.identify.arm import COLUMNS, identify_arm
+from zwidth.device import DeviceError, from_document
+from zwidth.identify import Parameters, base_parameters, check_sampling, identify_arm, record_of
+from zwidth.identify.arm import COLUMNS
 from zwidth.identify.arm.channels import channels_of
-from zwidth.identify.arm.parameters import Parameters, base_parameters
 from zwidth.identify.arm.smoothing import choose_band
 from zwidth.identify.arm.stretches import TorqueTiming, smoothed
-from zwidth.identify.records.record import record_of
-from zwidth.identify.records.sampling import check_sampling
 
 SEEDS = 1000
 

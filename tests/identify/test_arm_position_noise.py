@@ -11,12 +11,11 @@ from tests.cli.command_runner import run_command
 from tests.identify.arm_truth import one_chain
 from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
 from zwidth.device.load import load
-from zwidth.identify.arm import COLUMNS, ArmIdentification, identify_arm
+from zwidth.identify import Estimate, IdentificationError, identify_arm, read_record
+from zwidth.identify.arm import COLUMNS, ArmIdentification
 from zwidth.identify.arm.channels import Channels
 from zwidth.identify.arm.checks import Survey, sign_check, velocity_check
 from zwidth.identify.arm.smoothing import Kernel
-from zwidth.identify.identification import Estimate, IdentificationError
-from zwidth.identify.records.record import read_record
 
 PENDULUM = """name = "pendulum"
 [[mechanism.links]]

@@ -6,12 +6,10 @@ import pytest
 from tests.identify.arm_benches import chain_device, five_bar_device, random_chains, random_five_bar
 from tests.identify.arm_truth import link_parameters
 from tests.model.random_mechanisms import unit
-from zwidth.device.load import from_document
-from zwidth.identify.arm.parameters import Parameters, base_parameters
-from zwidth.model.bias import bias_batch
+from zwidth.device import from_document
+from zwidth.identify import Parameters, base_parameters
+from zwidth.model import PRISMATIC, bias_batch, pack
 from zwidth.model.inertia_regressor import inertia_regressor
-from zwidth.model.mechanism import PRISMATIC
-from zwidth.model.mechanism_arrays import pack
 
 GRAVITY = np.array([0.4, -9.0, 2.0])
 

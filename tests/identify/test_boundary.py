@@ -10,14 +10,11 @@ import pytest
 
 import zwidth
 from tests.identify.boundary_cases import measured, random_device, record
-from zwidth.chart.edge_crossings import EdgeChords
-from zwidth.contact.boundary_experiment import StableExtent, measure_edges
-from zwidth.contact.stability_trial import StabilityTrial
-from zwidth.device import address
-from zwidth.device.faults import DeviceError
-from zwidth.identify.boundary.identify import COLUMNS, identify_boundary
-from zwidth.identify.boundary.parameters import BoundaryParameters
-from zwidth.identify.records.record import read_record
+from zwidth.chart import EdgeChords
+from zwidth.contact import StabilityTrial, StableExtent, measure_edges
+from zwidth.device import DeviceError, address
+from zwidth.identify import BoundaryParameters, identify_boundary, read_record
+from zwidth.identify.boundary.identify import COLUMNS
 
 DELAY = "loop.delay_samples"
 

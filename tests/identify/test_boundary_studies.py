@@ -7,16 +7,10 @@ import pytest
 
 import zwidth
 from tests.identify.boundary_cases import measured, random_device, record, toml
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.edge_crossings import EdgeChords
+from zwidth.chart import ChartError, EdgeChords
 from zwidth.device import address
-from zwidth.identify.boundary.fit import fit_boundary
-from zwidth.identify.boundary.identify import identify_boundary
-from zwidth.identify.boundary.model import BoundaryModel
-from zwidth.identify.boundary.parameters import BoundaryParameters
-from zwidth.identify.boundary.points import read_points
-from zwidth.study.boundary.experiment import measure_boundary
-from zwidth.study.boundary.experiment_plan import Plan
+from zwidth.identify import BoundaryModel, BoundaryParameters, fit_boundary, identify_boundary, read_points
+from zwidth.study import Plan, measure_boundary
 
 PATHS = (
     ("loop.delay_samples",),

@@ -7,13 +7,12 @@ import pytest
 
 import zwidth
 from tests.identify.boundary_cases import record
-from zwidth.contact.stability_trial import LEVELS, LONGER, StabilityTrial, TrialError
+from zwidth.contact import StabilityTrial, TrialError
+from zwidth.contact.stability_trial import LEVELS, LONGER
+from zwidth.identify import identify_boundary, read_points
 from zwidth.identify.boundary.checks import check_circumstances
-from zwidth.identify.boundary.identify import identify_boundary
-from zwidth.identify.boundary.points import read_points
 from zwidth.identify.boundary.trials import TrialPlan
-from zwidth.study.boundary.experiment import measure_boundary
-from zwidth.study.boundary.experiment_plan import Plan
+from zwidth.study import Plan, measure_boundary
 
 DELAY = "loop.delay_samples"
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from tests.identify.boundary_cases import measured, random_device, record
-from zwidth.identify.boundary.fit import fit_boundary
-from zwidth.identify.boundary.model import BoundaryModel, Deviations
-from zwidth.identify.boundary.points import TIP, read_points
+from zwidth.identify import BoundaryModel, fit_boundary, fit_least_squares, read_points
+from zwidth.identify.boundary.model import Deviations
+from zwidth.identify.boundary.points import TIP
 from zwidth.identify.boundary.weights import relative_scatter
-from zwidth.identify.profile_likelihood import fit_least_squares
 
 COUNTS = {"lower": 10, "upper": 10, "tip": 4}
 

@@ -9,15 +9,20 @@ import pytest
 
 import zwidth
 from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
-from zwidth.identify.identification import Estimate, Identification
+from zwidth.identify import (
+    Estimate,
+    Identification,
+    check_sampling,
+    identify_friction,
+    identify_mass,
+    read_record,
+    record_of,
+)
 from zwidth.identify.joint.fit import MASS, ONE
 from zwidth.identify.joint.force_balance import NOTHING, force_balance
-from zwidth.identify.joint.friction import COLUMNS, identify_friction
+from zwidth.identify.joint.friction import COLUMNS
 from zwidth.identify.joint.joint import joint_of
-from zwidth.identify.joint.mass import identify_mass
 from zwidth.identify.joint.record import read_motion, windows_of
-from zwidth.identify.records.record import read_record, record_of
-from zwidth.identify.records.sampling import check_sampling
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from identify.test_friction_joint import JOINT, failed, record
 from identify.virtual_joint import records_of
 
 import zwidth
-from zwidth.identify.joint.friction import identify_friction
+from zwidth.identify import identify_friction
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ import pytest
 from identify.virtual_joint import random_joint, records_of
 
 import zwidth
+from zwidth.identify import identify_friction, record_of
 from zwidth.identify.joint import identification as joint_identification
 from zwidth.identify.joint.fit import fit_joint
-from zwidth.identify.joint.friction import COLUMNS, identify_friction
-from zwidth.identify.records.record import record_of
+from zwidth.identify.joint.friction import COLUMNS
 
 NAMES = ("dry friction", "viscous friction", "effective mass", "level forward", "viscous friction backward")
 

@@ -11,10 +11,9 @@ from identify.virtual_joint import Joint, records_of
 from paddle import PADDLE
 
 import zwidth
-from zwidth.device.faults import DeviceError
-from zwidth.identify.joint.friction import COLUMNS, identify_friction
-from zwidth.identify.joint.mass import identify_mass
-from zwidth.identify.records.record import record_of
+from zwidth.device import DeviceError
+from zwidth.identify import identify_friction, identify_mass, record_of
+from zwidth.identify.joint.friction import COLUMNS
 
 JOINT = Joint(
     mass=0.12,

@@ -9,11 +9,11 @@ import pytest
 
 from tests.identify.impedance_bench import bench, pushed
 from tests.identify.modes_bench import readings
-from zwidth.device.faults import DeviceError
-from zwidth.identify.impedance.identify import COLUMNS, identify_impedance
+from zwidth.device import DeviceError
+from zwidth.identify import identify_impedance, record_of
+from zwidth.identify.impedance.identify import COLUMNS
 from zwidth.identify.impedance.spectra import MeasuredImpedance, octave_bands
-from zwidth.identify.records.record import record_of
-from zwidth.measures.handle_impedance import free_motion_mass, static_stiffness
+from zwidth.measures import free_motion_mass, static_stiffness
 
 WALL = (1500.0, 3.0)
 

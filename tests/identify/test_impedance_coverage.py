@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.identify.random_impedance_benches import random_bench, records_of
-from zwidth.identify.impedance.identify import COLUMNS, identify_impedance
-from zwidth.identify.records.record import record_of
-from zwidth.measures.handle_impedance import felt_impedance, static_stiffness
+from zwidth.identify import identify_impedance, record_of
+from zwidth.identify.impedance.identify import COLUMNS
+from zwidth.measures import felt_impedance, static_stiffness
 
 BATCH = 100
 LOW = 2e-4  # share of the sampling rate, in angular frequency, at which the limit of low frequency is read off

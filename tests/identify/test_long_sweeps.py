@@ -7,10 +7,10 @@ import pytest
 
 from tests.identify.modes_bench import columns, readings
 from zwidth.device.load import load
-from zwidth.identify.kinds import identify
+from zwidth.identify import SweepBlocks, identify
 from zwidth.identify.records.record import ArrayRecord
-from zwidth.identify.response.sweep_blocks import SweepBlocks, SweepRange
-from zwidth.model.sweep_response import sweep_response_of_blocks
+from zwidth.identify.response.sweep_blocks import SweepRange
+from zwidth.model import sweep_response_of_blocks
 
 PERIOD = 2e-3
 

@@ -11,14 +11,13 @@ import pytest
 from tests import systems
 from tests.identify.modes_bench import columns, quantised, random_bench, readings, two_mass_device
 from tests.identify.record_benches import three_masses
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.device.load import load
+from zwidth.identify import record_of
 from zwidth.identify.modes.identify import COLUMNS, identify_modes
 from zwidth.identify.modes.model import sampled_response
-from zwidth.identify.records.record import record_of
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
+from zwidth.loop import Controller, Loop
+from zwidth.model import Operator, attach
 
 T, N, STEP = 1e-3, 4096, 1e-7
 PLANT = systems.two_mass(0.26, 0.1, 1e5, 10.0)

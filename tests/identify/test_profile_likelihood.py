@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.identify.profile_likelihood import fit_least_squares
+from zwidth.identify import fit_least_squares
 
 
 def test_a_linear_problem_has_students_interval():

@@ -9,11 +9,10 @@ import pytest
 import scipy.io
 import xarray as xr
 
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
+from zwidth.identify import Columns, read_record, record_of
 from zwidth.identify.records import table_copy
 from zwidth.identify.records.averaged_rows import averaged_rows
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import read_record, record_of
 
 WANTED = Columns(("time_s", ("force_N", "torque_Nm")), optional=("position_m",), text=("joint",))
 

@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 from tests.identify.modes_bench import columns, readings, two_mass_device
-from zwidth.chart.measured.chart import measured_chart
-from zwidth.device.load import from_document
-from zwidth.identify.kinds import identify
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import record_of
-from zwidth.identify.response.sweep_blocks import SweepBlocks
+from zwidth.chart import measured_chart
+from zwidth.device import from_document
+from zwidth.identify import Columns, SweepBlocks, identify, record_of
 from zwidth.identify.response.sweep_parts import shared_excitation
-from zwidth.loop.controller import Controller
-from zwidth.model.response import Response
+from zwidth.loop import Controller
+from zwidth.model import Response
 
 PERIOD = 1e-3
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import record_of
-from zwidth.identify.records.sampling import check_sampling
+from zwidth.identify import Columns, check_sampling, record_of
 
 WANTED = Columns(("time_s", "force_N"))
 

@@ -7,8 +7,8 @@ import pytest
 
 import zwidth
 from tests.identify.spring_bench import bench_record, bent_angles, random_bench, triangle
-from zwidth.device.faults import DeviceError
-from zwidth.identify.identification import IdentificationError
+from zwidth.device import DeviceError
+from zwidth.identify import IdentificationError
 from zwidth.identify.stiffness.spring_fit import fit_spring
 from zwidth.identify.stiffness.strokes import resolution_of, strokes_of, turning_points
 

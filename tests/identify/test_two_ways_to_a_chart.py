@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.identify.modes_bench import columns, quantised, readings, two_mass_device
-from zwidth.identify.identification import Identification
+from zwidth.identify import Identification
 
 
 def both_ways(seed):

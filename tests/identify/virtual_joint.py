@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from zwidth.contact.environments import Parameter, environment
-from zwidth.contact.simulate import Run, simulate_batch
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
-from zwidth.model.plant import Plant
+from zwidth.contact import Parameter, Run, simulate_batch
+from zwidth.contact.environments import environment
+from zwidth.loop import Controller, Loop
+from zwidth.model import Counter, Friction, Nonlinear, Plant
 
 TONES = 4
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from zwidth.loop.estimators import (
+from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
     CentralDifference,

@@ -8,15 +8,23 @@ import numpy as np
 
 from tests.model.model_cases import KINDS, random_five_bar, some_postures
 from tests.model.random_mechanisms import JOINTS, random_mechanism
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.damping import GivenDamping, ModalDamping
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load
-from zwidth.model.loaded_posture import loaded_postures
-from zwidth.model.mechanism import AXIS, FRAME, ORIENTATION, POINT, REVOLUTE, DriveNonlinearity
-from zwidth.model.posture import OK, solve_posture
-from zwidth.model.ratio_table import RatioTable
+from zwidth.loop import Butterworth, Controller, OperatingPoint
+from zwidth.model import (
+    AXIS,
+    FRAME,
+    OK,
+    ORIENTATION,
+    POINT,
+    REVOLUTE,
+    DriveNonlinearity,
+    EquilibriumError,
+    GivenDamping,
+    Load,
+    ModalDamping,
+    RatioTable,
+    loaded_postures,
+    solve_posture,
+)
 
 
 def straight(drives):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 from zwidth.loop.linear_omissions import STRAIGHT
 from zwidth.show.app.layers import _guarantees
 from zwidth.show.circumstances import omission_text

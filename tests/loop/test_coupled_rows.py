@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.apart import ApartLoop, loop_of_every_kind
-from zwidth.chart.chart import boundary_points
+from zwidth.chart import boundary_points
 from zwidth.loop import sections
 from zwidth.loop.coupled_hold import rows_error, sample_form, separate_rows
 from zwidth.loop.sections import UnresolvedError

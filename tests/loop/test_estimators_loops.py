@@ -8,12 +8,10 @@ import pytest
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements, spectral_radii
 from tests.loop.estimators_cases import random_method
 from tests.systems import mass, random_loop
-from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.verdict import STABLE, UNSTABLE, judge
-from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import LINEAR_METHODS, LeastSquaresSlope, SavitzkyGolay, WindowedDifference
-from zwidth.loop.estimators.frequency_response import relative_response
-from zwidth.loop.loop import Loop
+from zwidth.chart import judge, largest_stiffness, stability_chart
+from zwidth.chart.verdict import STABLE, UNSTABLE
+from zwidth.loop import Controller, LeastSquaresSlope, Loop, SavitzkyGolay, WindowedDifference, relative_response
+from zwidth.loop.estimators import LINEAR_METHODS
 
 
 def loops_of(name, rng, count, longest=16):

@@ -11,12 +11,18 @@ import scipy.optimize
 import scipy.signal
 
 from tests.loop.estimators_cases import METHODS, polynomials
-from zwidth.loop.controller import Controller
+from zwidth.loop import (
+    BackwardDifference,
+    Controller,
+    Foaw,
+    LeastSquaresSlope,
+    Levant,
+    WindowedDifference,
+    velocity_of,
+)
 from zwidth.loop.estimator import NonlinearError
-from zwidth.loop.estimators import BackwardDifference, Foaw, LeastSquaresSlope, Levant, WindowedDifference
 from zwidth.loop.estimators.foaw_kernel import foaw_estimate
 from zwidth.loop.estimators.levant_kernel import levant_estimate
-from zwidth.loop.estimators.run_estimator import velocity_of
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
 FITS = ("end-fit", "best-fit")
@@ -280,8 +286,8 @@ def test_a_bad_parameter_is_named_with_what_is_allowed(make, values, said):
 @pytest.mark.parametrize(("method", "name"), [(Foaw(5, 1e-6), "adaptive windowing"), (Levant(1.0), "Levant's")])
 def test_it_has_no_chart_and_says_what_to_do(method, name):
     from tests.systems import mass
-    from zwidth.chart.chart import stability_chart
-    from zwidth.loop.loop import Loop
+    from zwidth.chart import stability_chart
+    from zwidth.loop import Loop
 
     for ask in (
         lambda: method.estimator(T),

@@ -9,9 +9,17 @@ import scipy.linalg
 import scipy.signal
 
 from tests.loop.estimators_cases import METHODS, PERIODS, polynomials, random_method
+from zwidth.loop import (
+    AlphaBeta,
+    BackwardDifference,
+    Kalman,
+    LeastSquaresSlope,
+    SavitzkyGolay,
+    phase_delay,
+    relative_response,
+)
 from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators import AlphaBeta, BackwardDifference, Kalman, LeastSquaresSlope, SavitzkyGolay
-from zwidth.loop.estimators.frequency_response import low_frequency_delay, phase_delay, relative_response
+from zwidth.loop.estimators.frequency_response import low_frequency_delay
 
 
 def by_control(method, period):

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 
 from gallery import estimators as gallery
 from tests.systems import reference_transition_matrix
-from zwidth.loop.estimators import METHODS, AlphaBeta
-from zwidth.loop.estimators.frequency_response import phase_delay, relative_response
-from zwidth.loop.estimators.parameter_checks import quantisation_noise
+from zwidth.loop import AlphaBeta, phase_delay, quantisation_noise, relative_response
+from zwidth.loop.estimators import METHODS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
 

@@ -5,7 +5,7 @@ import pytest
 import scipy.signal
 
 from tests.loop.estimators_cases import METHODS, PERIODS, polynomials, random_method
-from zwidth.loop.estimators import (
+from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
     CentralDifference,

@@ -6,8 +6,7 @@ import pytest
 
 from tests.control_apart import ControlledLoop
 from tests.systems import reference_transition_matrix
-from zwidth.loop.controller import Controller
-from zwidth.loop.estimators import AlphaBeta, Kalman
+from zwidth.loop import AlphaBeta, Controller, Kalman, LocalLoop, Loop
 from zwidth.loop.exact_polynomials import (
     characteristic_polynomial,
     numerator,
@@ -15,9 +14,7 @@ from zwidth.loop.exact_polynomials import (
     roots_near,
     without_roots,
 )
-from zwidth.loop.fixed_feedback import LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.model import Plant
 
 
 def row_of_masses(masses, springs, dampers):

@@ -10,18 +10,26 @@ from scipy.linalg import matrix_balance
 from systems import mass, published, random_loop, two_mass
 
 from tests.control_apart import ControlledLoop, random_controlled_loop
+from zwidth.loop import (
+    AlphaBeta,
+    Butterworth,
+    Controller,
+    Feedforward,
+    FirstOrder,
+    Foaw,
+    ForceSensor,
+    HysteresisError,
+    LocalLoop,
+    Loop,
+    MultiLoop,
+    UnmovedError,
+    WindowedDifference,
+    feedforward_response,
+)
 from zwidth.loop.closed_plant import ForceSensorError
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import AlphaBeta, Foaw, WindowedDifference
-from zwidth.loop.feedback_response import feedforward_response
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.pole_zero_form import PoleZeroForm
-from zwidth.loop.sections import HysteresisError, UnmovedError
 from zwidth.loop.unobserved_instability import unobserved_instability
-from zwidth.model.multi_plant import MultiPlant
-from zwidth.model.operator import Operator, attach
+from zwidth.model import MultiPlant, Operator, attach
 
 T = 0.001
 ARM = Operator(0.8, 580.0, 5.5, 10000.0, 5.0)

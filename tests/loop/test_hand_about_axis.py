@@ -6,15 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
+from zwidth.device import DeviceError, from_document
 from zwidth.loop.fixed_feedback import describe_feedback, feedback_name
-from zwidth.model.operator import Operator, OperatorError
+from zwidth.model import Operator, OperatorError
+from zwidth.show import computer_text, speaking_of_moments
 from zwidth.show.app.layers import _touch
-from zwidth.show.circumstances import computer_text
-from zwidth.show.moment_units import speaking_of_moments
-from zwidth.study.robust.family import Family
-from zwidth.study.robust.robust_study import robust_study
+from zwidth.study import Family, robust_study
 
 HAND = {"arm_mass_kg": 0.5, "arm_stiffness_N_per_m": 300.0, "arm_damping_Ns_per_m": 4.0, "grasp": "rigid"}
 

@@ -18,15 +18,11 @@ from tests.measured_handle_cases import (
     measured_device,
     random_plant,
 )
-from zwidth.chart.chart import largest_stiffness
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.chart import largest_stiffness
+from zwidth.loop import Controller, Loop, OperatingPoint
 from zwidth.loop.measured.held_response import held_response, operator_stiffness
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.handle_impedance import felt_impedance
-from zwidth.model.operator import Operator, OperatorError, attach
-from zwidth.model.plant import Plant
-from zwidth.model.response import MeasuredHandle, Response, ResponseError
+from zwidth.measures import felt_impedance
+from zwidth.model import MeasuredHandle, Operator, OperatorError, Plant, Response, ResponseError, attach
 
 T = 0.00125
 PLANT = systems.published().plant

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from tests.systems import held_step, mass, random_plant, two_mass
-from zwidth.loop.factor_response import rows_response
+from zwidth.loop import rows_response
 from zwidth.loop.hold import step_response
 from zwidth.loop.sections import sampled_sections
-from zwidth.model.modes import natural_frequencies
-from zwidth.model.plant import Plant
+from zwidth.model import Plant, natural_frequencies
 
 
 def sampled_response(plant, period, delay_fraction, z):

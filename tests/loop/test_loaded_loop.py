@@ -13,15 +13,8 @@ from tests.loaded_apart import LoadedDevice, SimulatedDevice, root_errors
 from tests.loop.loaded_cases import MADE, random_load, random_points, random_screw
 from tests.model.model_cases import KINDS, drives_on, five_bar, some_postures, with_fixed_foot
 from zwidth.device.load import load as load_device
-from zwidth.loop.controller import Controller
-from zwidth.loop.fixed_feedback import LocalLoop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sideways import SidewaysMotion
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load
-from zwidth.model.mechanism import PRISMATIC
-from zwidth.model.operator import Operator
-from zwidth.model.posture import PostureError, solve_posture
+from zwidth.loop import Controller, LocalLoop, OperatingPoint, SidewaysMotion
+from zwidth.model import PRISMATIC, EquilibriumError, Load, Operator, PostureError, solve_posture
 
 ROOTS = 1e-6  # share of a root's size; most are alike to 1e-10
 ROUNDING = 1e-11  # share of a matrix to which the judge's differences are known

@@ -6,20 +6,29 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.several_directions.chart import multi_chart
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document, load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import NoMechanismError, OperatingPointError, SeveralDirectionsError
-from zwidth.model.multi_plant import reduce_directions
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
-from zwidth.model.posture import OK, OUT_OF_REACH, OutOfReach, solve_posture
-from zwidth.model.reduction import reduce_mechanism
+from zwidth.chart import multi_chart, stability_chart
+from zwidth.device import DeviceError, from_document
+from zwidth.device.load import load
+from zwidth.loop import (
+    Controller,
+    Loop,
+    MultiLoop,
+    NoMechanismError,
+    OperatingPoint,
+    OperatingPointError,
+    SeveralDirectionsError,
+)
+from zwidth.model import (
+    OK,
+    OUT_OF_REACH,
+    Operator,
+    OutOfReach,
+    Plant,
+    attach,
+    reduce_directions,
+    reduce_mechanism,
+    solve_posture,
+)
 
 POSITION, DIRECTION = (0.03, 0.22), (0.6, 0.8)
 

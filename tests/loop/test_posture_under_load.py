@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from tests.model.beam_devices import planar_arm, with_beams
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 from zwidth.device.load import load as load_device
-from zwidth.model import loaded_posture
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load, LoadError
-from zwidth.model.posture import NO_EQUILIBRIUM, OK
-from zwidth.study.sensitivity.what_if import find_variant, what_if
+from zwidth.model import NO_EQUILIBRIUM, OK, EquilibriumError, Load, LoadError, loaded_posture
+from zwidth.study import find_variant, what_if
 
 MOTORS = Load(push=-3.0, posture_of="motors")
 

@@ -6,8 +6,7 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Butterworth, Controller, Loop
 
 
 def eigenvalue_distance(ours, theirs):

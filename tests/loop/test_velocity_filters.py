@@ -5,7 +5,7 @@ import pytest
 import scipy.signal
 
 from tests.systems import velocity_filter
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
+from zwidth.loop import Butterworth, Controller, FirstOrder
 from zwidth.loop.filters import velocity_estimator
 
 

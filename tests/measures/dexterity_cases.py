@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tests.model.model_cases import rotation_about
-from zwidth.loop.controller import Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.mechanism import DriveNonlinearity, Mechanism
-from zwidth.model.posture import solve_posture
+from zwidth.loop import Controller, OperatingPoint
+from zwidth.model import DriveNonlinearity, Mechanism, solve_posture
 
 TURN = rotation_about(np.array([0.3, -1.0, 0.7]), 1.1)
 SHIFT = np.array([0.4, -0.2, 0.9])

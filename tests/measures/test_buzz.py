@@ -9,11 +9,10 @@ import pytest
 from systems import mass, two_mass
 
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MeasureError
+from zwidth.loop import Controller, OperatingPoint
+from zwidth.measures import MeasureError
 from zwidth.measures.vibration_threshold import detection_threshold
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.model import Counter, Friction, Nonlinear
 
 ONE = np.ones(1)
 

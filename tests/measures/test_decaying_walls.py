@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, random_loop, reference_transition_matrix
 
-from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.chart import ChartError, largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import DECAY, STIFFEST, chart_numbers
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import FOUND, NO_WALL
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.sections import UnmovedError
-from zwidth.measures.definition import NO_VALUE, OK, MeasureError
+from zwidth.loop import Controller, Loop, UnmovedError, table_of_loops
+from zwidth.measures import NO_VALUE, OK, MeasureError
 
 KINDS = ("chain", "dense", "coupled", "apart")
 

@@ -8,22 +8,23 @@ import numpy as np
 import pytest
 from systems import mass, two_mass
 
+from zwidth.contact import Hand, Tremor
 from zwidth.contact.environments import wall
-from zwidth.contact.hand import Hand, Tremor
 from zwidth.contact.simulate import simulate
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import FeedbackError
-from zwidth.measures.definition import MeasureError
-from zwidth.measures.felt_chart import felt_chart
-from zwidth.measures.handle_impedance import (
-    felt_impedance,
-    free_impedance,
-    free_motion_mass,
-    static_stiffness,
+from zwidth.loop import (
+    Butterworth,
+    Controller,
+    FeedbackError,
+    Feedforward,
+    FirstOrder,
+    ForceSensor,
+    LocalLoop,
+    Loop,
+    OperatingPoint,
 )
+from zwidth.measures import MeasureError, felt_impedance, free_motion_mass, static_stiffness
+from zwidth.measures.felt_chart import felt_chart
+from zwidth.measures.handle_impedance import free_impedance
 
 T = 0.001
 DEVICE = two_mass(0.26, 0.04, 15620.0, 3.0)

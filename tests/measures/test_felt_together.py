@@ -8,14 +8,11 @@ import scipy.optimize
 from systems import random_plant
 
 import zwidth
-from zwidth.chart.chart import largest_stiffness
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import NO_VALUE, OK, MeasureError
-from zwidth.measures.handle_impedance import felt_impedance, free_motion_impedance
+from zwidth.chart import largest_stiffness
+from zwidth.loop import Butterworth, Controller, FirstOrder, Loop, OperatingPoint
+from zwidth.measures import NO_VALUE, OK, MeasureError, felt_impedance, free_motion_impedance
 from zwidth.measures.handle_motion import HandleMotion
-from zwidth.model.plant import Plant
+from zwidth.model import Plant
 
 AT = [[0.0, 0.25], [0.08, 0.2], [-0.1, 0.15], [0.9, 0.9]]
 WALL = {"stiffness": 1500.0, "damping": 6.0, "frequency": 8.0}

@@ -11,13 +11,11 @@ from systems import mass, random_loop, random_operator, two_mass
 
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of
-from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.verdict import judge
-from zwidth.loop.controller import Controller
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.chart import judge, largest_stiffness
+from zwidth.loop import Controller, OperatingPoint
+from zwidth.measures import HandleError, felt_impedance, static_stiffness
 from zwidth.measures.felt_wall import felt_wall
-from zwidth.measures.handle_impedance import HandleError, felt_impedance, static_stiffness
-from zwidth.show.output import json_value
+from zwidth.show import json_value
 
 WALL = (4000.0, 10.0)
 

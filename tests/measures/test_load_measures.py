@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.measures.definition import NO_EQUILIBRIUM, NO_VALUE, OK, STATUS
-from zwidth.model.load import Load
-from zwidth.study.workspace.extreme_direction import extreme_over_directions
-from zwidth.study.workspace.map_data import why_no_cell
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import NO_EQUILIBRIUM, NO_VALUE, OK, STATUS
+from zwidth.model import Load
+from zwidth.study import extreme_over_directions, plane_of, why_no_cell
 
 PUSH = Load(push=-5.0)
 LIMITS = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.loop.controller import Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import NO_VALUE, OK, MeasureError
+from zwidth.loop import Controller, OperatingPoint
+from zwidth.measures import NO_VALUE, OK, MeasureError
 from zwidth.study.designs.study import as_key
 
 MARGINS = {"stiffness_margin": 0.2, "damping_margin": 0.3, "delay_margin": 0.5}

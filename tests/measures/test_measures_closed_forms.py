@@ -10,18 +10,20 @@ from numpy.testing import assert_allclose
 
 import zwidth
 from tests.systems import mass, published, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import spectral_radius
-from zwidth.loop.controller import Controller, FirstOrder
-from zwidth.loop.estimators import WindowedDifference
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH, MeasureError, WantedWall
-from zwidth.measures.deformation import structural_distortion
+from zwidth.chart import spectral_radius, stability_chart
+from zwidth.loop import Controller, FirstOrder, Loop, OperatingPoint, WindowedDifference
+from zwidth.measures import (
+    MEASURES,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    MeasureError,
+    WantedWall,
+    optimal_mass,
+    structural_distortion,
+)
 from zwidth.measures.evaluate import evaluate
-from zwidth.measures.vibration_decay import optimal_mass
-from zwidth.model.operator import Operator
+from zwidth.model import Operator
 
 CLOSED = ("stiffness_max_closed_form", "damping_max_closed_form", "stable_area_closed_form")
 OPTIMAL = ("optimal_spectral_radius", "optimal_motor_side_mass")

@@ -9,17 +9,18 @@ from numpy.testing import assert_allclose
 
 from tests.device.device_cases import ARM_FILE, with_changes
 from tests.model.model_cases import random_rotation
-from zwidth.device.load import from_document, load
-from zwidth.measures.dexterity import (
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.measures import (
     dynamic_isotropy,
     dynamic_manipulability,
     handle_mass_isotropy,
     isotropy,
     isotropy_frobenius,
     manipulability,
-    singular_values,
 )
-from zwidth.model.posture import solve_posture
+from zwidth.measures.dexterity import singular_values
+from zwidth.model import solve_posture
 
 
 def random_mass(rng, d):

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.definition import OK
+from zwidth.measures import MEASURES, OK
 
 PAGE = (Path(__file__).parents[2] / "docs" / "measures.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
-from zwidth.chart.chart import stability_chart
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.measures.eigenvalue_paths import LONG, SHORT, PathError, eigenvalue_paths, loop_paths, wall_paths
+from zwidth.chart import stability_chart
+from zwidth.loop import Controller, Loop
+from zwidth.measures import loop_paths, wall_paths
+from zwidth.measures.eigenvalue_paths import LONG, SHORT, PathError, eigenvalue_paths
 
 FEATURES = ("lag", "electrical", "estimator")
 

@@ -18,13 +18,10 @@ from tests.systems import (
     two_mass,
     velocity_weights,
 )
-from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.device.load import load
-from zwidth.loop.controller import Butterworth, Controller, FirstOrder
-from zwidth.loop.estimators import WindowedDifference
-from zwidth.loop.loop import Loop
-from zwidth.measures.felt_chart import felt_chart
-from zwidth.measures.handle_impedance import (
+from zwidth.loop import Butterworth, Controller, FirstOrder, Loop, WindowedDifference
+from zwidth.measures import (
     HandleError,
     commanded_impedance,
     felt_impedance,
@@ -33,8 +30,9 @@ from zwidth.measures.handle_impedance import (
     static_stiffness,
     static_stiffness_limit,
 )
+from zwidth.measures.felt_chart import felt_chart
+from zwidth.model import LaggedDamper, Plant
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.model.plant import LaggedDamper, Plant
 
 
 class SectionFilter:

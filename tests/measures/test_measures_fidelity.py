@@ -10,10 +10,9 @@ import sympy as sp
 from numpy.testing import assert_allclose
 
 from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
-from zwidth.chart.verdict import spectral_radius
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.measures.vibration_decay import decay_time, fastest_mass, optimal_mass, with_motor_side_mass
+from zwidth.chart import spectral_radius
+from zwidth.loop import Controller, Loop
+from zwidth.measures import decay_time, fastest_mass, optimal_mass, with_motor_side_mass
 
 K_E, T = 15620.0, 0.00125
 g, P, D, R, z, W = sp.symbols("g P D R z W", positive=True)

@@ -10,14 +10,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import linprog
 
 from tests.model.model_cases import random_rotation
-from zwidth.measures.forces import (
-    acceleration_along,
-    force_along,
-    force_component,
-    friction_along,
-    joint_rates,
-    resolution_along,
-)
+from zwidth.measures import acceleration_along, force_along, force_component, friction_along, resolution_along
+from zwidth.measures.forces import joint_rates
 
 
 def random_direction(rng, J):

@@ -7,8 +7,8 @@ import pytest
 import scipy.optimize
 
 import zwidth
-from zwidth.device.read import bundled_names
-from zwidth.measures.definition import OK, MeasureError
+from zwidth.device import bundled_names
+from zwidth.measures import OK, MeasureError
 from zwidth.measures.geometry import (
     limit_margin,
     link_distance,
@@ -17,7 +17,7 @@ from zwidth.measures.geometry import (
     rods_of,
     segment_distance,
 )
-from zwidth.model.posture import link_points
+from zwidth.model import link_points
 
 PLANTS = ("published-two-mass", "hapkit-course")
 MECHANISMS = [name for name in bundled_names() if name not in PLANTS]

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.model.model_cases import random_rotation
-from zwidth.measures.homogeneous import characteristic_length, homogeneous_jacobian, scaled_jacobian
+from zwidth.measures import characteristic_length, homogeneous_jacobian, scaled_jacobian
 
 KINDS = {
     "a platform turned and moved": (3, 3, (2,), ()),

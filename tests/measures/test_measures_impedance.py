@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.device.load import load
-from zwidth.loop.loop import Loop
+from zwidth.loop import Loop
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, find_measure
 from zwidth.measures.bindings import impedance
-from zwidth.measures.catalogue import MEASURES, find_measure
-from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH
 from zwidth.measures.evaluate import evaluate
 
 AT = np.array([[[0.0, 0.25, 0.0], [0.08, 0.2, 0.0]], [[-0.12, 0.22, 0.0], [0.9, 0.9, 0.0]]])

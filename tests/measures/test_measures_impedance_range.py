@@ -8,12 +8,10 @@ import sympy as sp
 from numpy.testing import assert_allclose
 
 from tests.systems import mass, two_mass
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.conditions import thesis_rigid, thesis_unit_delay, thesis_whole_delay
-from zwidth.loop.controller import Controller, FirstOrder
-from zwidth.loop.estimators import WindowedDifference
-from zwidth.loop.loop import Loop
-from zwidth.measures.impedance_range import rigid_range, sprung_range
+from zwidth.loop import Controller, FirstOrder, Loop, WindowedDifference
+from zwidth.measures import rigid_range, sprung_range
 
 EXACT = 1e-9
 # A smooth maximum holds its place only to the root of the rounding; the chart's area lies between corners that are

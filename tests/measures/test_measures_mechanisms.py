@@ -19,14 +19,12 @@ from tests.measures.dexterity_cases import (
     with_drive_data,
 )
 from tests.model.model_cases import KINDS, five_bar, some_postures
-from zwidth.device.load import from_document, load
-from zwidth.measures import dexterity
-from zwidth.measures.catalogue import MEASURES, find_measure
-from zwidth.measures.definition import NO_VALUE, OK, OUT_OF_REACH, MeasureError
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, MeasureError, dexterity, find_measure
 from zwidth.measures.evaluate import evaluate
-from zwidth.model.damping import GivenDamping
+from zwidth.model import GivenDamping, reduce_directions
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.model.multi_plant import reduce_directions
 
 # Those that are about a wanted wall or force have tests of their own.
 TESTED_MEASURES = [

@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, OK, OUT_OF_REACH, SINGULAR, UNDECIDED
-from zwidth.measures.dexterity import isotropy
-from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
+from zwidth.measures import (
+    FAILED,
+    MISSING,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    UNDECIDED,
+    global_conditioning_index,
+    global_isotropy_index,
+    isotropy,
+)
+from zwidth.measures.overall import overall
 
 NAN = float("nan")
 

@@ -10,9 +10,8 @@ import scipy.linalg
 from systems import low_pass_sections, mass, random_controller, random_plant, two_mass
 
 import zwidth
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import NO_VALUE, OK
+from zwidth.loop import Butterworth, Controller, OperatingPoint
+from zwidth.measures import NO_VALUE, OK
 
 HEAVY = 1e9  # times the device's mass, at the handle: it keeps its velocity
 

@@ -12,19 +12,13 @@ import pytest
 
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from tests.systems import mass, two_mass
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.fixed_feedback import ForceSensor
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop import Controller, ForceSensor, Loop, OperatingPoint
+from zwidth.measures import static_stiffness, static_stiffness_limit
 from zwidth.measures.felt_chart import felt_chart
-from zwidth.measures.handle_impedance import (
-    static_stiffness,
-    static_stiffness_limit,
-    static_stiffness_limit_kind,
-)
-from zwidth.model.plant import Plant
+from zwidth.measures.handle_impedance import static_stiffness_limit_kind
+from zwidth.model import Plant
 
 GROUND = Fraction(1, 10**90)  # N/m per kg, of springs to the ground that stand for none
 WITHOUT_END = Fraction(10**40)  # N/m

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import load
-from zwidth.measures.catalogue import find_measure
-from zwidth.measures.definition import FAILED, NO_VALUE, OK, Measure
-from zwidth.measures.user_measures import load_measures, measure
-from zwidth.study.workspace.map import map_job, workspace_map
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import FAILED, NO_VALUE, OK, Measure, find_measure, load_measures, measure
+from zwidth.study import map_job, plane_of, workspace_map
 
 GOOD = '''
 from zwidth import measure

@@ -14,8 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from tests.model.rods import Rod
-from zwidth.model.beam_bodies import finite_elements
-from zwidth.model.mechanism import PRISMATIC, REVOLUTE
+from zwidth.model import PRISMATIC, REVOLUTE, finite_elements
 
 NODES = 2  # elements of each beam
 STEPS = 320

@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from tests.model.random_mechanisms import place
-from zwidth.model.mechanism import AXIS, BALL_X, BALL_Z, FIXED, FRAME, PRISMATIC
+from zwidth.model import AXIS, BALL_X, BALL_Z, FIXED, FRAME, PRISMATIC
 
 FOURTH = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))  # steps and weights
 PART = 0.1  # of a motion that is taken at once [rad], [m]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from zwidth.model.mechanism import REVOLUTE, Closures, Drives, Links, Mechanism
-from zwidth.model.posture import solve_posture
+from zwidth.model import REVOLUTE, Closures, Links, Mechanism, solve_posture
+from zwidth.model.mechanism import Drives
 
 X, Y, Z = np.eye(3)
 

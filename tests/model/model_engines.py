@@ -14,15 +14,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from zwidth.model.mechanism import (
-    AXIS,
-    BALL_X,
-    BALL_Z,
-    FIXED,
-    FRAME,
-    PRISMATIC,
-    REVOLUTE,
-)
+from zwidth.model import AXIS, BALL_X, BALL_Z, FIXED, FRAME, PRISMATIC, REVOLUTE
 
 NEARLY_NOTHING = 1e-14  # kg and kg m^2 of a massless link: this engine wants some
 

@@ -12,16 +12,14 @@ from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
 from tests.model.model_cases import NO_CLOSURES, drives_on, random_inertia, random_rotation, rotation_about
-from zwidth.model.mechanism import (
+from zwidth.model import (
     AXIS,
     BALL_X,
-    BALL_Y,
     BALL_Z,
     FIXED,
     FRAME,
     ORIENTATION,
     POINT,
-    POSE,
     POSITION,
     PRISMATIC,
     REVOLUTE,
@@ -29,6 +27,7 @@ from zwidth.model.mechanism import (
     Links,
     Mechanism,
 )
+from zwidth.model.mechanism import BALL_Y, POSE
 
 JOINTS = ("revolute", "prismatic", "universal", "ball", "fixed")
 

@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
+from zwidth.device import DeviceError, from_document
+from zwidth.model import Load, Motions, natural_frequencies, pack
 from zwidth.model.arm import ArmError, attach_arm
-from zwidth.model.load import Load
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.modes import natural_frequencies
-from zwidth.model.motions import Motions
 
 SHOULDER = np.array([0.45, 0.05, 0.0])
 LENGTHS = 0.3, 0.26

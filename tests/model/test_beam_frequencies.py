@@ -12,9 +12,14 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
 from tests.model.frame_elements import GROUND, Frame, natural_frequencies
-from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
-from zwidth.model.beam_section import BeamProperties
-from zwidth.model.flexible_body import clamped_frequencies, highest_frequency
+from zwidth.model import (
+    BeamProperties,
+    assumed_modes,
+    clamped_frequencies,
+    finite_elements,
+    highest_frequency,
+    lumped_tip,
+)
 
 L, MASS_PER_LENGTH, EI = 0.35, 0.2, 12.0
 MASS = MASS_PER_LENGTH * L

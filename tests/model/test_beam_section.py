@@ -8,9 +8,9 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
+from zwidth.model import BeamProperties
 from zwidth.model.beam_section import (
     TYPICAL_MATERIALS,
-    BeamProperties,
     Material,
     Section,
     beam_properties,

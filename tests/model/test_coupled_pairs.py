@@ -9,24 +9,15 @@ import pytest
 from model_cases import KINDS, some_postures
 from systems import random_operator, random_plant
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.chart_batch import ALL_NUMBERS, STIFFEST
+from zwidth.chart import ALL_NUMBERS, numbers_of_points, stability_chart
+from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
-from zwidth.chart.point_numbers import numbers_of_points
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.factor_response import rows_response
-from zwidth.loop.loop import Loop
-from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop import Controller, Loop, OperatingPoint, rows_response, section_rows
 from zwidth.loop.point_loops import pole_pairs_of_points
-from zwidth.loop.sections_batch import section_rows
+from zwidth.model import ModalDamping, Operator, Plant, attach, reduce_mechanism, solve_posture
 from zwidth.model.coupled_pairs import coupled_pairs
-from zwidth.model.damping import ModalDamping
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
 from zwidth.model.plant_modes import plant_modes
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
 from zwidth.model.rendered_modes import RenderedModes, rendered_modes
 
 Z = 1.02 * np.exp(1j * np.linspace(0.05, 3.0, 7))

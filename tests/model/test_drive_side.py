@@ -19,14 +19,20 @@ from random_mechanisms import closure_values, derivative, place, random_mechanis
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from zwidth.model.damping import GivenDamping, ModalDamping
+from zwidth.model import (
+    BALL_X,
+    PRISMATIC,
+    REVOLUTE,
+    GivenDamping,
+    ModalDamping,
+    modes_in_general,
+    natural_frequencies,
+    reduce_mechanism,
+    solve_posture,
+    undamped_modes,
+)
 from zwidth.model.drive_side import drive_side
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.model.general_modes import modes_in_general
-from zwidth.model.mechanism import BALL_X, PRISMATIC, REVOLUTE
-from zwidth.model.modes import natural_frequencies, undamped_modes
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import reduce_mechanism
 
 AT = 2j * np.pi * np.array([3.0, 30.0, 300.0])
 

@@ -17,12 +17,9 @@ from tests.loop.loaded_cases import random_points
 from tests.model.beam_devices import device, drive, link
 from tests.model.joints_apart import FOURTH, Joints
 from tests.model.model_engines import mjcf, moving_links, quaternion
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 from zwidth.device.load import load as load_device
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load
-from zwidth.model.mechanism import BALL_X
-from zwidth.model.posture import NO_EQUILIBRIUM, OK, OUT_OF_REACH
+from zwidth.model import BALL_X, NO_EQUILIBRIUM, OK, OUT_OF_REACH, EquilibriumError, Load
 
 # --- an arm on one joint ----------------------------------------------------------------------------------
 

@@ -11,11 +11,17 @@ from scipy.optimize import brentq
 from scipy.special import jv
 
 from tests.model.rods import assert_moves_as_a_rod, middles
-from zwidth.model import beam_bodies
-from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
+from zwidth.model import (
+    BeamProperties,
+    FlexibleBody,
+    assumed_modes,
+    beam_bodies,
+    clamped_frequencies,
+    finite_elements,
+    highest_frequency,
+    lumped_tip,
+)
 from zwidth.model.beam_integrals import Shapes, body_of_shapes, gauss_panels
-from zwidth.model.beam_section import BeamProperties
-from zwidth.model.flexible_body import FlexibleBody, clamped_frequencies, highest_frequency
 
 L = 0.4
 STATIONS = np.array([0.1, 0.25, 0.4])

@@ -13,7 +13,7 @@ import pytest
 
 import zwidth
 from tests.lazy_module import LazyModule
-from zwidth.model.load import Load
+from zwidth.model import Load
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "flexible-links.md").read_text(encoding="utf-8")

@@ -24,10 +24,9 @@ from tests.model.beam_devices import (
 )
 from tests.model.bent_chains import with_bodies
 from tests.model.framed_devices import framed
-from zwidth.device.load import from_document
-from zwidth.model.beam_bodies import assumed_modes, finite_elements
+from zwidth.device import from_document
+from zwidth.model import assumed_modes, finite_elements, natural_frequencies, undamped_modes
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.model.modes import natural_frequencies, undamped_modes
 
 CONVERGING = ("assumed-modes", "finite-elements")
 

@@ -20,10 +20,8 @@ from tests.model.beam_devices import (
 )
 from tests.model.frame_elements import modes_of
 from tests.model.framed_devices import framed
-from zwidth.device.load import from_document
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load
-from zwidth.model.loaded_posture import loaded_postures
+from zwidth.device import from_document
+from zwidth.model import EquilibriumError, Load, loaded_postures
 
 L, SOFT, STIFF = 0.3, 8.0, 20.0
 EULER = np.pi**2 * SOFT / L**2

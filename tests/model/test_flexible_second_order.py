@@ -7,9 +7,8 @@ import pytest
 
 from tests.model.beam_devices import light_five_bar, slides, spatial_arm
 from tests.model.bent_chains import Chain, with_elements
-from zwidth.device.load import from_document
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.motions import Motions
+from zwidth.device import from_document
+from zwidth.model import Motions, pack
 
 
 def of_beams_alone(document):

@@ -14,10 +14,8 @@ from random_mechanisms import random_mechanism, random_mechanisms
 from scipy.spatial.transform import Rotation
 
 import zwidth
-from zwidth.device.load import from_document
-from zwidth.device.robot_files.import_file import import_file
-from zwidth.model.mechanism import BALL_X, FIXED, PRISMATIC, REVOLUTE
-from zwidth.model.posture import solve_posture
+from zwidth.device import from_document, import_file
+from zwidth.model import BALL_X, FIXED, PRISMATIC, REVOLUTE, solve_posture
 
 RELATIVE = 1e-9
 

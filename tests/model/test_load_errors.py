@@ -7,14 +7,10 @@ import copy
 import numpy as np
 import pytest
 
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
+from zwidth.device import DeviceError, from_document
 from zwidth.device.load import load as load_device
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import OperatingPointError, SeveralDirectionsError
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import Load, LoadError
-from zwidth.model.reduction import ModelError
+from zwidth.loop import OperatingPoint, OperatingPointError, SeveralDirectionsError
+from zwidth.model import EquilibriumError, Load, LoadError, ModelError
 
 
 @pytest.mark.parametrize(

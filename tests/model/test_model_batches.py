@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from model_cases import KINDS, five_bar, random_five_bar, same_angles, some_postures
 
-from zwidth.model.posture import OK, OUT_OF_REACH, inertia_terms, link_points, solve_posture
+from zwidth.model import OK, OUT_OF_REACH, inertia_terms, link_points, solve_posture
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 from model_cases import KINDS, drives_on, five_bar, some_postures
 
-from zwidth.model.damping import GivenDamping, ModalDamping
-from zwidth.model.plant import LaggedDamper, Plant
-from zwidth.model.posture import OK, solve_posture
-from zwidth.model.reduction import ModelError, reduce_mechanism, reduce_plant
+from zwidth.model import (
+    OK,
+    GivenDamping,
+    LaggedDamper,
+    ModalDamping,
+    ModelError,
+    Plant,
+    reduce_mechanism,
+    reduce_plant,
+    solve_posture,
+)
 
 MODELS = ("two-mass", "motor-mass", "rigid")
 

@@ -7,11 +7,18 @@ import pytest
 from model_cases import KINDS, X, Y, five_bar, some_postures
 from scipy.linalg import block_diag
 
-from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
+from zwidth.model import (
+    DirectionError,
+    GivenDamping,
+    ModalDamping,
+    ModelError,
+    ProportionalDamping,
+    decompose,
+    reduce_directions,
+    reduce_mechanism,
+    solve_posture,
+)
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.model.multi_plant import decompose, reduce_directions
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import DirectionError, ModelError, reduce_mechanism
 
 MODELS = ("full", "two-mass", "motor-mass", "rigid")
 DAMPINGS = (ModalDamping(0.05), ProportionalDamping(0.7, 1e-4), GivenDamping())

@@ -6,9 +6,7 @@ from model_cases import KINDS, some_postures
 from model_engines import ask_mujoco, ask_pinocchio
 from random_mechanisms import random_mechanisms
 
-from zwidth.model.mechanism import ORIENTATION, POSITION
-from zwidth.model.posture import OK, inertia_terms, solve_posture
-from zwidth.model.rotations import rotation_matrix
+from zwidth.model import OK, ORIENTATION, POSITION, inertia_terms, rotation_matrix, solve_posture
 
 RELATIVE = 1e-9
 

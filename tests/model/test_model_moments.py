@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.device.device_cases import faults
-from zwidth.device.load import from_document
-from zwidth.model.plant import Plant
+from zwidth.device import from_document
+from zwidth.model import Plant
 
 WRIST = {
     "name": "Wrist",
@@ -103,7 +103,7 @@ def test_a_rigid_wrist_about_its_first_axis_is_a_single_inertia():
     chart = from_document(document).at().chart(decay=False)
     # about the first axis at rest: all three links and the first rotor; the products of inertia vanish
     inertia = 2e-3 + 7e-4 + 2e-4 + 0.1 * 0.02**2 + 19**2 * 1.4e-5
-    from zwidth.loop.loop import Loop
+    from zwidth.loop import Loop
 
     alone = Loop(Plant.one_mass(inertia), sampling_period=0.001).chart(decay=False)
     assert chart.stiffness_max == pytest.approx(alone.stiffness_max, rel=1e-9)
@@ -129,8 +129,7 @@ def test_a_wrist_finds_the_joints_of_an_orientation(seed):
 
 
 def test_a_platform_that_cannot_turn_renders_no_moment():
-    from zwidth.model.posture import solve_posture
-    from zwidth.model.reduction import DirectionError
+    from zwidth.model import DirectionError, solve_posture
 
     device = paddle(0.08)
     assert solve_posture(device.mechanism).angular_jacobian[:, 0] == pytest.approx([0, 0, 1])
@@ -140,7 +139,7 @@ def test_a_platform_that_cannot_turn_renders_no_moment():
 
 def test_what_cannot_be_meant_is_refused_in_a_sentence():
     device, wrist = paddle(0.08), from_document(WRIST)
-    from zwidth.device.faults import DeviceError
+    from zwidth.device import DeviceError
 
     for case, sentence in (
         ({"axis": [0, 0, 0]}, "has zero length"),

@@ -11,15 +11,24 @@ import numpy as np
 import pytest
 
 from tests.model.model_cases import KINDS, five_bar
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.damping import ModalDamping
-from zwidth.model.mechanism import DriveNonlinearity
-from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import ModelError, _motions, reduce_mechanism, reduce_plant
+from zwidth.loop import Controller, Loop
+from zwidth.model import (
+    Brake,
+    Counter,
+    DriveNonlinearity,
+    Friction,
+    ModalDamping,
+    ModelError,
+    Nonlinear,
+    Operator,
+    Plant,
+    Spring,
+    attach,
+    reduce_mechanism,
+    reduce_plant,
+    solve_posture,
+)
+from zwidth.model.reduction import _motions
 
 MODELS = ("full", "two-mass", "motor-mass", "rigid")
 

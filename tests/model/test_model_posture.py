@@ -22,20 +22,9 @@ from model_cases import (
 )
 from scipy import ndimage
 
-from zwidth.model.mechanism import Mechanism
-from zwidth.model.mechanism_arrays import pack
+from zwidth.model import OK, OUT_OF_REACH, Mechanism, OutOfReach, Singular, inertia_terms, pack, solve_posture
 from zwidth.model.mobility import check_mobility, drives_fit
-from zwidth.model.posture import (
-    OK,
-    OUT_OF_REACH,
-    SINGULAR,
-    LoopOpen,
-    OutOfReach,
-    Singular,
-    _references,
-    inertia_terms,
-    solve_posture,
-)
+from zwidth.model.posture import SINGULAR, LoopOpen, _references
 
 
 def paddle(length=0.1):

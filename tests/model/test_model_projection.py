@@ -6,7 +6,7 @@ import pytest
 
 from tests.paddle import LENGTH, paddle
 from zwidth.device.load import load
-from zwidth.model.posture import OK, OUT_OF_REACH, OutOfReach, solve_posture
+from zwidth.model import OK, OUT_OF_REACH, OutOfReach, solve_posture
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,19 @@ import sympy
 from model_cases import KINDS, Y, five_bar, some_postures
 from scipy.linalg import eigh, null_space
 
-from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
+from zwidth.model import (
+    GivenDamping,
+    ModalDamping,
+    ModelError,
+    Plant,
+    ProportionalDamping,
+    natural_frequencies,
+    plant_effective_parameters,
+    reduce_mechanism,
+    reduce_plant,
+    solve_posture,
+)
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.model.modes import natural_frequencies
-from zwidth.model.plant import Plant
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import ModelError, plant_effective_parameters, reduce_mechanism, reduce_plant
 
 FIVE_PERCENT = ModalDamping(0.05)
 AVERAGE = (0.40, 0.65)

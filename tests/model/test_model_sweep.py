@@ -7,11 +7,9 @@ import pytest
 
 from tests import systems
 from tests.measured_cases import chirp, encoder_readings, sampled_response
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.measured.chart import measured_chart
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.response import ResponseError
+from zwidth.chart import measured_chart, stability_chart
+from zwidth.loop import Butterworth, Controller, Loop
+from zwidth.model import ResponseError
 from zwidth.model.sweep_response import sweep_response
 
 T = 0.001

@@ -8,7 +8,7 @@ import pytest
 from lazy_module import LazyModule
 from model_cases import random_five_bar, two_bar_angles
 
-from zwidth.model.posture import OK, inertia_terms, solve_posture
+from zwidth.model import OK, inertia_terms, solve_posture
 
 appendix_b = LazyModule("gallery.appendix_b")
 

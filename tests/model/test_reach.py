@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from model_cases import KINDS, five_bar
 
-from zwidth.model import posture_batch
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.posture import OK, OUT_OF_REACH, UNSOLVED, OutOfReach, solve_posture
+from zwidth.model import OK, OUT_OF_REACH, OutOfReach, pack, posture_batch, solve_posture
+from zwidth.model.posture import UNSOLVED
 from zwidth.model.reach_shells import outside_shells, shells
 from zwidth.model.roadmap import roadmap
 

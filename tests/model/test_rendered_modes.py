@@ -8,13 +8,8 @@ import numpy as np
 import pytest
 from model_cases import KINDS, some_postures
 
-from zwidth.loop.controller import Controller
-from zwidth.loop.factor_response import rows_response
-from zwidth.loop.loop import Loop
-from zwidth.loop.sections_batch import section_rows
-from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
-from zwidth.model.posture import solve_posture
-from zwidth.model.reduction import MODELS, reduce_mechanism
+from zwidth.loop import Controller, Loop, rows_response, section_rows
+from zwidth.model import MODELS, GivenDamping, ModalDamping, ProportionalDamping, reduce_mechanism, solve_posture
 from zwidth.model.rendered_modes import rendered_modes
 
 DAMPING = (ModalDamping(0.05), ModalDamping(1.4), ProportionalDamping(0.7, 2e-4), GivenDamping())

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant, undamped_modes
 from zwidth.model.idle_motions import separated_modes
-from zwidth.model.modes import real_modes, undamped_modes
-from zwidth.model.plant import Plant
+from zwidth.model.modes import real_modes
 
 PERIOD = 1e-3
 

@@ -5,8 +5,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from zwidth.model.response import ResponseError
-from zwidth.model.sweep_response import block_length, sweep_response, sweep_response_of_blocks
+from zwidth.model import ResponseError, sweep_response_of_blocks
+from zwidth.model.sweep_response import block_length, sweep_response
 
 PERIOD = 1e-3
 SAMPLES = 1 << 17

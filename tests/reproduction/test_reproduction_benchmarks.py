@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import _peers, _timing, commands
 from benchmarks import chart as benchmark
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 
 COUNT = 15
 

@@ -324,7 +324,7 @@ def test_ways_over_the_mass(name):
 
 
 def test_figures_are_drawn():
-    from zwidth.show.figures.style import context, figure
+    from zwidth.show import context, figure
 
     for script, width, height in (
         (maps, 9.0, 11.0),

@@ -10,9 +10,9 @@ from identify.test_friction_joint import JOINT, record
 from identify.virtual_joint import records_of
 
 import zwidth
-from zwidth.identify.joint.friction import identify_friction
+from zwidth.identify import identify_friction
+from zwidth.show import figure
 from zwidth.show.figures.identify_friction import draw_friction
-from zwidth.show.figures.style import figure
 
 
 @pytest.fixture(scope="module")

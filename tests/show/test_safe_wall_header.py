@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import load
-from zwidth.loop.controller import Butterworth, FirstOrder
-from zwidth.loop.estimators import BackwardDifference, WindowedDifference
-from zwidth.loop.fixed_feedback import ForceSensor
-from zwidth.show.output import OutputError
-from zwidth.show.safe_walls.header import HEADER_NAME, header_text, sketch_obstacle, sketch_text, write_sketch
+from zwidth.loop import BackwardDifference, Butterworth, FirstOrder, ForceSensor, WindowedDifference
+from zwidth.show import HEADER_NAME, OutputError, header_text
+from zwidth.show.safe_walls.header import sketch_obstacle, sketch_text, write_sketch
 from zwidth.study import safe_walls
 
 STRICT = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow", "-Wundef", "-O1")

@@ -9,11 +9,8 @@ import zwidth
 from tests.model.beam_devices import five_bar, planar_arm, slides, spatial_arm, spatial_loop
 from tests.model.model_cases import KINDS
 from tests.model.random_mechanisms import random_mechanisms
-from zwidth.device.load import from_document
-from zwidth.model.mechanism import ORIENTATION
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.posture import solve_posture
-from zwidth.model.rotations import rotation_matrix
+from zwidth.device import from_document
+from zwidth.model import ORIENTATION, pack, rotation_matrix, solve_posture
 from zwidth.show.mechanism_scene import mechanism_scene
 from zwidth.show.scene_rates import mode_strokes
 

@@ -6,8 +6,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from zwidth.show import figure
 from zwidth.show.figures.colour_bands import COLOURS, bands_of, colour_bar, levels_of
-from zwidth.show.figures.style import figure
 
 
 def bar_of(values, unit=""):

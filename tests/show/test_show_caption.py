@@ -12,9 +12,10 @@ import zwidth
 from tests.cli.command_runner import run_command
 from tests.undrawn_figures import listed_svg
 from zwidth.measures.felt_chart import felt_chart
-from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts, caption_of_result, write_caption
-from zwidth.show.figures.style import figure, save, text_width, wrapped
-from zwidth.study.designs.study_arguments import study_over
+from zwidth.show import caption_of_result, figure, save, write_caption
+from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts
+from zwidth.show.figures.style import text_width, wrapped
+from zwidth.study import study_over
 
 ROUGH = {"friction.coulomb_N": [0.3, 0.1], "loop.encoder.resolution_m": 1e-5, "loop.saturation.force_N": 5.0}
 

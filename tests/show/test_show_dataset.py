@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from scipy.io import loadmat
 
+from zwidth.show import OutputError
 from zwidth.show.dataset import write_dataset
-from zwidth.show.output import OutputError
 
 
 def dataset():

@@ -6,9 +6,8 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from tests.systems import published
-from zwidth.chart.chart import stability_chart
-from zwidth.show.figures.experiment import ErrorBarPoint, draw_experiment
-from zwidth.show.figures.style import figure
+from zwidth.chart import stability_chart
+from zwidth.show import ErrorBarPoint, draw_experiment, figure
 
 POINTS = [
     ErrorBarPoint(4000.0, 2.4, "lower", 2.2, 2.7),

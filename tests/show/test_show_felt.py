@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, published
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import stability_chart
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
+from zwidth.measures import commanded_impedance, felt_impedance, free_motion_impedance
 from zwidth.measures.felt_chart import felt_chart
-from zwidth.measures.handle_impedance import commanded_impedance, felt_impedance, free_motion_impedance
+from zwidth.show import figure
 from zwidth.show.figures.felt import draw_felt_chart, draw_impedance
 from zwidth.show.figures.sensitivity import draw_sensitivities
-from zwidth.show.figures.style import figure
-from zwidth.study.sensitivity.sensitivities import sensitivities
+from zwidth.study import sensitivities
 
 
 def texts(ax):

@@ -14,21 +14,29 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from tests.systems import mass
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import spectral_radius, stability_chart
 from zwidth.chart.rings import simple_rings
-from zwidth.chart.verdict import spectral_radius
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
-from zwidth.show.figures.decay import draw_decay_contours, round_radii, tenfold_time
-from zwidth.show.figures.frequency import corners, draw_frequency
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
+from zwidth.show import (
+    GREY,
+    OutputError,
+    draw_chart,
+    draw_decay_contours,
+    draw_frequency,
+    draw_models,
+    figure,
+    label,
+    save,
+)
+from zwidth.show.figures.decay import round_radii, tenfold_time
+from zwidth.show.figures.frequency import corners
 from zwidth.show.figures.mechanism import draw_mechanism
 from zwidth.show.figures.plant import draw_chain
-from zwidth.show.figures.stability import draw_chart, draw_models, edges_of
-from zwidth.show.figures.style import GREY, figure, fitted_columns, inline_svg, label, number_logarithmic, save
+from zwidth.show.figures.stability import edges_of
+from zwidth.show.figures.style import fitted_columns, inline_svg, number_logarithmic
 from zwidth.show.mass_chain import as_chain
-from zwidth.show.output import OutputError
 
 
 def loop_of(name, changes=()):

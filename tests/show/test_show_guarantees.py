@@ -5,11 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 from tests.systems import mass
-from zwidth.guarantees.loop_guarantees import find_guarantees
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.guarantees import find_guarantees
+from zwidth.loop import Controller, Loop
+from zwidth.show import figure
 from zwidth.show.figures.guarantees import FILLS, draw_guarantees
-from zwidth.show.figures.style import figure
 
 
 def test_every_guarantee_is_in_the_legend_with_its_largest_stiffness():

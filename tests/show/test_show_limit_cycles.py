@@ -9,13 +9,12 @@ import pytest
 
 from tests.show.test_show_felt import texts
 from tests.systems import mass
-from zwidth.contact.friction_quantisation_plane import device_plane
+from zwidth.contact import device_plane
 from zwidth.contact.harmonic_balance import harmonic_balance
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.loop import Controller, Loop
+from zwidth.model import Counter, Friction, Nonlinear
+from zwidth.show import figure
 from zwidth.show.figures.limit_cycles import draw_balance, draw_plane
-from zwidth.show.figures.style import figure
 
 LOOP = Loop(mass(0.1, 0.1), Controller(0.001))
 ROUGH = Nonlinear((Friction(np.ones(1), 0.02),), (Counter(np.ones(1), 2e-5),))

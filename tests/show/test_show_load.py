@@ -13,19 +13,15 @@ from matplotlib import pyplot
 import zwidth
 from tests.model.beam_devices import slides
 from zwidth.device.new_device import new_device
-from zwidth.measures.definition import MISSING, OK, OUT_OF_REACH, STATUS
-from zwidth.model.load import Load
-from zwidth.model.mechanism import PRISMATIC
-from zwidth.show import load_text
-from zwidth.show.figures.load_path import COLOURS, draw_close_up, load_path_figure
-from zwidth.show.figures.map import MARKS
+from zwidth.measures import MISSING, OK, OUT_OF_REACH, STATUS
+from zwidth.model import PRISMATIC, Load
+from zwidth.show import MARKS, gather, keys_of_moments, load_path_figure, load_text, typed
+from zwidth.show.figures.load_path import COLOURS, draw_close_up
 from zwidth.show.figures.study import SYMBOLS
 from zwidth.show.load_text import balance_text, drive_rows, pushes_text
-from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.report import load as section
-from zwidth.show.report.facts import gather
-from zwidth.show.units import typed
-from zwidth.study.load.load_path import LoadPath, PushedChart
+from zwidth.study import LoadPath
+from zwidth.study.load.load_path import PushedChart
 
 WEAK = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
 

@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import PathPatch
 
 from zwidth.device.load import load
-from zwidth.measures.definition import (
+from zwidth.measures import (
     BEYOND_LIMIT,
     FAILED,
     NO_EQUILIBRIUM,
@@ -21,13 +21,8 @@ from zwidth.measures.definition import (
     Measure,
     NoValueError,
 )
-from zwidth.show.figures.map import MARKS, draw_map, map_figure
-from zwidth.show.figures.style import figure, save
-from zwidth.show.units import area_text, percent
-from zwidth.study.designs.requirement import parse_requirement
-from zwidth.study.workspace.common_area import common_area
-from zwidth.study.workspace.map import workspace_map
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.show import MARKS, area_text, draw_map, figure, map_figure, percent, save
+from zwidth.study import common_area, parse_requirement, plane_of, workspace_map
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from tests.study.test_optimise import RATIO, TASK, problem_study
 from zwidth.device.new_device import new_device
 from zwidth.show.figures.optimise import front_figure
 from zwidth.show.report.optimisation_text import sentences
+from zwidth.study import study_to_optimise
 from zwidth.study.optimise.optimise import optimise
-from zwidth.study.optimise.problem import study_to_optimise
 
 WALL = {"stiffness_N_per_m": 500.0, "damping_Ns_per_m": 1.0}
 AXES = [

@@ -8,9 +8,7 @@ import pytest
 import zwidth
 from tests.show.show_cases import check_legends_lie_beside
 from zwidth.contact import Box, Plane, Sphere, SurfaceWall
-from zwidth.show.figures.contact_response import LONGEST_LINE
-from zwidth.show.figures.mechanism_motion import draw_mechanism_motion, mechanism_motion_figure
-from zwidth.show.figures.style import save
+from zwidth.show import LONGEST_LINE, draw_mechanism_motion, mechanism_motion_figure, save
 
 BALL = Sphere((0.0, 0.31), 0.05)
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from zwidth.chart.polar import ByDirection, circle
+from zwidth.chart import ByDirection, circle
+from zwidth.show import figure, save
 from zwidth.show.figures.polar import draw_polar
-from zwidth.show.figures.style import figure, save
 
 
 def directions_of(stiffness, status=None):

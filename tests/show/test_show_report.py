@@ -13,12 +13,12 @@ from html.parser import HTMLParser
 import pytest
 from markupsafe import Markup
 
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.device.load import from_document, load
-from zwidth.model.posture import OutOfReach
-from zwidth.show.output import json_text
+from zwidth.chart import ChartError
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.model import OutOfReach
+from zwidth.show import gather, json_text
 from zwidth.show.report import facts as facts_module
-from zwidth.show.report.facts import gather
 from zwidth.show.report.report import keep_units, page, write_report
 
 NO_STABLE_WALL = ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]

@@ -15,11 +15,9 @@ from matplotlib.axes import Axes
 import zwidth
 from tests.identify.spring_bench import bench_record
 from zwidth.result import Result
+from zwidth.show import json_value
 from zwidth.show.figures.plots import DRAWINGS
-from zwidth.show.output import json_value
-from zwidth.study.designs.study_arguments import study_over
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.study import plane_of, study_of, study_over
 
 LINES = 8
 PACKAGES = ["chart", "conditions", "contact", "guarantees", "loop", "measures", "model", "study"]

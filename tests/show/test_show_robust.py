@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from tests.systems import mass
-from zwidth.chart.robust.chart import robust_chart
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.chart import robust_chart
+from zwidth.loop import Controller, Loop
+from zwidth.show import figure, save
 from zwidth.show.figures.robust import NAMED, draw_robust
-from zwidth.show.figures.style import figure, save
 
 
 def texts(ax):

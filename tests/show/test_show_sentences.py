@@ -11,12 +11,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from zwidth.device.load import from_document, load
+from zwidth.device import from_document
+from zwidth.device.load import load
 from zwidth.loop.motion_names import group_names
+from zwidth.show import gather
 from zwidth.show.report import sentences
-from zwidth.show.report.facts import gather
+from zwidth.study import Variant, limiting_change
 from zwidth.study.sensitivity.result import Sensitivity
-from zwidth.study.sensitivity.what_if import Variant, limiting_change
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 FIRST_ORDER = "loop.velocity.filter={type='first-order', time_constant_s=0.002}"

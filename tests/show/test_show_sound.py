@@ -12,12 +12,11 @@ import pytest
 
 from tests.cli.command_runner import document_of, run_command
 from tests.systems import published
-from zwidth.contact.environments import ENVIRONMENTS
+from zwidth.contact import ENVIRONMENTS
 from zwidth.contact.simulate import simulate
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
-from zwidth.show.output import OutputError
+from zwidth.loop import Controller, Loop
+from zwidth.model import Plant
+from zwidth.show import OutputError
 from zwidth.show.sound import FADE, PEAK, RATE, Silence, sound_of, speed_for, write_sound
 
 WALL = ENVIRONMENTS["wall"]

@@ -8,12 +8,11 @@ import xarray as xr
 
 from tests.study.study_cases import TWO_MASS, axis, study
 from zwidth.memory_limit import TooLarge
-from zwidth.show import sweep_files
+from zwidth.show import OutputError, csv_text, json_text, sweep_files
 from zwidth.show.dataset import write_zarr
-from zwidth.show.output import OutputError, csv_text, json_text
 from zwidth.show.sweep_files import write_sweep_csv, write_sweep_zarr
+from zwidth.study import Sweep, run_study
 from zwidth.study.designs import sweep_data
-from zwidth.study.designs.sweep import Sweep, run_study
 from zwidth.study.jobs import executor
 
 MASS = axis("plant.mass_kg.0.0", range=[-0.05, 0.3], tie=["plant.mass_kg.1.1"])

@@ -9,14 +9,12 @@ import pytest
 from hypothesis import given as over
 from hypothesis import strategies as st
 
+from zwidth.show import amount, area_text, percent
 from zwidth.show.units import (
     NONE,
     PREFIXES,
-    amount,
-    area_text,
     as_written,
     number,
-    percent,
     point,
     printed,
     quantity,

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from zwidth.measures.definition import FAILED, NO_VALUE, OK, MeasureError, Note
-from zwidth.study.jobs.job import CellValues
+from zwidth.measures import FAILED, NO_VALUE, OK, MeasureError, Note
+from zwidth.study import CellValues
 
 LEFT_OUT = "is a multiple of seven"
 

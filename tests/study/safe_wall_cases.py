@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from zwidth.chart.point_radii import radii_at_points
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 from zwidth.device.new_device import new_device
-from zwidth.measures.definition import OK
+from zwidth.measures import OK
 
 
 def random_device(kind, seed):

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.device.faults import DeviceError
-from zwidth.measures.definition import OK
-from zwidth.study.designs.study import Study
-from zwidth.study.designs.study_file import study_of
+from zwidth.device import DeviceError
+from zwidth.measures import OK
+from zwidth.study import Study, study_of
 
 FIVE_BAR, TWO_MASS = "five-bar", "published-two-mass"
 RIGHT_LENGTH, LEFT_LENGTH = "links.upper-right.length_m", "links.upper-left.length_m"

@@ -21,10 +21,10 @@ from tests.model.beam_devices import (
     with_beams,
     without_beams,
 )
-from zwidth.device.load import from_document
+from zwidth.device import from_document
 from zwidth.device.new_device import new_device
-from zwidth.loop.point_errors import MissingNumbersError, OperatingPointError
-from zwidth.model.modes import natural_frequencies
+from zwidth.loop import MissingNumbersError, OperatingPointError
+from zwidth.model import natural_frequencies
 from zwidth.study.load.bending import DAMPING, FIRST_ROOT, LEAST_SHARE, SHARE, THICKEST, WALL, with_rigid_links
 
 E, RHO = 68.9e9, 2700.0  # of aluminium 6061 [Pa], [kg/m^3], as `zwidth.model.beam_section` has them

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from tests.study.study_cases import study_document
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.designs.sweep import run_study
+from zwidth.study import run_study, study_of
 
 MOTORS = """name,inertia_kg_m2,torque_Nm,price
 small,6e-7,0.02,40

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
-from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.tracer import Tracer
-from zwidth.device.load import from_document, load
-from zwidth.loop.loop_table import table_of_loops
+from zwidth.chart import ChartError, Tracer, largest_stiffness
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.loop import table_of_loops
+from zwidth.study import optimum, sensitivities
 from zwidth.study.sensitivity import changed_devices
 from zwidth.study.sensitivity.changed_devices import ChangedDevices
-from zwidth.study.sensitivity.optimum import OptimumError, optimum
-from zwidth.study.sensitivity.sensitivities import sensitivities
+from zwidth.study.sensitivity.optimum import OptimumError
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 # Bundled device, changes of it, and where it is asked: positions [m] or joint angles [rad].

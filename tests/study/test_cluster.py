@@ -14,15 +14,11 @@ import pytest
 
 from tests.study.cluster_cases import running_cluster
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
-from zwidth.measures.definition import FAILED, OUT_OF_TIME
+from zwidth.measures import FAILED, OUT_OF_TIME
+from zwidth.study import CannotStart, RecoveredWarning, Store, open_executor, pack_job, run
 from zwidth.study.jobs import cluster as clusters
 from zwidth.study.jobs import cluster_worker
 from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
-from zwidth.study.jobs.executor import RecoveredWarning, run
-from zwidth.study.jobs.executor_interface import open_executor
-from zwidth.study.jobs.recovery import CannotStart
-from zwidth.study.jobs.store import Store
-from zwidth.study.jobs.workers import pack_job
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 

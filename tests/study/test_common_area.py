@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import load
-from zwidth.measures.definition import Measure
-from zwidth.study.designs.requirement import parse_requirement
-from zwidth.study.workspace.common_area import common_area, nonnegative_region
-from zwidth.study.workspace.map import workspace_map
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import Measure
+from zwidth.study import common_area, parse_requirement, plane_of, workspace_map
+from zwidth.study.workspace.common_area import nonnegative_region
 from zwidth.study.workspace.reach_outline import KEY, reach_outline
 
 MIDDLE = (0.02, 0.2)

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from tests.study_sizes import study_size
-from zwidth.chart.verdict import judge
+from zwidth.chart import judge
 from zwidth.device import address
 from zwidth.device.load import load
+from zwidth.measures import FAILED, OK, OUT_OF_REACH
 from zwidth.measures.bindings import impedance, wall_decay
-from zwidth.measures.definition import FAILED, OK, OUT_OF_REACH
+from zwidth.study import Axis, Sampling, SweepJob, Tie
 from zwidth.study.designs.column import column_named
-from zwidth.study.designs.sampling import Axis, Sampling, Tie
-from zwidth.study.designs.sweep_job import SweepJob
 
 MECHANISM = ("stiffness_max", "damping_max", "stable_area", "isotropy", "rigid_mass", "acceleration_max")
 PLANT = ("stiffness_max", "damping_max", "stable_area", "rigid_mass")

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 import zwidth
-from zwidth.chart.chart import largest_stiffness
-from zwidth.measures.load_effect import fastest_sideways_motion
-from zwidth.model.load import Load
+from zwidth.chart import largest_stiffness
+from zwidth.measures import fastest_sideways_motion
+from zwidth.model import Load
 
 PAGE = (Path(__file__).parents[2] / "docs" / "equilibrium.md").read_text(encoding="utf-8")
 TEXT = " ".join(PAGE.split())

@@ -20,14 +20,13 @@ from tests.study.executor_cases import (
     RootsJob,
     same_cells,
 )
-from zwidth.measures.definition import FAILED, MISSING, NO_VALUE, MeasureError, Note
+from zwidth.measures import FAILED, MISSING, NO_VALUE, MeasureError, Note
 from zwidth.memory_limit import TooLarge
+from zwidth.study import Store, pack_job, run
 from zwidth.study.jobs import batch_size as batches
 from zwidth.study.jobs.batch_size import batch_size
-from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.notes import MORE, merge_notes
-from zwidth.study.jobs.store import Store
-from zwidth.study.jobs.workers import cores, pack_job
+from zwidth.study.jobs.workers import cores
 
 NO_PATIENCE = -1.0  # patience that is over at once
 

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from zwidth.chart.table_radii import spectral_radii
-from zwidth.chart.verdict import spectral_radius
-from zwidth.device.load import from_document, load
+from zwidth.chart import spectral_radii, spectral_radius
+from zwidth.device import from_document
+from zwidth.device.load import load
 from zwidth.device.new_device import new_device
-from zwidth.loop.table_states import CHAINED
+from zwidth.loop import CHAINED
+from zwidth.study import Family, FamilyMember, Range, robust_study
 from zwidth.study.robust import family as robust_family
 from zwidth.study.robust import unseen_members
-from zwidth.study.robust.family import Family, FamilyMember, Range, build_together
-from zwidth.study.robust.robust_study import robust_study
+from zwidth.study.robust.family import build_together
 
 LENGTHS = ("links.upper-left.length_m", "links.distal-right.length_m")
 FIVE_BAR = (

@@ -13,13 +13,11 @@ from scipy.optimize import brentq
 from tests.frozen.mechanisms import mechanism_file
 from tests.frozen.plants import plant_file
 from tests.frozen.toml_text import toml_text
-from zwidth.chart.chart import largest_stiffness
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.device import address
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document, load
-from zwidth.study.sensitivity.goal import numbers_for_goal
-from zwidth.study.sensitivity.sensitivities import property_numbers, sensitivities
+from zwidth.chart import ChartError, largest_stiffness
+from zwidth.device import DeviceError, address, from_document
+from zwidth.device.load import load
+from zwidth.study import numbers_for_goal, sensitivities
+from zwidth.study.sensitivity.sensitivities import property_numbers
 
 
 def one_mass(**loop):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from zwidth.study.jobs.journal import Journal, JournalError, fingerprint
+from zwidth.study import Journal, JournalError, fingerprint
 
 QUESTION = fingerprint("what?")
 

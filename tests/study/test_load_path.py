@@ -10,10 +10,11 @@ import pytest
 
 import zwidth
 from zwidth.device.new_device import new_device
-from zwidth.loop.point_errors import NoMechanismError
-from zwidth.measures.load_effect import fastest_sideways_motion
-from zwidth.model.load import Load
-from zwidth.study.load.load_path import load_path, without_push
+from zwidth.loop import NoMechanismError
+from zwidth.measures import fastest_sideways_motion
+from zwidth.model import Load
+from zwidth.study import load_path
+from zwidth.study.load.load_path import without_push
 
 LIMITS = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
 

@@ -7,13 +7,19 @@ import pytest
 
 from tests.cli.command_runner import document_of, run_command
 from zwidth.device.load import load
-from zwidth.measures.definition import Measure, NoValueError
-from zwidth.show.output import csv_text, json_value
-from zwidth.study.designs.requirement import parse_requirement
-from zwidth.study.workspace.common_area import common_area
-from zwidth.study.workspace.map import map_job, measures_of, workspace_map
-from zwidth.study.workspace.map_data import map_document, map_table, why_no_cell
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import Measure, NoValueError
+from zwidth.show import csv_text, json_value
+from zwidth.study import (
+    common_area,
+    map_document,
+    map_job,
+    map_table,
+    parse_requirement,
+    plane_of,
+    why_no_cell,
+    workspace_map,
+)
+from zwidth.study.workspace.map import measures_of
 
 DEVICE = "five-bar"
 COUNTS = (7, 5)

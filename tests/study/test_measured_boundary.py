@@ -8,15 +8,14 @@ from math import isnan, nan
 import pytest
 
 from tests.systems import published
-from zwidth.chart.chart import stability_chart
-from zwidth.contact.boundary_experiment import EdgePoint, StableExtent
-from zwidth.contact.stability_trial import TrialError
-from zwidth.device.load import from_document, load
-from zwidth.study.boundary.experiment import measure_boundary, run_experiment
-from zwidth.study.boundary.experiment_plan import Plan
-from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint
-from zwidth.study.boundary.user_points import UserPoint
-from zwidth.study.jobs.journal import JournalError
+from zwidth.chart import stability_chart
+from zwidth.contact import StableExtent, TrialError
+from zwidth.contact.boundary_experiment import EdgePoint
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.study import Experiment, JournalError, MeasuredPoint, Plan, UserPoint, measure_boundary
+from zwidth.study.boundary.experiment import run_experiment
+from zwidth.study.boundary.measured_boundary import Cause
 
 FEWEST = Plan(stiffnesses=1, tips=0)
 

@@ -4,18 +4,22 @@ import numpy as np
 import pytest
 
 from tests.study.study_cases import axis, study_document
-from zwidth.device.faults import DeviceError
+from zwidth.device import OPERATORS, DeviceError, bundled_names
 from zwidth.device.load import load
-from zwidth.device.read import OPERATORS, bundled_names
-from zwidth.measures.definition import OK, OUT_OF_REACH
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.store import StoreError
-from zwidth.study.optimise.evaluation import Judge
+from zwidth.measures import OK, OUT_OF_REACH
+from zwidth.study import (
+    Judge,
+    StoreError,
+    gradients,
+    neighbours,
+    problem_of,
+    run,
+    share_of,
+    study_of,
+    study_to_optimise,
+    values_at,
+)
 from zwidth.study.optimise.optimise import optimise
-from zwidth.study.optimise.polish import gradients, neighbours
-from zwidth.study.optimise.problem import problem_of, study_to_optimise
-from zwidth.study.optimise.variables import share_of, values_at
 
 TWO_MASS = "published-two-mass"
 LINKS = [

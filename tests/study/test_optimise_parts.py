@@ -5,11 +5,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from zwidth.study.designs.sampling import Axis
+from zwidth.study import Axis, gradients, hypervolume, neighbours, settle, share_of, values_at
 from zwidth.study.optimise.evaluation import margins
-from zwidth.study.optimise.front import hypervolume, knee, spread_out, undominated
-from zwidth.study.optimise.polish import gradients, neighbours
-from zwidth.study.optimise.variables import continuous, settle, share_of, value_at, values_at
+from zwidth.study.optimise.front import knee, spread_out, undominated
+from zwidth.study.optimise.variables import continuous, value_at
 
 AXES = (
     Axis("linear", (), (2.0, 6.0)),

@@ -4,17 +4,11 @@ import numpy as np
 import pytest
 
 from tests.study.study_cases import axis, study_document
-from zwidth.device.faults import DeviceError
-from zwidth.device.read import OPERATORS, bundled_names
+from zwidth.device import OPERATORS, DeviceError, bundled_names
+from zwidth.show import percent
 from zwidth.show.report.optimisation_text import sentences
-from zwidth.show.units import percent
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.jobs.executor import run
-from zwidth.study.optimise.evaluation import Judge
+from zwidth.study import Judge, member_changes, problem_of, run, study_of, values_at
 from zwidth.study.optimise.optimise import optimise
-from zwidth.study.optimise.problem import problem_of
-from zwidth.study.optimise.variables import values_at
-from zwidth.study.tolerances.draws import member_changes
 
 MASS = {"key": "plant.mass_kg", "distribution": "uniform", "plus_minus_percent": 5}
 PERIOD = {"key": "loop.sampling_period_s", "distribution": "uniform", "plus_minus": 1e-5}

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document, load
-from zwidth.model.posture import Singular, reachable_positions, solve_posture
-from zwidth.study.workspace.plane_grid import PlaneError, plane_of, reachable_set, rounded_outwards
+from zwidth.device import DeviceError, from_document
+from zwidth.device.load import load
+from zwidth.model import Singular, reachable_positions, solve_posture
+from zwidth.study import PlaneError, plane_of
+from zwidth.study.workspace.plane_grid import reachable_set, rounded_outwards
 
 
 @pytest.fixture(scope="module")

@@ -14,13 +14,11 @@ import pytest
 
 from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
-from zwidth.measures.definition import FAILED, OUT_OF_TIME, MeasureError
+from zwidth.measures import FAILED, OUT_OF_TIME, MeasureError
+from zwidth.study import CannotStart, RecoveredWarning, Store, open_executor, pack_job, run
 from zwidth.study.jobs import recovery
-from zwidth.study.jobs.executor import RecoveredWarning, run
-from zwidth.study.jobs.executor_interface import open_executor
-from zwidth.study.jobs.recovery import CannotStart, OutOfTime, WorkerLost, compute_range
-from zwidth.study.jobs.store import Store
-from zwidth.study.jobs.workers import WorkerProcess, pack_job
+from zwidth.study.jobs.recovery import OutOfTime, WorkerLost, compute_range
+from zwidth.study.jobs.workers import WorkerProcess
 
 NO_PATIENCE = -1.0
 TRUE_CELLS = RootsJob(40).compute(0, 40)

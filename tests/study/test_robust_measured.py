@@ -7,11 +7,10 @@ import pytest
 
 from tests.measured_handle_cases import COLLOCATED, frequencies, measured_device
 from zwidth.chart.verdict import STABLE, UNSTABLE
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.model.plant import Plant
-from zwidth.study.robust.family import Family, Range, RangeError
-from zwidth.study.robust.robust_study import robust_study
+from zwidth.model import Plant
+from zwidth.study import Family, Range, RangeError, robust_study
 
 T = 0.001
 LOOP = "[loop]\nsampling_period_s = 0.001\n{}"

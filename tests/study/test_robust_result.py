@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.device.load import from_document, load
-from zwidth.study.robust.family import Family, Range
-from zwidth.study.robust.robust_study import robust_study
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.study import Family, Range, robust_study
 
 KEYS = {
     "regions",

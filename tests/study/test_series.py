@@ -5,8 +5,8 @@ import json
 import pytest
 
 from tests.study.executor_cases import RootsJob
-from zwidth.study.jobs.series import JobSeries, remove_stores
-from zwidth.study.jobs.store import StoreError
+from zwidth.study import JobSeries, StoreError
+from zwidth.study.jobs.series import remove_stores
 
 
 def computed(folder, question="first", cells=33, name="1"):

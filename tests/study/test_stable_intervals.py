@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.verdict import spectral_radius
-from zwidth.device.load import from_document, load
+from zwidth.chart import spectral_radius, stability_chart
+from zwidth.device import from_document
+from zwidth.device.load import load
 from zwidth.study.safe_walls.edge_chords import MOST_CHORDS, EdgeChords, _fill_all, edges_of_points
 from zwidth.study.safe_walls.grid import Sectors, cells_of
 from zwidth.study.safe_walls.stable_intervals import GAPS, common_interval, stable_intervals

@@ -10,9 +10,8 @@ import pytest
 import zarr
 
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
-from zwidth.measures.definition import MISSING, STATUS
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.store import Store, StoreError
+from zwidth.measures import MISSING, STATUS
+from zwidth.study import Store, StoreError, run
 
 
 def partial_store(path, job, batches, size=5):

@@ -18,10 +18,10 @@ import pytest
 from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
+from zwidth.study import FolderLock, Store, StoreError, run
 from zwidth.study.jobs import executor
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.store import Store, StoredCells, StoreError
-from zwidth.study.jobs.store_lock import FolderLock, owner_of
+from zwidth.study.jobs.store import StoredCells
+from zwidth.study.jobs.store_lock import owner_of
 
 HOLDING = """
 import sys, time

@@ -9,9 +9,9 @@ import zwidth
 from tests.cli.command_runner import document_of, run_command
 from tests.undrawn_figures import leave_undrawn
 from zwidth.device.new_device import new_device
-from zwidth.measures.catalogue import MEASURES
-from zwidth.model.load import Load
-from zwidth.study.designs.sweep import sweep
+from zwidth.measures import MEASURES
+from zwidth.model import Load
+from zwidth.study import sweep
 
 WRIST, PADDLE = "openwrist", "five-bar"
 

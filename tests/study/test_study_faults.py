@@ -16,10 +16,10 @@ from tests.study.study_cases import (
     study,
     study_document,
 )
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.device.new_device import new_device
 from zwidth.memory_limit import TooLarge
-from zwidth.study.designs.study_file import read_study, study_of
+from zwidth.study import read_study, study_of
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)
 

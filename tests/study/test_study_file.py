@@ -9,8 +9,8 @@ import pytest
 
 from tests.study.study_cases import FIVE_BAR, LEFT_LENGTH, RIGHT_LENGTH, TWO_MASS, axis, study
 from zwidth.device.load import load
-from zwidth.study.designs.sampling import Axis, Sampling, settings, spread
-from zwidth.study.designs.study_file import read_study, study_of
+from zwidth.study import Axis, Sampling, read_study, study_of
+from zwidth.study.designs.sampling import settings, spread
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)
 

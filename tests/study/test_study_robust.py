@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from zwidth.chart.verdict import judge
-from zwidth.device import address
-from zwidth.device.load import from_document, load
-from zwidth.study.robust.family import Family, FamilyMember, Range, RangeError
-from zwidth.study.robust.robust_study import RobustError, robust_study, sample_walls
+from zwidth.chart import judge
+from zwidth.device import address, from_document
+from zwidth.device.load import load
+from zwidth.study import Family, FamilyMember, Range, RangeError, RobustError, robust_study
+from zwidth.study.robust.robust_study import sample_walls
 
 PAGE = Path(__file__).parents[2] / "docs" / "robust.md"
 

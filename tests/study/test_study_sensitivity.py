@@ -9,18 +9,15 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
+from zwidth.chart import ChartError, Peak, Tracer, closed_rings, largest_stiffness, stability_chart
 from zwidth.chart.arcs import MINUS, PAIR, PLUS
-from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError, closed_rings
-from zwidth.chart.peak import Peak
-from zwidth.chart.tracer import Tracer
-from zwidth.device import address
-from zwidth.device.load import device_of_point, from_document, load
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
+from zwidth.device import address, from_document
+from zwidth.device.load import device_of_point, load
+from zwidth.loop import Loop
+from zwidth.model import Plant
+from zwidth.study import optimum, sensitivities
 from zwidth.study.sensitivity.derivative import central_derivative, one_sided_derivative
-from zwidth.study.sensitivity.optimum import optimum, second_peak_stiffness
-from zwidth.study.sensitivity.sensitivities import sensitivities
+from zwidth.study.sensitivity.optimum import second_peak_stiffness
 
 LATE = "loop.delay_samples=1"
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, published
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.chart_base import BoundaryArc
-from zwidth.device.load import from_document, load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.chart import BoundaryArc, stability_chart
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.loop import Controller, Loop
 from zwidth.study.validity import edge_distance, validity
 
 K_E, M1, M2 = 15620.0, 0.2616, 0.0254

@@ -9,21 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.device.load import from_document, load
-from zwidth.loop.controller import Butterworth
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import attach
-from zwidth.study.sensitivity.what_if import (
-    BASE,
-    REMEDIES,
-    VARIANT_MODELS,
-    find_variant,
-    half_period,
-    limiting_change,
-    usual_filter,
-    what_if,
-)
+from zwidth.chart import largest_stiffness, stability_chart
+from zwidth.device import from_document
+from zwidth.device.load import load
+from zwidth.loop import Butterworth, Loop
+from zwidth.model import attach
+from zwidth.study import find_variant, limiting_change, what_if
+from zwidth.study.sensitivity.what_if import BASE, REMEDIES, VARIANT_MODELS, half_period, usual_filter
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 RIGID = ["drives.motor-right.stiffness_Nm_per_rad=unset", "drives.motor-left.stiffness_Nm_per_rad=unset"]

@@ -18,29 +18,24 @@ from tests.study.study_cases import (
     study,
     study_document,
 )
-from zwidth.chart.chart import largest_stiffness
-from zwidth.device.device import Device
+from zwidth.chart import largest_stiffness
+from zwidth.device import Device
 from zwidth.device.load import load
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import (
-    FAILED,
-    NO_VALUE,
-    OK,
-    OUT_OF_REACH,
-    STATUS,
-    Measure,
-    MeasureError,
-    WantedWall,
-)
+from zwidth.loop import OperatingPoint
+from zwidth.measures import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, MeasureError, WantedWall
 from zwidth.measures.evaluate import evaluate
 from zwidth.model.effective_parameters import effective_parameters
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.designs.sweep import Sweep, run_study, sweep
-from zwidth.study.designs.sweep_job import sweep_job
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.store import Store
-from zwidth.study.workspace.map import workspace_map
-from zwidth.study.workspace.workspace_summary import over_the_workspace
+from zwidth.study import (
+    Store,
+    Sweep,
+    over_the_workspace,
+    run,
+    run_study,
+    study_of,
+    sweep,
+    sweep_job,
+    workspace_map,
+)
 
 LENGTHS = axis(
     RIGHT_LENGTH, range=[0.11, 0.18], count=4, tie=[LEFT_LENGTH, {"key": "links.upper-left.mass_kg", "power": 1}]

@@ -10,13 +10,10 @@ import pytest
 
 import zwidth
 from tests.study.study_cases import FIVE_BAR, RIGHT_LENGTH, TWO_MASS, axis, study
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.measures.definition import FAILED, OK, Measure, MeasureError
-from zwidth.study.designs.study_arguments import study_over
-from zwidth.study.designs.sweep import run_study, sweep
-from zwidth.study.designs.sweep_job import sweep_job
-from zwidth.study.workspace.plane_grid import plane_of
+from zwidth.measures import FAILED, OK, Measure, MeasureError
+from zwidth.study import plane_of, run_study, study_over, sweep, sweep_job
 
 PERIOD, DELAY = "loop.sampling_period_s", "loop.delay_samples"
 PERIOD_MEASURE = Measure(

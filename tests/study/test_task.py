@@ -5,9 +5,8 @@ import pytest
 
 from tests.study.study_cases import faults, study_document
 from zwidth.device.load import load
-from zwidth.measures.definition import OK, OUT_OF_REACH
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.designs.sweep import run_study
+from zwidth.measures import OK, OUT_OF_REACH
+from zwidth.study import run_study, study_of
 from zwidth.study.designs.task import task_of
 
 FIVE_BAR = load("five-bar")

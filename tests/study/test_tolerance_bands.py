@@ -7,12 +7,10 @@ import pytest
 
 from tests.study.tolerance_cases import MASS, PERIOD, free_mass
 from zwidth.chart.verdict import NAMES
-from zwidth.measures.definition import OK, UNDECIDED
-from zwidth.show.figures.tolerance import band_path
-from zwidth.study.designs.sampling import Axis, Sampling
-from zwidth.study.designs.study_arguments import study_over
-from zwidth.study.designs.sweep_job import SweepJob, sweep_job
-from zwidth.study.tolerances.band import Band, Coverage, refined_dampings
+from zwidth.measures import OK, UNDECIDED
+from zwidth.show import band_path
+from zwidth.study import Axis, Coverage, Sampling, SweepJob, study_over, sweep_job
+from zwidth.study.tolerances.band import Band, refined_dampings
 from zwidth.study.tolerances.edge_job import MOST_INTERVALS, stable_intervals
 from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
 

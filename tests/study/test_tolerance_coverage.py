@@ -7,18 +7,20 @@ import pytest
 
 from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least_mass, uniform
 from tests.study_sizes import study_size
-from zwidth.device.device import Device
-from zwidth.device.load import from_document
-from zwidth.study.designs.sweep_job import sweep_job
-from zwidth.study.jobs.executor import run
-from zwidth.study.tolerances.band import Coverage
-from zwidth.study.tolerances.draws import drawn_values
-from zwidth.study.tolerances.edge_job import EdgeJob
+from zwidth.device import Device, from_document
+from zwidth.study import (
+    Coverage,
+    EdgeJob,
+    ToleranceStudy,
+    count_bounds,
+    drawn_values,
+    question_over,
+    run,
+    sweep_job,
+)
 from zwidth.study.tolerances.indices import indices_of, sampled_shares
-from zwidth.study.tolerances.intervals import Interval, count_bounds
+from zwidth.study.tolerances.intervals import Interval
 from zwidth.study.tolerances.question import LEAST_INDEX_SAMPLES
-from zwidth.study.tolerances.question_arguments import question_over
-from zwidth.study.tolerances.result import ToleranceStudy
 from zwidth.study.tolerances.tolerance_study import _measured, _tightened
 
 SEEDS = 400

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from zwidth.study.designs.sampling import Tie
+from zwidth.study import Tie, count_bounds, drawn_values, member_changes, shares_of
 from zwidth.study.tolerances.distribution import (
     CUT,
     Distribution,
@@ -15,9 +15,8 @@ from zwidth.study.tolerances.distribution import (
     normal,
     spread_of_variation,
 )
-from zwidth.study.tolerances.draws import DRAWN, UNSEEN, drawn_values, member_changes, shares_of
+from zwidth.study.tolerances.draws import DRAWN, UNSEEN
 from zwidth.study.tolerances.intervals import (
-    count_bounds,
     difference_interval,
     draws_needed,
     quantile_interval,

@@ -6,11 +6,9 @@ import pytest
 
 import zwidth
 from tests.study.tolerance_cases import tolerance_document, tolerance_faults, uniform
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.memory_limit import TooLarge
-from zwidth.study.designs.study_file import study_of
-from zwidth.study.tolerances.question import question_of
-from zwidth.study.tolerances.tolerance_study import tolerance
+from zwidth.study import question_of, study_of, tolerance
 
 LENGTH = "links.upper-right.length_m"
 

@@ -10,9 +10,8 @@ from scipy import stats
 
 import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, free_mass, tolerance_document, tolerance_faults
-from zwidth.device.faults import DeviceError
-from zwidth.study.tolerances.question_arguments import question_over
-from zwidth.study.tolerances.tolerance_study import tolerance
+from zwidth.device import DeviceError
+from zwidth.study import question_over, tolerance
 
 NORMAL, LOGNORMAL = {"distribution": "normal"}, {"distribution": "lognormal"}
 UNIFORM, TRIANGULAR = {"distribution": "uniform"}, {"distribution": "triangular"}

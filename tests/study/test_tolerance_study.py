@@ -11,14 +11,11 @@ import pytest
 import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least_mass, radius, uniform
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
-from zwidth.show.figures.tolerance import band_path
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.series import JobSeries
-from zwidth.study.tolerances.draws import UNSEEN, shares_of
-from zwidth.study.tolerances.edge_job import EdgeJob
-from zwidth.study.tolerances.intervals import count_bounds
+from zwidth.show import band_path
+from zwidth.study import EdgeJob, JobSeries, count_bounds, run, run_tolerances, shares_of, tolerance
+from zwidth.study.tolerances.draws import UNSEEN
 from zwidth.study.tolerances.tighten import tightened
-from zwidth.study.tolerances.tolerance_study import answer, run_tolerances, tolerance
+from zwidth.study.tolerances.tolerance_study import answer
 
 MASSES = {"plant.mass_kg": uniform(20.0)}
 BOTH = {"plant.mass_kg": uniform(20.0), "loop.sampling_period_s": uniform(5.0)}

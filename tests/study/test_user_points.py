@@ -8,9 +8,8 @@ from math import isnan
 import pytest
 
 from tests.systems import published
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_crossings import exact_edge
-from zwidth.study.boundary.user_points import UserPoint, compare_points
+from zwidth.chart import exact_edge, stability_chart
+from zwidth.study import UserPoint, compare_points
 
 POINTS = (
     UserPoint(4000.0, 2.6, "lower", trials=4),

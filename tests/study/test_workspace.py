@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm
-from zwidth.device.faults import DeviceError
+from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.definition import (
+from zwidth.measures import (
     FAILED,
+    MEASURES,
     NO_VALUE,
     OK,
     OUT_OF_REACH,
@@ -25,11 +25,10 @@ from zwidth.measures.definition import (
     WantedWall,
 )
 from zwidth.measures.evaluate import evaluate_safely
-from zwidth.model.posture import PostureError
-from zwidth.study.jobs.store import Store
-from zwidth.study.workspace.map import MapJob, as_dataset, map_job, workspace_map
-from zwidth.study.workspace.plane_grid import PlaneError, plane_of
-from zwidth.study.workspace.workspace_summary import over_the_workspace, positions
+from zwidth.model import PostureError
+from zwidth.study import PlaneError, Store, map_job, over_the_workspace, plane_of, workspace_map
+from zwidth.study.workspace.map import MapJob, as_dataset
+from zwidth.study.workspace.workspace_summary import positions
 
 SINGLE_POINT_MEASURE = Measure(
     "each", "Asked one by one", "N", "lower", "", lambda place: 10.0 * float(place.effective.rigid_mass), each=True
@@ -113,7 +112,7 @@ def test_each_cell_is_the_question_asked_alone(seed, make):
 
 
 def test_the_exact_stiffness_is_the_chart_s(device):
-    from zwidth.chart.chart import largest_stiffness
+    from zwidth.chart import largest_stiffness
 
     plane = plane_of(device, x=(-0.2, 0.2), y=(0.1, 0.3), cells=(3, 3))
     found = workspace_map(device, ["stiffness_max"], plane)

@@ -7,13 +7,13 @@ import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm, spatial_loop
 from zwidth.device.load import load
-from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.definition import NO_VALUE, OK, Measure, MeasureError, NoValueError
-from zwidth.model.posture import solve_posture
-from zwidth.study.designs.requirement import Requirement, parse_requirement
+from zwidth.loop import OperatingPoint
+from zwidth.measures import MEASURES, NO_VALUE, OK, Measure, MeasureError, NoValueError
+from zwidth.model import solve_posture
+from zwidth.study import extreme_over_directions, parse_requirement
+from zwidth.study.designs.requirement import Requirement
 from zwidth.study.workspace.direction_share import share_measure, share_of_directions
-from zwidth.study.workspace.extreme_direction import extreme_over_directions, sphere
+from zwidth.study.workspace.extreme_direction import sphere
 
 KINDS = {"planar": random_five_bar, "arm": spatial_arm, "loop": spatial_loop}
 

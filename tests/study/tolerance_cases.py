@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
-from zwidth.device.load import from_document
-from zwidth.study.tolerances.question import question_of
+from zwidth.device import Device, DeviceError, from_document
+from zwidth.study import question_of
 
 PERIOD, MASS = 0.001, 0.1
 STIFFEST = 4.0 * (3.0 - 2.0 * np.sqrt(2.0))  # K_max T^2 / m of a free mass, in closed form

@@ -1,6 +1,12 @@
 from .device import Device as Device
+from .edit_file import edited_text as edited_text
 from .faults import DeviceError as DeviceError
 from .load import from_document as from_document
 from .new_device import new_device as new_device
+from .numbers import DeviceNumber as DeviceNumber
+from .numbers import device_numbers as device_numbers
+from .plausibility import implausible as implausible
+from .read import OPERATORS as OPERATORS
 from .read import bundled as bundled
+from .read import bundled_names as bundled_names
 from .robot_files.import_file import import_file as import_file

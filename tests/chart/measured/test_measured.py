@@ -12,16 +12,10 @@ from scipy.signal import lfilter
 from tests import systems
 from tests.measured_cases import frequency_grid, measured_response, sampled_response
 from tests.study_sizes import study_size
-from zwidth.chart.chart import stability_chart
+from zwidth.chart import MeasuredLoop, eigenvalues, measured_chart, stability_chart
 from zwidth.chart.measured.boundary import coarse_angles, nyquist_count, sample_boundary
-from zwidth.chart.measured.chart import measured_chart
-from zwidth.chart.measured.loop import MeasuredLoop
-from zwidth.chart.verdict import eigenvalues
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.estimators import CentralDifference, LeastSquaresSlope, SavitzkyGolay
-from zwidth.loop.loop import Loop
-from zwidth.model.plant import Plant
-from zwidth.model.response import Response, ResponseError, integrators_of
+from zwidth.loop import Butterworth, CentralDifference, Controller, LeastSquaresSlope, Loop, SavitzkyGolay
+from zwidth.model import Plant, Response, ResponseError, integrators_of
 from zwidth.model.sweep_response import sweep_response
 
 DAMPED = (0.01, 0.05, 0.3, 1.0, 1.5)

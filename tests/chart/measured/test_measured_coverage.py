@@ -11,14 +11,10 @@ from tests import systems
 from tests.measured_cases import chirp
 from tests.noisy_benches import random_bench, readings
 from tests.study_sizes import study_size
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.measured.chart import measured_chart
-from zwidth.chart.verdict import eigenvalues
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
+from zwidth.chart import eigenvalues, measured_chart, stability_chart
+from zwidth.loop import Butterworth, Controller, Loop
+from zwidth.model import Plant, ResponseError, integrators_of
 from zwidth.model.joint_confidence import joint_radius
-from zwidth.model.plant import Plant
-from zwidth.model.response import ResponseError, integrators_of
 from zwidth.model.sweep_response import sweep_response
 
 CLAIMED = 0.95

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.cli.command_runner import document_of
-from zwidth.chart.measured.chart import MeasuredChart
+from zwidth.chart import MeasuredChart
 from zwidth.device.load import load
 
 PAGE = (Path(__file__).parents[3] / "docs" / "measured.md").read_text(encoding="utf-8")

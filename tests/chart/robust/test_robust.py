@@ -10,16 +10,18 @@ import shapely
 from study_sizes import study_size
 from systems import mass, random_loop, reference_transition_matrix, two_mass
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.robust.chart import robust_chart
-from zwidth.chart.robust.instability import softening, unstable
-from zwidth.chart.tracer import Tracer
-from zwidth.chart.verdict import judge, spectral_radius
-from zwidth.loop.controller import Butterworth, Controller
-from zwidth.loop.loop import Loop
-from zwidth.model.operator import Operator, attach
-from zwidth.model.plant import Plant
+from zwidth.chart import (
+    ChartError,
+    Tracer,
+    judge,
+    robust_chart,
+    softening,
+    spectral_radius,
+    stability_chart,
+    unstable,
+)
+from zwidth.loop import Butterworth, Controller, Loop
+from zwidth.model import Operator, Plant, attach
 
 # Random members: of every kind, with one to five of them on the edge, and two that exclude each other.
 WALL_SEEDS = (2, 17, 20, 33, 40, 47, 51, 57)

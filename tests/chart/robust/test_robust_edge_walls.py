@@ -10,9 +10,7 @@ from tests.apart import ExactLoop
 from tests.chart.exact_radii import is_off, joined_excess, walls_beside_origin
 from tests.chart.robust.test_robust import similar_loops
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.chart.robust.chart import robust_chart
+from zwidth.chart import ChartError, robust_chart, stability_chart
 
 OFF = 1e-9
 # Walls judged in 40 digits, of those that double precision finds off: the farthest off of each member.

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from systems import mass, two_mass
 
-from zwidth.chart.robust.chart import robust_chart, robust_chart_of_members
+from zwidth.chart import TracedEdge, robust_chart
+from zwidth.chart.robust.chart import robust_chart_of_members
 from zwidth.chart.robust.edge_check import walls_off_edge
 from zwidth.chart.robust.members import chart_members
-from zwidth.chart.traced_edge import TracedEdge
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
+from zwidth.loop import Controller, Loop
 
 
 def free_mass(kilograms):

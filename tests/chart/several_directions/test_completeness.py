@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 import shapely
 
+from zwidth.chart import Box, multi_chart, trace_curves
 from zwidth.chart.off_circle import sides_of_circle
-from zwidth.chart.several_directions.box import Box
-from zwidth.chart.several_directions.chart import multi_chart
 from zwidth.chart.several_directions.completeness import shows_all_walls, walls_beside_regions
-from zwidth.chart.several_directions.curve_set import trace_curves
-from zwidth.loop.controller import Controller
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.wall_matrices import WallMatrices
-from zwidth.model.multi_plant import MultiPlant
+from zwidth.loop import Controller, MultiLoop, WallMatrices
+from zwidth.model import MultiPlant
 
 
 def masses_on_a_spring(stiffness=8000.0):

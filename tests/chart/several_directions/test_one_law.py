@@ -9,15 +9,10 @@ import shapely
 from multi_loops import as_multi, random_multi, reference_radius, side_by_side
 from systems import random_loop, two_mass
 
-from zwidth.chart.chart import largest_stiffness, stability_chart
-from zwidth.chart.polar import circle, largest_stiffness_by_direction
-from zwidth.chart.several_directions.chart import multi_chart
+from zwidth.chart import circle, largest_stiffness, largest_stiffness_by_direction, multi_chart, stability_chart
 from zwidth.device.load import load
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.model.multi_plant import MultiPlant, reduce_directions
-from zwidth.model.reduction import reduce_mechanism
+from zwidth.loop import Controller, Loop, MultiLoop
+from zwidth.model import MultiPlant, reduce_directions, reduce_mechanism
 
 # --- one direction -------------------------------------------------------------------------------------
 
@@ -128,7 +123,7 @@ def test_motions_that_no_wall_moves_are_set_aside():
 
 
 def test_lag_and_force_filter_are_those_of_the_single_loop():
-    from zwidth.loop.controller import Butterworth, FirstOrder
+    from zwidth.loop import Butterworth, FirstOrder
 
     plant = two_mass(0.3, 0.03, 2e4, 1.0)
     for controller in (

@@ -8,7 +8,7 @@ from multi_loops import random_multi, random_unlike, reference_matrix
 
 from tests.chart.exact_radii import exact_matrix, exact_radius, is_off, joined_excess, walls_beside_origin
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
-from zwidth.chart.several_directions.chart import multi_chart
+from zwidth.chart import multi_chart
 
 OFF = 1e-9
 # Walls judged in 40 digits, of those that double precision finds off: the farthest off.

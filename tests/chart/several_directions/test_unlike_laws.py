@@ -8,13 +8,9 @@ import shapely
 from multi_loops import random_multi, random_unlike, reference_matrix, reference_radius, side_by_side
 from systems import mass
 
-from zwidth.chart.chart import stability_chart
-from zwidth.chart.several_directions.chart import multi_chart
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.wall_matrices import MatrixError, WallMatrices
-from zwidth.model.multi_plant import MultiPlant
+from zwidth.chart import multi_chart, stability_chart
+from zwidth.loop import Controller, Loop, MatrixError, MultiLoop, WallMatrices
+from zwidth.model import MultiPlant
 
 # Walls closer to the edge than this share of the chart lie within the chords that draw it, and radii closer to 1
 # than this one are 1 but for rounding, most of all about the double root of a free motion.
