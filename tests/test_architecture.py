@@ -24,6 +24,7 @@ DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml
 FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "identify", "study", "show")
 # Device files become models and loops; what computes knows nothing of files.
 EVERYWHERE = {
+    "arrays",
     "compiled",
     "compile_events",
     "cuda_kernels",

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import END_MARGIN
 from zwidth.chart.area import end_value
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, wall_at, walls, zero_between
 from zwidth.compiled import compiled
 from zwidth.loop.circle_factors import CircleFactors, wall_with_slopes
-
-Floats = NDArray[np.float64]
 
 # Largest distance of a chord from its arc, in shares of the arc's own extent in K and in B.
 CHORD = 1e-6

@@ -20,10 +20,9 @@ from itertools import accumulate
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
+from zwidth.arrays import Floats, Ints
+
 Wall = tuple[float, float]
 ArcPoints = tuple[Floats, Floats, Floats]  # angles, K and B along an arc
 
@@ -105,15 +104,15 @@ class Arcs:
     offsets       (n + 1,)  index in `thetas` of each arc's first angle
     """
 
-    kind: Whole
-    member: Whole
+    kind: Ints
+    member: Ints
     first: Floats
     last: Floats
     start: Floats
     end: Floats
-    next_arc: Whole
+    next_arc: Ints
     thetas: Floats
-    offsets: Whole
+    offsets: Ints
 
     @classmethod
     def of(cls, rings: Sequence[Sequence[Arc]]) -> Arcs:
@@ -172,7 +171,7 @@ class Arcs:
         """Numbers of the arcs that are pieces of curves."""
         return np.flatnonzero(np.isin(self.kind, CURVED)).tolist()
 
-    def crossings(self, component: int, level: float = 0.0) -> tuple[Whole, Floats]:
+    def crossings(self, component: int, level: float = 0.0) -> tuple[Ints, Floats]:
         """Numbers (k,) of the straight arcs whose K or B passes a level, and the walls (k, 2) where they do."""
         a, b = self.first[:, component] - level, self.last[:, component] - level
         crossed = np.flatnonzero(~np.isin(self.kind, CURVED) & (a * b < 0.0))
@@ -181,7 +180,7 @@ class Arcs:
         return crossed, first + share[:, None] * (last - first)
 
 
-def _next_arcs(counts: Sequence[int]) -> Whole:
+def _next_arcs(counts: Sequence[int]) -> Ints:
     """For rings of so many arcs, one after the other, the number of the arc after each."""
     following: list[int] = []
     for count in counts:

@@ -11,15 +11,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import END_MARGIN, Arcs, Curves
 from zwidth.chart.curve import NO_LINE, OF_B, OF_K, zero_between
 from zwidth.chart.wall_samples import LANES_SIZE, walls_of_samples
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import CircleFactors, wall_on_circle
-
-Floats = NDArray[np.float64]
 
 POINTS: Final = 10  # of a panel's rule
 PANEL: Final = 3  # intervals between samples that are one panel at first

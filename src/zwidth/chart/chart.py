@@ -7,8 +7,9 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.chart.decay import fastest_decay, fastest_decay_in_first_quadrant
 from zwidth.chart.edge_by_eigenvalues import decided_trace
@@ -19,8 +20,6 @@ from zwidth.chart.tracer import tracer_of
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -132,9 +131,7 @@ def largest_stiffness(loop: Loop, radius: float = 1.0) -> Peak | None:
     return LoopEdge.of(tracer_of(loop, radius)).peak
 
 
-def boundary_points(
-    loop: Loop, count: int = 1000, radius: float = 1.0
-) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+def boundary_points(loop: Loop, count: int = 1000, radius: float = 1.0) -> tuple[Floats, Floats, Floats, Flags]:
     """K, B, frequency [Hz] and stable-edge flag at `count` angles spread over (0, pi), denser at low frequency."""
     thetas, t = _spread_angles(count)
     K, B, edge = decided_trace(tracer_of(loop, radius), thetas, t)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.chart.decay import FastestDecay
 from zwidth.chart.rings import Window, window_of
 from zwidth.chart.verdict import WallVerdicts
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)

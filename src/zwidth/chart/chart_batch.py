@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart_numbers import read_edge
 from zwidth.chart.decay_search import search_fastest
 from zwidth.chart.edge_memory import (
@@ -26,8 +27,6 @@ from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import COMPUTER
 from zwidth.loop.loop_table import LoopTable
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
 
 _OWN: Final = local()  # each thread's working memory for single loops
 

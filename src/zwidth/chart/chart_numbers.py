@@ -8,7 +8,6 @@ area                Green's integral of K dB along the rings, within K > 0 and B
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.arcs import PAIR
 from zwidth.chart.area import curve_integral, end_value, straight_integral
@@ -41,8 +40,6 @@ from zwidth.chart.peak import is_stiffer
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
-
-Floats = NDArray[np.float64]
 
 # A stiffness below this share of the edge's largest |K| is rounding of 0; where K = 0+ is tested; a corner this
 # near to K = 0 lies on it; and how long a stable interval of K = 0+ is at least, as a share of the longest.

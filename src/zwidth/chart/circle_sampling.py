@@ -16,8 +16,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.curve import NO_LINE, OF_B, OF_K, zero_between
 from zwidth.chart.loop_polynomials import SPARE, ZEROS, LoopPolynomials
 from zwidth.chart.roots import divide, find_roots, real_root, spread_roots
@@ -32,10 +32,6 @@ from zwidth.loop.circle_factors import (
     velocity_on_circle,
     wall_on_circle,
 )
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Whole = NDArray[np.int64]
 
 # A point on the circle itself would ask for infinitely many samples. Nearer than this share of its distance to the
 # next point the curve is at infinity or at the origin.
@@ -66,7 +62,7 @@ class Features(NamedTuple):
     scales: Floats
     active: Floats
     roots: Complexes
-    counts: Whole
+    counts: Ints
 
 
 def feature_memory(most: int, window: int) -> Features:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_memory import NONE, OPEN, SAMPLES, SETTLED, EdgeMemory
@@ -22,7 +21,6 @@ from zwidth.chart.wall_samples import EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
 
-Floats = NDArray[np.float64]
 NEAR: Final = 0.1  # longest step of Newton's method, as a share of t
 # Where the flags on both sides of a corner are looked at, as a share of t.
 BESIDE_CORNER: Final = 1e-7

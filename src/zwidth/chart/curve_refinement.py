@@ -18,15 +18,13 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.edge_memory import NONE, SAMPLES, EdgeMemory
 from zwidth.chart.real_root_lines import line_of, sum_of_coefficients
 from zwidth.chart.wall_samples import UNKNOWN
 from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_with_slopes
-
-Floats = NDArray[np.float64]
 
 NARROWEST: Final = 1e-7  # narrowest interval that is halved, in shares of t
 # How far the slopes must stay from the other half plane, in shares of the largest: what the cubic may be wrong by.

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart_batch import DECAY, memory_of, read_first
 from zwidth.chart.decay_search import REACHES, solve_double_root_alone
 from zwidth.chart.edge_by_eigenvalues import decided_trace
@@ -22,8 +22,6 @@ from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SIMPLEX_SIZES, edge_memory
 from zwidth.chart.radius_search import descend_alone, scatter_values
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.loop import Loop
-
-Floats = NDArray[np.float64]
 
 # How much faster than the best found (in shares of 1 - radius) the next wall is looked for. A larger step finds
 # other cells of faster walls sooner, a smaller one those that are hardly faster.

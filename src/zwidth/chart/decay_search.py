@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.circle_sampling import NEAR_END
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL, SAMPLES, STARTS, EdgeMemory
 from zwidth.chart.edge_samples import LONGEST, SHARE, fill_curve, fill_loop, fill_without_singularities, flag_all
@@ -23,8 +23,6 @@ from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
 
 # How much faster than the best found, in shares of 1 - radius, the next wall is looked for.
 FASTER: Final = 3e-5

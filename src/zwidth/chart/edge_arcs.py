@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.arcs import CHORD, MINUS, PAIR, PLUS
 from zwidth.chart.curve import OF_LINE, zero_between
@@ -20,8 +19,6 @@ from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of, wall
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, half_angle, velocity_on_circle
-
-Floats = NDArray[np.float64]
 
 # Corners closer than this share of the set's size are one.
 SAME_CORNER: Final = 1e-7

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import CHORD, PAIR, PLUS, Arc, Arcs, Wall
 from zwidth.chart.circle_sampling import NEAR_END
 from zwidth.chart.corner import better_conditioned, fill_corners, solve_crossing
@@ -36,8 +37,6 @@ from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled
 from zwidth.loop.circle_factors import COMPUTER, CircleFactors, wall_with_slopes
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
 
 MOST_SAMPLES: Final = 20_000
 # Steps along the curve, in shares of the distance to its nearest singularity, tried one after the other.
@@ -233,9 +232,7 @@ def decide_flags(tracer: Tracer, thetas: Floats, K: Floats, B: Floats, flags: ND
         flags[:] = flags[sure[np.maximum(np.searchsorted(sure, np.arange(len(flags)), "right") - 1, 0)]]
 
 
-def decided_trace(
-    tracer: Tracer, thetas: Floats, t: Floats | None = None
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def decided_trace(tracer: Tracer, thetas: Floats, t: Floats | None = None) -> tuple[Floats, Floats, Flags]:
     """K, B and stable-edge flag at ascending angles in (0, pi), decided by eigenvalues where it must be.
 
     t  tan(theta/2) of each, where that is known

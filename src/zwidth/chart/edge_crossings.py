@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Final, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
+
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
     from zwidth.loop.loop import Loop
 
-Floats = NDArray[np.float64]
 EdgeKind = Literal["lower", "upper", "tip"]
 
 MOST_STEPS: Final = 30  # of false position between the ends of a chord
@@ -157,7 +158,7 @@ class EdgeChords:
             going &= (np.abs(f) > 1e-13 * np.maximum(np.abs(at), 1e-300)) & (np.abs(b - a) > 4e-16 * np.abs(x))
         return other, angle / turn
 
-    def inside(self, stiffness: Floats, damping: Floats) -> NDArray[np.bool_]:
+    def inside(self, stiffness: Floats, damping: Floats) -> Flags:
         """Whether walls (m,) are stable: how often the edge winds round them, by its crossings above each."""
         x0, y0, x1, y1 = *self.first.T, *self.last.T
         at, above = np.asarray(stiffness)[:, None], np.asarray(damping)[:, None]

@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.arcs import PAIR
 from zwidth.chart.curve import trace
 from zwidth.chart.edge_memory import SAMPLES, EdgeMemory
@@ -29,10 +29,6 @@ from zwidth.chart.tracer import CIRCLE_TOLERANCE, Tracer
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.loop.circle_factors import DEGREE
 from zwidth.loop.realisation import StateSpace
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 # Where walls between two samples of the edge are tried before its numbers are read, in shares of the step. Fewer
 # would leave wider lenses to be found when the edge is drawn, whose points are some ten times as dense.

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Bytes, Floats, Ints
 from zwidth.chart.area import AreaMemory, area_memory
 from zwidth.chart.circle_sampling import Features, feature_memory
 from zwidth.chart.hurwitz import work_array
@@ -23,10 +23,6 @@ from zwidth.chart.loop_polynomials import LoopPolynomials, polynomial_memory
 from zwidth.chart.wall_samples import LANES_SIZE
 from zwidth.loop.circle_factors import CircleFactors, factor_memory
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Small = NDArray[np.int8]
 
 MOST_ARCS: Final = 256
 MOST_PIECES: Final = 256  # of the two lines of real roots
@@ -61,8 +57,8 @@ class Samples(NamedTuple):
     B: Floats
     slope_K: Floats
     slope_B: Floats
-    flag: Small
-    corner: Small
+    flag: Bytes
+    corner: Bytes
     corner_t: Floats
     corner_partner: Floats
     corner_K: Floats
@@ -82,16 +78,16 @@ class EdgeArcs(NamedTuple):
     next_arc      (a,)    the arc after each; -1 for one that is no more than a corner
     """
 
-    kind: Small
+    kind: Bytes
     first: Floats
     last: Floats
     start: Floats
     end: Floats
-    samples: Whole
+    samples: Ints
     extent: Floats
-    node: Whole
-    order: Whole
-    next_arc: Whole
+    node: Ints
+    order: Ints
+    next_arc: Ints
 
 
 class LinePieces(NamedTuple):
@@ -104,9 +100,9 @@ class LinePieces(NamedTuple):
     crossing_t  (p,)  t at which the curve crosses one of the lines
     """
 
-    root: Small
+    root: Bytes
     ends: Floats
-    flag: Small
+    flag: Bytes
     nodes: Floats
     crossing_t: Floats
 
@@ -150,11 +146,11 @@ class EdgeMemory(NamedTuple):
     samples: Samples
     arcs: EdgeArcs
     pieces: LinePieces
-    counts: Whole
+    counts: Ints
     size: Floats
     picked: Floats
-    picked_number: Whole
-    picked_flag: Small
+    picked_number: Ints
+    picked_flag: Bytes
     peak: Floats
     stops: Floats
     numbers: Floats

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.circle_sampling import (
     add_samples_around_crossings,
@@ -31,8 +30,6 @@ from zwidth.loop.circle_factors import (
     wall_on_circle,
 )
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
 
 # Steps along the curve for a whole edge, in shares of the distance to its nearest singularity, and the longest.
 SHARE: Final = 0.2

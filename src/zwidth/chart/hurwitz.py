@@ -10,11 +10,9 @@ left half plane". The kernels share one working array `room` (8, N + 2), whose r
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-
-Floats = NDArray[np.float64]
 
 P, QUOTIENT = 0, 2
 # Error of a computed sum in shares of its terms: four units in the last place.

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.chart.hysteretic_response import SampledResponse
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.response_interpolation import interpolate_response
@@ -26,9 +26,6 @@ from zwidth.loop.sections import HysteresisError
 from zwidth.model.argument_checks import require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.response import Response, ResponseError, integrators_of
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 STEP = 0.1  # first angles, in shares of the distance to the nearest singularity of the viscous plant
 INTERPOLATION_ERROR = 1e-9  # relative error of P that interpolation may leave

@@ -14,13 +14,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import MINUS, PAIR, PLUS, Arcs
 from zwidth.chart.edge_crossings import WallCurve
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MOST_STEPS: Final = 40  # of Newton's method
 SLOPE_STEP: Final = 1e-6  # of an angle for derivatives, as a share of its distance to the nearer end of (0, pi)

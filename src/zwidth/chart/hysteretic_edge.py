@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import MINUS, PAIR, PLUS, ArcPoints, Arcs
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_crossings import EdgeChords
@@ -24,8 +24,6 @@ from zwidth.chart.hysteretic_corners import MovedArcs, moved_arcs
 from zwidth.chart.hysteretic_response import SampledResponse
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.loop.loop import Loop
-
-Floats = NDArray[np.float64]
 
 THINNED: Final = 8  # chords of the viscous edge that make one here
 LENGTHENED: Final = 6  # chords on the piece by which an arc is longer than the viscous one

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.nyquist import terms_along
 from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.factor_response import factor_response
@@ -28,10 +28,6 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import table_of_loops
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Whole = NDArray[np.int64]
 
 # Pairs of aliases summed, and how many for each that the highest natural frequency lies above: what is left out
 # falls off with the third power.
@@ -131,7 +127,7 @@ class SampledResponse:
     hysteretic: ModalPlant
     viscous: ModalPlant
     reference: Loop
-    near: Whole
+    near: Ints
     far: Chebyshev
 
     @classmethod
@@ -165,7 +161,7 @@ class SampledResponse:
         return np.asarray(UNIT * sizes * np.abs(np.expm1(-1j * thetas)) / thetas)
 
 
-def _response_difference(loop: Loop, lossy: ModalPlant, damped: ModalPlant, thetas: Floats, k: Whole) -> Complexes:
+def _response_difference(loop: Loop, lossy: ModalPlant, damped: ModalPlant, thetas: Floats, k: Ints) -> Complexes:
     """Response of the hysteretic plant less the viscous one's (n,) [m/N], over aliases k, without whole delay."""
     w = (thetas[:, None] + 2.0 * np.pi * k) / loop.period
     s = 1j * w

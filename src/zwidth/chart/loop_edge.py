@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.chart_batch import ALL_NUMBERS, memory_of, read_first
 from zwidth.chart.edge_arcs import SAME_CORNER
@@ -22,8 +22,6 @@ from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING
 from zwidth.chart.peak import Peak
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
-
-Floats = NDArray[np.float64]
 
 # How often a curve is traced again through walls that are none of its edge: each time finds a lens within one that
 # the last has found.

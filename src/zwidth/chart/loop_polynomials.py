@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import (
     COMPUTER,
@@ -27,9 +27,6 @@ from zwidth.loop.circle_factors import (
     fill_plant,
 )
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 # Rows of `LoopPolynomials.coefficients`: A, S, V, and what cancelled in S and V.
 A, S, V, LOST_S, LOST_V = range(5)
@@ -48,7 +45,7 @@ class LoopPolynomials(NamedTuple):
 
     coefficients: Floats
     parts: Floats
-    degrees: Whole
+    degrees: Ints
 
 
 def polynomial_memory(most: int) -> LoopPolynomials:

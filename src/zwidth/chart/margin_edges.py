@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Bytes, Floats, Ints
 from zwidth.chart.arcs import PAIR
 from zwidth.chart.chart_numbers import fill_nodes
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
@@ -26,10 +26,6 @@ from zwidth.loop.circle_factors import (
     wall_with_slopes,
 )
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
-Small = NDArray[np.int8]
-Whole = NDArray[np.int64]
 
 # Nodes, and parts of edges within a strip, for which there is memory at each delay.
 NODES_EACH, PARTS_EACH = 2048, 64
@@ -49,13 +45,13 @@ class EdgeNodes(NamedTuple):
     gap    (2,)    dampings of the walls that fitted last: between these no edge enters the strip
     """
 
-    used: Whole
+    used: Ints
     K: Floats
     B: Floats
     t: Floats
-    piece: Small
-    loop: Whole
-    turn: Small
+    piece: Bytes
+    loop: Ints
+    turn: Bytes
     parts: Floats
     gap: Floats
 

@@ -11,8 +11,8 @@ too far for the step to be sure, the step is halved.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.roots import divide
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import (
@@ -30,9 +30,6 @@ from zwidth.loop.circle_factors import (
     scaled,
     velocity_on_circle,
 )
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 FAR = 2.0  # a turn of phase beyond which a step is halved
 HALVINGS = 60
@@ -175,7 +172,7 @@ def phase_flags(
     walls: Floats,
     pairs: Floats,
     real: int,
-) -> NDArray[np.int64]:
+) -> Ints:
     """Whether walls (n, 2) have all roots inside but those divided out: 1, -1, or 0 where rounding hides it.
 
     thetas, terms  samples of the circle, and `terms_along` them

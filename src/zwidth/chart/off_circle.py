@@ -11,11 +11,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.verdict import BAND, rounding_of_roots
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
 
 # How exactly a wall of an edge is known, relative. Less would call walls off whose root has a neighbour that moves
 # it: where two nearly coalesce they part with the square root of it.

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import DAMPING, SLOPE, STIFFNESS, Arc, Arcs, Curves
 from zwidth.compiled import compiled
-
-Floats = NDArray[np.float64]
 
 # Walls whose stiffnesses differ by a smaller share are as stiff as each other.
 AS_STIFF: Final = 1e-13

@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.corner import fill_corner, solve_crossing
 from zwidth.chart.curve import NO_LINE, OF_B, OF_LINE, OF_SLOPE, Line, undamped_stiffness, zero_between
@@ -29,8 +28,6 @@ from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_inline, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
-
-Floats = NDArray[np.float64]
 
 # Steps along the curve, in shares of the distance to its nearest singularity, and the longest
 # (`circle_sampling.fill_samples`): wide ones for loops up to SMALL_DEGREE, whose cells are few and large.

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart_batch import ChartNumbers, chart_numbers
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import pieces_of_points, table_of_points
 from zwidth.processors import processor_in_use
-
-Floats = NDArray[np.float64]
 
 
 def numbers_of_points(point: OperatingPoint, what: int, radius: Floats | None = None) -> ChartNumbers | None:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.table_radii import radii_and_leverages, spectral_radii
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import pieces_of_points, table_of_points
 from zwidth.model.coupled_pairs import AGREEMENT
-
-Floats = NDArray[np.float64]
 
 ERROR: Final = 1e-9  # largest error of a radius, relative to 1
 

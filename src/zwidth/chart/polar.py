@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_by_eigenvalues import ChartError
@@ -26,8 +27,6 @@ from zwidth.model.plant import Plant
 from zwidth.model.reduction import DirectionError, ModelError
 from zwidth.progress import Progress
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
 
 OK, NO_WALL = "ok", "no stable wall"
 OUT_OF_MOTION = "out of motion: the handle cannot move along the direction"

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 @compiled_lean

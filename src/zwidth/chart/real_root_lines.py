@@ -8,13 +8,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.edge_memory import EdgeMemory
 from zwidth.compiled import compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
-
-Floats = NDArray[np.float64]
 
 LAST_DIGITS: Final = 1e-14  # of an angle
 # Two lines are parallel, or an end of the curve at infinity, where a determinant is this small a share of its

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import ArcPoints
 
-Floats = NDArray[np.float64]
 # Of a ring's extent: corners blurred by more are drawn from one arc's end to the next one's beginning.
 WIDE_CORNER = 1e-6
 ROUNDING_AREA = 1e-12  # share of a cell that a part of it, or a hole, is only rounding of

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.compiled import compiled, compiled_apart, compiled_inline, compiled_lean
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 @compiled_inline

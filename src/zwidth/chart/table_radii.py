@@ -6,20 +6,18 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.verdict import BATCH_SIZE
-from zwidth.loop.loop_table import LoopTable, Whole
+from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.realisation import StateSpace
 from zwidth.loop.table_states import state_spaces
 from zwidth.loop.unheld_positions import AT_ONE, set_aside
 
-Floats = NDArray[np.float64]
-
 BESIDE: Final = 1e-3  # how much smaller a root may be that could be the largest instead
 
 
-def spectral_radii(loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_damping: Floats) -> Floats:
+def spectral_radii(loops: LoopTable, which: Ints, wall_stiffness: Floats, wall_damping: Floats) -> Floats:
     """Largest |z| (p,) of each of p walls K, B (p,) for one loop each, number `which` (p,).
 
     By eigenvalues of the transition matrix, as `verdict.spectral_radius` of one loop: where roots meet, those of
@@ -34,7 +32,7 @@ def spectral_radii(loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_
 
 
 def radii_and_leverages(
-    loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_damping: Floats
+    loops: LoopTable, which: Ints, wall_stiffness: Floats, wall_damping: Floats
 ) -> tuple[Floats, Floats]:
     """`spectral_radii`, and by how much the largest root moves at most, per relative change of the plant's
     response (p,).
@@ -48,8 +46,8 @@ def radii_and_leverages(
 
 
 def slowest_roots(
-    loops: LoopTable, which: Whole, wall_stiffness: Floats, wall_damping: Floats, count: int
-) -> NDArray[np.complex128]:
+    loops: LoopTable, which: Ints, wall_stiffness: Floats, wall_damping: Floats, count: int
+) -> Complexes:
     """The `count` largest roots z (p, count) in the upper half plane, or on the real axis, of each of p walls for
     one loop each; 0 where there are fewer, nan for a loop without sections.
 
@@ -66,7 +64,7 @@ def slowest_roots(
     return found
 
 
-def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
+def _radii(loops: LoopTable, which: Ints, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
     """Radii (p,), and leverages (p,) if these are wanted, else nan."""
     radii, leverages = np.full((2, len(which)), np.nan)
     for walls, states in _batches(loops, which):
@@ -83,7 +81,7 @@ def _radii(loops: LoopTable, which: Whole, K: Floats, B: Floats, leverage: bool)
     return radii, leverages
 
 
-def _without_position(loops: LoopTable, which: Whole, z: NDArray[np.complex128]) -> Floats:
+def _without_position(loops: LoopTable, which: Ints, z: Complexes) -> Floats:
     """Radii (p,) of roots (p, N) of walls without stiffness, the root z = 1 of each motion without a spring set
     aside (`unheld_positions`); nan where rounding leaves open whether there is one."""
     rows = np.arange(loops.rows.shape[1]) < loops.section_count[which][:, None]
@@ -94,7 +92,7 @@ def _without_position(loops: LoopTable, which: Whole, z: NDArray[np.complex128])
     return np.where((count == 0) & (np.abs(radii - 1.0) < AT_ONE), np.nan, radii)
 
 
-def _batches(loops: LoopTable, which: Whole) -> Iterator[tuple[Whole, StateSpace]]:
+def _batches(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpace]]:
     """Walls of loops of one structure, and the states of each one's loop; walls of loops without sections are in
     none. Raises ValueError for chained sections."""
     for first in range(0, len(which), BATCH_SIZE):
@@ -107,7 +105,7 @@ def _batches(loops: LoopTable, which: Whole) -> Iterator[tuple[Whole, StateSpace
             yield batch[known], space[row[place[known]]]
 
 
-def _leverages(z: NDArray[np.complex128], states: StateSpace) -> Floats:
+def _leverages(z: Complexes, states: StateSpace) -> Floats:
     """The largest (p,) over the roots that are, or are nearly, the largest of z (p, N)."""
     poles = np.linalg.eigvals(states.open)
     size = np.abs(z)

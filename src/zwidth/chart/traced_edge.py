@@ -10,15 +10,13 @@ from typing import TypedDict
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import ArcPoints, Arcs, Curves, sample_arcs
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.chart_base import BoundaryArc
 from zwidth.chart.peak import Peak, find_peak, largest_damping
 from zwidth.chart.rings import outline, simple_rings
-
-Floats = NDArray[np.float64]
 
 
 class PeakFields(TypedDict):

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.arc_kernels import dense_points, sign_changes
 from zwidth.chart.arcs import Arc, ArcPoints
 from zwidth.chart.area import arc_integral, area_memory
@@ -27,7 +28,6 @@ from zwidth.loop.circle_factors import DEGREE, WHOLE_DELAY, WINDOW, CircleFactor
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
 
-Floats = NDArray[np.float64]
 # A root this near the circle is on neither side of it.
 CIRCLE_TOLERANCE = 1e-9
 RealRoot = Literal["plus", "minus"]
@@ -144,7 +144,7 @@ class Tracer:
         return self.degree > MOST_DEGREE
 
     @cached_property
-    def _circle(self) -> tuple[Floats, NDArray[np.complex128]]:
+    def _circle(self) -> tuple[Floats, Complexes]:
         """Samples of the circle, and the loop's terms along them."""
         thetas = self.sample_angles(0.2)
         # soft walls have roots as near to z = 1 as one likes
@@ -169,12 +169,12 @@ class Tracer:
         K, B, flags = self.trace(one)
         return int(flags[0] or self.edge_by_eigenvalues(one, K, B)[0])
 
-    def edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.int64]:
+    def edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> Ints:
         """The flag from all eigenvalues but the pair at each angle."""
         z = np.abs(self.roots_without_pair(thetas, K, B)).max(axis=-1) - self.radius
         return np.where(z < -CIRCLE_TOLERANCE, EDGE, np.where(z > CIRCLE_TOLERANCE, NO_EDGE, HIDDEN))
 
-    def roots_without_pair(self, thetas: Floats, K: Floats, B: Floats) -> NDArray[np.complex128]:
+    def roots_without_pair(self, thetas: Floats, K: Floats, B: Floats) -> Complexes:
         """Eigenvalues (..., N - 2) of walls on the curve, without the pair at rho exp(+-i theta)."""
         z = np.linalg.eigvals(self.loop.transition_matrix(K, B))
         for point in (self.radius * np.exp(1j * thetas), self.radius * np.exp(-1j * thetas)):

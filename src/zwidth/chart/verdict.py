@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.unheld_positions import set_aside, unheld_positions
 from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.progress import Progress
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
 
 # Half-width of the band round the unit circle in which stability is left undecided.
 BAND = 1e-9
@@ -85,7 +84,7 @@ class Verdicts(WallVerdicts):
 
     spectral_radius: Floats
     uncertainty: Floats
-    unheld: NDArray[np.int64]
+    unheld: Ints
 
     def table(self) -> dict[str, list[Any]]:
         return super().table() | {
@@ -94,7 +93,7 @@ class Verdicts(WallVerdicts):
         }
 
 
-def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.complex128]:
+def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Complexes:
     """All eigenvalues z (..., N) of the transition matrix (thesis eq. 2.41), unobserved motions left out."""
     require("loop", loop, Loop)
     K, B = broadcast_walls(wall_stiffness, wall_damping, finite=True)
@@ -144,7 +143,7 @@ def verdicts(
     return Verdicts(K, B, verdict, frequency, radius, width, _unheld(loop, K))
 
 
-def _unheld(loop: Loop | MultiLoop, K: Floats) -> NDArray[np.int64]:
+def _unheld(loop: Loop | MultiLoop, K: Floats) -> Ints:
     """Positions that nobody holds on walls K (...)."""
     free = K == 0.0
     return np.where(free, unheld_positions(loop) if np.any(free) else 0, 0)

@@ -23,6 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.chart_numbers import read_edge
 from zwidth.chart.edge_by_eigenvalues import closed_rings
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, MOST_SAMPLES, NO_WALL, EdgeMemory, edge_memory
@@ -50,8 +51,6 @@ from zwidth.loop.circle_factors import COMPUTER, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable, table_of_loops
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
 
 DELAY_STEP: Final = 0.25  # samples from one delay to the next at most
 STEPS: Final = 48  # of stiffness that are tried besides those at which an edge enters the strip or leaves it
@@ -109,7 +108,7 @@ class MarginMemory(NamedTuple):
     nodes: EdgeNodes
     close: EdgeNodes
     pool: EdgeNodes
-    ends: NDArray[np.int64]
+    ends: Ints
     tried: Floats
 
 

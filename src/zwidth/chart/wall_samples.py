@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Bytes, Floats
 from zwidth.chart.hurwitz import ROUNDING, edges_stable_set
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import (
@@ -27,9 +27,6 @@ from zwidth.loop.circle_factors import (
     WINDOW,
     CircleFactors,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.int8]
 
 EDGE, HIDDEN, NO_EDGE, UNKNOWN = 1, 0, -1, 2
 LANES: Final = 128  # samples that are computed together
@@ -160,7 +157,7 @@ def flag_walls(
     t: Floats,
     K: Floats,
     B: Floats,
-    flags: Flags,
+    flags: Bytes,
     work: Floats,
     room: Floats,
 ) -> None:

@@ -8,13 +8,11 @@ from math import isnan, nan
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.conditions.bound import Bound, Claim, Kind
 from zwidth.conditions.traits import Traits, traits
 from zwidth.loop.loop import Loop
-
-Floats = NDArray[np.float64]
 
 # Largest b T/m and B T/m for which conditions of first order in them count as accurate.
 LIGHT_FRICTION: Final = 0.1

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Floats
 
 Kind = Literal["stability", "passivity"]
 Claim = Literal["exact", "sufficient", "approximate"]

@@ -14,8 +14,9 @@ from functools import partial
 from math import nan
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import (
     COLLOCATED,
     DIFFERENCE,
@@ -29,8 +30,6 @@ from zwidth.conditions.assumptions import (
 )
 from zwidth.conditions.bound import Bound
 from zwidth.loop.controller import FirstOrder
-
-Floats = NDArray[np.float64]
 
 
 def stiffness_limit(wall_damping: ArrayLike, device_damping: ArrayLike, sampling_period: ArrayLike) -> Floats:

@@ -10,13 +10,12 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.conditions.abbott_okamura import pure_spring_limit
 from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE_DELAY, ConditionCase
 from zwidth.conditions.bound import Bound
-
-Floats = NDArray[np.float64]
 
 
 def dimensionless_friction(
@@ -55,7 +54,7 @@ def viscous_stiffness_limit(
     return np.asarray(np.maximum(b, 0.0) / (T * (l + 0.5)))
 
 
-def is_passive(beta: ArrayLike, sigma: ArrayLike, delay_samples: ArrayLike = 0) -> NDArray[np.bool_]:
+def is_passive(beta: ArrayLike, sigma: ArrayLike, delay_samples: ArrayLike = 0) -> Flags:
     """Whether walls (...) lie in the plane's passive quadrant, beta >= l + 1/2 and sigma >= 1/2.
 
     There the wall is passive at every speed and with every hand. With beta alone large enough, the encoder's steps

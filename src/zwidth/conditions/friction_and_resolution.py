@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.modes import undamped_modes
-from zwidth.model.plant import Floats, Plant
+from zwidth.model.plant import Plant
 
 
 def ground_friction(plant: Plant) -> float:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions import colgate_schenkel
 from zwidth.conditions.assumptions import COLLOCATED, NYQUIST_BELOW_CORNER, PLAIN, RIGID, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
-
-Floats = NDArray[np.float64]
 
 
 def effective_damping(

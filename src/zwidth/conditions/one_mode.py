@@ -22,13 +22,12 @@ from functools import partial
 from math import inf, isfinite, nan, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, ONE_MODE, PLAIN, RESISTIVE, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 from zwidth.loop.hold import denominator, step_response
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,15 +16,14 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE_DELAY, ConditionCase
 from zwidth.conditions.bound import Bound
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
-
-Floats = NDArray[np.float64]
 
 # Frequencies tried: enough for a relative error below 1e-6 (see the tests); low ones for low cutoffs.
 ANGLES = np.unique(np.concatenate([np.geomspace(1e-6, np.pi, 1500), np.linspace(0.0, np.pi, 3001)[1:]]))

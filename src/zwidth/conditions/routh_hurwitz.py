@@ -8,9 +8,9 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Flags, Floats
 
 
 def bilinear_coefficients(characteristic: ArrayLike) -> Floats:
@@ -70,7 +70,7 @@ def principal_minors(coefficients: ArrayLike) -> Floats:
     return np.stack([np.linalg.det(matrix[..., :k, :k]) for k in range(1, n + 1)], axis=-1)
 
 
-def is_stable(coefficients: ArrayLike) -> NDArray[np.bool_]:
+def is_stable(coefficients: ArrayLike) -> Flags:
     """Whether all roots of a0 s^n + ... + an lie in the open left half plane (...).
 
     Where a0 > 0 and all minors are positive (thesis eq. A.3). A polynomial with a0 < 0 is multiplied

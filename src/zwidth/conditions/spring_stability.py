@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from math import isfinite, nan, pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RESISTIVE, RIGID, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
 from zwidth.conditions.one_mode import OneMode, one_mode
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

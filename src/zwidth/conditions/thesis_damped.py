@@ -19,9 +19,10 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import gammainc
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import (
     COLLOCATED,
     LIGHT,
@@ -33,8 +34,6 @@ from zwidth.conditions.assumptions import (
     ConditionCase,
 )
 from zwidth.conditions.bound import Bound
-
-Floats = NDArray[np.float64]
 
 
 class HeldForceResponse(NamedTuple):

@@ -16,12 +16,11 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, SPRUNG, UNDAMPED, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
-
-Floats = NDArray[np.float64]
 
 
 def _cosine_and_bend(mass: Floats, stiffness: Floats, period: Floats) -> tuple[Floats, Floats]:

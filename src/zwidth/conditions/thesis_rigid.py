@@ -5,12 +5,11 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, UNDELAYED, ConditionCase
 from zwidth.conditions.bound import Bound
-
-Floats = NDArray[np.float64]
 
 
 def stiffness_limit(wall_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLike) -> Floats:

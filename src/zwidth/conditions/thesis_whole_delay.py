@@ -16,12 +16,11 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, WHOLE_DELAY, ConditionCase
 from zwidth.conditions.bound import Bound
-
-Floats = NDArray[np.float64]
 
 # Nodes of the area's integral; without delay, where its end is closest to the pole at t = pi, 12 leave 1e-13.
 GAUSS = 16

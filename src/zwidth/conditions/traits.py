@@ -8,10 +8,11 @@ from math import isfinite, isnan, nan
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.loop.controller import FirstOrder
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import clusters, repeat_tolerance, undamped_modes
-from zwidth.model.plant import Floats, LaggedDamper, Plant
+from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.reduction import plant_effective_parameters
 
 # Modes with a smaller share of the response to the wall's force count as modes that no wall moves.

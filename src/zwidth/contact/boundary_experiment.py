@@ -18,8 +18,8 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeKind
 from zwidth.contact.line_search import (
     Brackets,
@@ -35,7 +35,6 @@ from zwidth.model.modes import least_deforming_motion
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]  # done, of how many
 
 PER_DECADE: Final = 3  # of the raster
@@ -181,7 +180,7 @@ def _none(box: SearchWindow | None) -> str:
     return f"no stable wall was found{where}: the disturbed device did not come to rest inside any of those tried"
 
 
-def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Floats, Floats, Flags]:
     """Stiffnesses (k,), dampings (b,), and which walls (k, b) belong to the largest connected stable patch."""
     from scipy.ndimage import label
 
@@ -221,7 +220,7 @@ def _masses(plant: Plant) -> tuple[float, float]:
 
 
 def _columns(
-    trial: StabilityTrial, patch: tuple[Floats, Floats, NDArray[np.bool_]], box: SearchWindow | None
+    trial: StabilityTrial, patch: tuple[Floats, Floats, Flags], box: SearchWindow | None
 ) -> list[_Column]:
     """The largest stable stiffness at some of the patch's dampings, on the trial itself."""
     K, B, inside = patch
@@ -275,7 +274,7 @@ def _largest_stiffnesses(
 
 def _recheck(
     trial: StabilityTrial, damping: Floats, brackets: Brackets, least: float, tolerance: Floats
-) -> tuple[Brackets, NDArray[np.bool_]]:
+) -> tuple[Brackets, Flags]:
     """The stiffnesses found at dampings (m,), or else the lowest at which the verdict changes.
 
     least    no softer wall is looked at [N/m]

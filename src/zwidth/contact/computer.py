@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_inline
 from zwidth.contact.noise import normal
 from zwidth.loop.controller import Controller
@@ -22,7 +22,6 @@ from zwidth.loop.estimators.foaw_kernel import foaw_estimate
 from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.estimators.levant_kernel import levant_estimate
 from zwidth.loop.filters import force_filter, low_pass_factors, velocity_estimator
-from zwidth.model.mechanism import Floats, Ints
 
 LINEAR: Final = 0
 FOAW: Final = 1
@@ -137,7 +136,7 @@ def computers(controllers: Sequence[Controller], limits: Sequence[float]) -> Com
     )
 
 
-def _stacked(arrays: Sequence[Floats]) -> NDArray[np.float64]:
+def _stacked(arrays: Sequence[Floats]) -> Floats:
     """Arrays of one rank side by side, padded with zeros to the largest."""
     largest = np.max([array.shape for array in arrays], axis=0)
     stacked = np.zeros((len(arrays), *largest))

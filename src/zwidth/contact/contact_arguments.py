@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from zwidth.contact.environments.environment import Environment, Floats
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Environment
 from zwidth.contact.environments.load import load_environment
 from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
 from zwidth.model.argument_checks import require

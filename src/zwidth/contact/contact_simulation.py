@@ -8,7 +8,8 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from zwidth.contact.environments.environment import Environment, Floats
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import Hand
 from zwidth.contact.motion_verdict import Behaviour, Judgement, judge_response
 from zwidth.contact.passivity_controller import rendered_stiffness

@@ -14,11 +14,10 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
-
-Floats = NDArray[np.float64]
 
 
 def _positive(**values: ArrayLike) -> None:

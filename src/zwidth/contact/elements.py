@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_inline, compiled_lean
 from zwidth.contact.friction import bristle_force, coulomb_force
-from zwidth.model.mechanism import Floats
 
 NOTHING: Final = -1
 COULOMB: Final = 0

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING
 from zwidth.contact.engine_arrays import (
@@ -41,7 +42,6 @@ from zwidth.contact.engine_arrays import (
     PlantArrays,
 )
 from zwidth.contact.hand import BRAKE
-from zwidth.model.mechanism import Floats
 
 (
     LAST_TRUTH,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_inline
 from zwidth.contact.computer import (
     Computer,
@@ -66,7 +67,6 @@ from zwidth.contact.plant_step import (
     step_with_frictions,
     swapped,
 )
-from zwidth.model.mechanism import Floats, Ints
 
 ENCODERS = 64  # numbers of encoders by which two samples of a local loop draw noise apart
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from zwidth.model.mechanism import Floats, Ints
+from zwidth.arrays import Floats, Ints
 
 # Columns of a trace.
 READING, TRUTH, VELOCITY, FORCE, HANDLE = range(5)

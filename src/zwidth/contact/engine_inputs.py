@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING, VARYING
 from zwidth.contact.engine_arrays import LATER, NOTHING_LOCAL, SAMPLE, PlantArrays
 from zwidth.contact.hand import ARM, BRAKE, GRASP, Hand
@@ -24,7 +24,6 @@ from zwidth.model.nonlinear import Counter, Spring
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
 
-Floats = NDArray[np.float64]
 Element = tuple[int, tuple[float, ...], Floats]
 
 

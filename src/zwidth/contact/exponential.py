@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
-from zwidth.model.mechanism import Floats
 
 TERMS: Final = 12  # of the series, for matrices up to SMALL: 0.25^13/13! are left
 SMALL: Final = 0.25

@@ -11,13 +11,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_inline
 from zwidth.contact.computer import cascade, weigh_readings
 from zwidth.loop.controller import Controller, split_delay
 from zwidth.loop.estimators import LinearMethod
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.low_pass import LowPass
-from zwidth.model.mechanism import Floats, Ints
 
 # Columns of `FeedbackArrays.gains`.
 GAIN, OF_ERROR, INERTIA, DAMPING, COULOMB, DEAD_BAND, LOCAL_STIFFNESS, LOCAL_DAMPING = range(8)

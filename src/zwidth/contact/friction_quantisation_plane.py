@@ -15,15 +15,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.conditions.diolaiti import dimensionless_friction
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.conditions.traits import traits
 from zwidth.loop.loop import Loop
 from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
-
-Floats = NDArray[np.float64]
 
 PASSIVE: Final = "passive"
 SMALL: Final = "small vibrations"

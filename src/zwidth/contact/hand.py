@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
 from zwidth.contact.elements import VARYING
 from zwidth.contact.engine_arrays import PlantArrays
-from zwidth.model.mechanism import Floats
 from zwidth.model.operator import Operator
 
 # What stands in the first number of an element that varies.

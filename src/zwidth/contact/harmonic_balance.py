@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.contact.quasi_linear import (
     EquivalentLoop,
     SizeFunction,
@@ -31,8 +32,6 @@ from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
 
 STAGE = "vibrations by amplitude"
 PER_DECADE = 24

@@ -14,15 +14,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.contact.harmonic_balance import LimitCycle
 from zwidth.contact.quasi_linear import equivalent_loop
 from zwidth.loop.loop import Loop
 from zwidth.model.nonlinear import Nonlinear
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 COUNTS = (1, 2, 4, 8, 16)  # of odd harmonics, each solution the start of the next
 PHASES = 512

@@ -11,9 +11,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.contact.stability_trial import Observation, StabilityTrial, observe
-
-Floats = NDArray[np.float64]
 
 MARCHES: Final = 12  # steps outwards, each twice as long as the one before
 # of the way to what was found: where it is looked at again
@@ -31,7 +30,7 @@ class Lines(NamedTuple):
     def at(self, t: Floats) -> Floats:
         return np.asarray(self.start + t[:, None] * self.outwards)
 
-    def only(self, lanes: NDArray[np.bool_] | NDArray[np.intp]) -> Lines:
+    def only(self, lanes: Flags | NDArray[np.intp]) -> Lines:
         return Lines(self.start[lanes], self.outwards[lanes])
 
 
@@ -131,7 +130,7 @@ def nearest_change(
     return Brackets(halved.stable, np.where(changed, halved.unstable, unstable), halved.observations)
 
 
-def stable_beyond(trial: StabilityTrial, lines: Lines, unstable: Floats) -> NDArray[np.bool_]:
+def stable_beyond(trial: StabilityTrial, lines: Lines, unstable: Floats) -> Flags:
     """Whether a wall beyond the first unstable one (m,) is stable again; False where none is unstable."""
     known = np.flatnonzero(np.isfinite(unstable))
     again = np.zeros(len(unstable), dtype=bool)

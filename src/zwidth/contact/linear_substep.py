@@ -13,11 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,10 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.contact.time_response import TimeResponse
 from zwidth.model.argument_checks import require
-
-Floats = NDArray[np.float64]
 
 Behaviour = Literal[
     "converged", "decaying", "drifting", "growing", "limit cycle", "bouncing", "lost contact", "undecided"
@@ -115,7 +113,7 @@ def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement
 
 def _behaviour(
     response: TimeResponse,
-    touching: NDArray[np.bool_],
+    touching: Flags,
     third: slice,
     last: slice,
     growth: float,

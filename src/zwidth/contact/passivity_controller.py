@@ -36,11 +36,10 @@ from math import inf, isfinite, isnan
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
-
-Floats = NDArray[np.float64]
 
 PASSIVITY_MEMORY: Final = 4
 BEGUN, LAST, ENERGY, LAST_FORCE = range(PASSIVITY_MEMORY)

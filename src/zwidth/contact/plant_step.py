@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_inline, compiled_lean
 from zwidth.contact.computer import round_to_step
 from zwidth.contact.elements import BRISTLES, COULOMB, bristles_bend, element_force
 from zwidth.contact.engine_arrays import PlantArrays
 from zwidth.contact.friction import coulomb_force
-from zwidth.model.mechanism import Floats
 
 SWEEPS = 60  # of elements that work on one another, over one substep
 SETTLED = 1e-14  # relative change of their forces that is none

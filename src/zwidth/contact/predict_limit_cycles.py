@@ -7,11 +7,12 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.chart.verdict import judge
 from zwidth.conditions.friction_and_resolution import reading_step
 from zwidth.contact.environments.wall import wall
 from zwidth.contact.friction_quantisation_plane import device_plane
-from zwidth.contact.harmonic_balance import Floats, LimitCycle, harmonic_balance
+from zwidth.contact.harmonic_balance import LimitCycle, harmonic_balance
 from zwidth.contact.harmonics import with_harmonics
 from zwidth.contact.limit_cycle_answer import answered_cycles
 from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction, SimulatedVibration

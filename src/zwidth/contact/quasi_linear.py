@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.linear_substep import LinearDynamics, dynamics
 from zwidth.contact.vibration_kernel import (
     FORCE,
@@ -29,8 +29,6 @@ from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.nonlinear import Counter, Nonlinear
-
-Floats = NDArray[np.float64]
 
 SAME = 1e-11  # relative change of all sizes at which the shape agrees with the gains
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from math import ceil, exp, inf, isfinite, log
 from typing import Final, NamedTuple
 
+from zwidth.arrays import Floats
 from zwidth.chart.verdict import judge
 from zwidth.contact.environments import ENVIRONMENTS
-from zwidth.contact.environments.environment import Environment, Floats
+from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import Hand
 from zwidth.contact.simulate import LARGEST_MOTION
 from zwidth.loop.estimator import NonlinearError

@@ -8,8 +8,9 @@ from functools import partial
 from math import ceil, inf, isfinite, isinf
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats, Ints
 from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
 from zwidth.contact.computer import computers
 from zwidth.contact.engine import run_several
@@ -26,8 +27,6 @@ from zwidth.memory_limit import check_memory
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress, watched
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
 
 SUBSTEPS = 20
 LARGEST_MOTION = 1.0  # m, from the wall to either side: a device farther away, of which no more is known, is lost
@@ -192,7 +191,7 @@ def _check(lengths: Floats, substeps: int) -> None:
         raise ValueError(f"substeps must be from 1 to 100000, got {substeps!r}")
 
 
-def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], NDArray[np.int64]]:
+def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], Ints]:
     """One apparatus for runs with the same loop and arm, and which run has which."""
     numbers: dict[tuple[object, ...], int] = {}
     held_devices: list[HeldDevice] = []
@@ -207,9 +206,7 @@ def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], NDArray[np.int
     return held_devices, np.array(index, dtype=np.int64)
 
 
-def _members(
-    runs: Sequence[Run], held_devices: list[HeldDevice], index: NDArray[np.int64], plants: PlantArrays
-) -> RunArrays:
+def _members(runs: Sequence[Run], held_devices: list[HeldDevice], index: Ints, plants: PlantArrays) -> RunArrays:
     m = len(runs)
     start = np.zeros((m, plants.transition.shape[-2]))
     for i, run in enumerate(runs):

@@ -19,8 +19,9 @@ from math import ceil, isfinite
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.contact.environments.one_sided_wall import one_sided_wall
 from zwidth.contact.environments.wall import wall
 from zwidth.contact.hand import Hand
@@ -33,8 +34,6 @@ from zwidth.loop.loop import Loop
 from zwidth.model.modes import least_deforming_motion, natural_frequencies
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.operator import attach
-
-Floats = NDArray[np.float64]
 
 FIRST_SAMPLES: Final = 1024  # samples at first
 LEAST_SAMPLES: Final = 64  # at first, however short the time

@@ -7,12 +7,10 @@ from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.engine_arrays import FORCE, HANDLE, READING, TRUTH, VELOCITY, Records
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
 
 # The ledger's entries, in the engine's order; the last is what the plant has stored.
 SOURCES: Final = (

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.contact.computer import computers
 from zwidth.contact.engine_inputs import HeldDevice, pack_plants, start_states
 from zwidth.contact.hand import Hand
@@ -15,7 +16,6 @@ from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.fixed_feedback import acts
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
-from zwidth.model.mechanism import Floats, Ints
 from zwidth.model.operator import Operator
 
 INPUT_NAMES: Final = ("law", "stiffness", "damping", "wall_position", "push", "last_push")

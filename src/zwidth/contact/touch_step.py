@@ -23,13 +23,13 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled_inline, compiled_lean
 from zwidth.contact.block_views import view
 from zwidth.contact.computer import LINEAR, Computer, Signals, arrived_command, estimate_velocity, send_force
 from zwidth.contact.energy_ledger import energy_of
 from zwidth.contact.engine_arrays import FORCE, HANDLE, READING, TRACES, TRUTH, VELOCITY, PlantArrays
 from zwidth.contact.plant_step import PlantState, dot, read_sensor, step_with_frictions
-from zwidth.model.mechanism import Floats, Ints
 
 # Sizes at the beginning of `counts`: coordinates n, states N, elements E, parts P, encoders C, whole samples of
 # delay, weights w, factors of the estimate k and of the force filter f.

@@ -13,14 +13,11 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.compiled import compiled
 from zwidth.contact.describing_functions import bent_spring_gain, damper_gain, quantiser_gain, saturation_gain
 from zwidth.contact.exponential import exponential, multiply
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # A root whose angle is below this does not swing: it creeps, or is a rounded double root at z = 1.
 CREEPS: Final = 1e-5

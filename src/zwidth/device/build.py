@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device import build_nonlinear
 from zwidth.device.build_nonlinear import value_or
 from zwidth.device.schema.feedback import FeedforwardSection, ForceSensorSection, LocalSection
@@ -35,7 +36,6 @@ from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, Li
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
 from zwidth.model.design_axes import stack_numbers
 from zwidth.model.electrical_damping import add_dampers
-from zwidth.model.mechanism import Floats
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.response import Response

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.schema.beam import BeamSection, MaterialSection, RectangleShape, RodShape, TubeShape
 from zwidth.device.schema.mechanism import LinkSection
 from zwidth.model.beam_section import (
@@ -21,7 +22,7 @@ from zwidth.model.beam_section import (
 )
 from zwidth.model.flexible_link import FlexibleLink
 from zwidth.model.link_beams import flexible_link
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 
 MODES, ELEMENTS = 2, 8  # where none are given
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device import build_nonlinear
 from zwidth.device.arm_consistency import HELD
 from zwidth.device.build import in_space, roll_pitch_yaw
@@ -42,8 +43,6 @@ from zwidth.model.mechanism import (
     REVOLUTE,
     Closures,
     Drives,
-    Floats,
-    Ints,
     Links,
     Mechanism,
 )

@@ -8,13 +8,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import KeyPath
 from zwidth.device.schema.friction import DriveFrictionSection, FrictionSection
 from zwidth.device.schema.loop import EncoderSection
 from zwidth.device.schema.mechanism import DriveSection
 from zwidth.device.schema.plant import PlantSection
 from zwidth.model.design_axes import stack_numbers
-from zwidth.model.mechanism import DriveNonlinearity, Floats
+from zwidth.model.mechanism import DriveNonlinearity
 from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
 from zwidth.model.plant import Plant
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import OK, Posture, solve_posture
 
@@ -22,7 +22,7 @@ def assembles(mechanism: Mechanism, assembly: str | None) -> bool:
     return bool(masses_moved(posture).all())
 
 
-def masses_moved(posture: Posture) -> NDArray[np.bool_]:
+def masses_moved(posture: Posture) -> Flags:
     """Marks (...) of the postures in which every motion has a mass, and of those that are not OK."""
     known = (posture.status == OK) & ~np.isnan(posture.mass_matrix).any(axis=(-2, -1))
     M = np.where(known[..., None, None], posture.mass_matrix, np.eye(posture.mass_matrix.shape[-1]))

@@ -15,8 +15,9 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device.compiled_mechanism_check import masses_moved
-from zwidth.device.design_checks import Marks, certainly_valid
+from zwidth.device.design_checks import certainly_valid
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.legs import members
@@ -26,7 +27,7 @@ from zwidth.device.toml_access import table
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import PROJECTION_TOLERANCE
 from zwidth.model.design_axes import change_designs, design_shape
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import UNSOLVED, Posture, PostureError, join_postures, solve_posture
 from zwidth.model.reduction import Model
 
@@ -129,7 +130,7 @@ class DesignBatch:
         direction: Any = None,
         assembly: str | None = None,
         model: str | None = None,
-    ) -> tuple[OperatingPoint, Marks]:
+    ) -> tuple[OperatingPoint, Flags]:
         """The designs with their handles at a position each, or all over a workspace.
 
         position   (P, 2) or (P, 3), or (..., 2) or (..., 3) of a workspace that has two axes or more; None: the
@@ -161,7 +162,7 @@ class DesignBatch:
         alone = (posture.status == UNSOLVED) | ~masses_moved(posture)
         return self._with_posture(posture, direction, model), alone
 
-    def at_point(self, point: OperatingPoint) -> tuple[OperatingPoint, Marks]:
+    def at_point(self, point: OperatingPoint) -> tuple[OperatingPoint, Flags]:
         """The designs at the operating point of a single device, as `Device.at_point` puts each of them; see `at`.
 
         point   one posture that is given by the handle's position, and one direction; or a plant
@@ -173,7 +174,7 @@ class DesignBatch:
 
     def _over_workspace(
         self, position: Floats, direction: Any, assembly: str | None, model: str | None
-    ) -> tuple[OperatingPoint, Marks]:
+    ) -> tuple[OperatingPoint, Flags]:
         """Each design by its own roadmap of postures."""
         mechanism, alone = cast(Mechanism, self.parts.mechanism), np.zeros(self.count, dtype=bool)
         postures: list[Posture | None] = []
@@ -232,8 +233,8 @@ class DesignBatch:
 
 
 def design_batch(
-    document: dict[str, Any], columns: Mapping[KeyPath, NDArray[np.float64]], count: int, label: str
-) -> tuple[DesignBatch, Marks]:
+    document: dict[str, Any], columns: Mapping[KeyPath, Floats], count: int, label: str
+) -> tuple[DesignBatch, Flags]:
     """Designs built together, and marks (P,) of those that are certain to be valid; the rest is to be built alone.
 
     document  of one of the designs, a valid one
@@ -263,7 +264,7 @@ def _built_alone(document: dict[str, Any]) -> bool:
     return bends or bool({"load", "arm"} & document.keys())
 
 
-def _leaves(steps: KeyPath, numbers: NDArray[np.float64]) -> Iterator[tuple[KeyPath, NDArray[np.float64]]]:
+def _leaves(steps: KeyPath, numbers: Floats) -> Iterator[tuple[KeyPath, Floats]]:
     """Path and numbers (P,) of each number in a list."""
     if numbers.ndim == 1:
         yield steps, numbers
@@ -272,7 +273,7 @@ def _leaves(steps: KeyPath, numbers: NDArray[np.float64]) -> Iterator[tuple[KeyP
         yield from _leaves((*steps, i), numbers[:, i])
 
 
-def _substitute(value: Any, raw: Any, steps: KeyPath, numbers: NDArray[np.float64]) -> Any:
+def _substitute(value: Any, raw: Any, steps: KeyPath, numbers: Floats) -> Any:
     """A checked value with arrays in place of the numbers at a path; `raw` is what the document holds there."""
     if isinstance(value, Section):
         key = cast(str, steps[0])
@@ -297,6 +298,6 @@ def _substitute(value: Any, raw: Any, steps: KeyPath, numbers: NDArray[np.float6
     return _columns(numbers)
 
 
-def _columns(numbers: NDArray[np.float64]) -> Any:
+def _columns(numbers: Floats) -> Any:
     """Numbers (P, ...) as nested tuples of arrays (P,)."""
     return numbers if numbers.ndim == 1 else tuple(_columns(numbers[:, i]) for i in range(numbers.shape[1]))

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device.faults import KeyPath
 from zwidth.device.legs import written
 from zwidth.device.loop_consistency import lags_wrongly, reaches_nyquist
@@ -27,8 +27,7 @@ from zwidth.loop.estimators.kalman import INDEX
 from zwidth.loop.estimators.parameter_checks import quantisation_noise
 from zwidth.model.design_axes import join_designs
 
-Marks = NDArray[np.bool_]
-Values = dict[KeyPath, NDArray[np.float64]]
+Values = dict[KeyPath, Floats]
 
 _LOW_PASSES: Final = (
     *((path, "filter") for path in ("velocity", "force", "force_sensor")),
@@ -39,7 +38,7 @@ PLANT_MATRICES: Final = ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
 PLANT_VECTORS: Final = ("actuator", "sensor", "handle")
 
 
-def certainly_valid(document: dict[str, Any], values: Values, count: int) -> Marks:
+def certainly_valid(document: dict[str, Any], values: Values, count: int) -> Flags:
     """Marks (count,) of the designs that are certain to be valid.
 
     document  of one of the designs, a valid one
@@ -64,7 +63,7 @@ def _together(steps: KeyPath) -> bool:
     return len(steps) > 4 and steps[3] in ("inertia_kg_m2", "axis")
 
 
-def _allowed_alone(document: dict[str, Any], steps: KeyPath, numbers: NDArray[np.float64]) -> Marks:
+def _allowed_alone(document: dict[str, Any], steps: KeyPath, numbers: Floats) -> Flags:
     """Which numbers the file may have at a path. Those between two that it may have are allowed, too, if they are
     of one sign and not infinite."""
     inside = np.zeros(len(numbers), dtype=bool)
@@ -74,7 +73,7 @@ def _allowed_alone(document: dict[str, Any], steps: KeyPath, numbers: NDArray[np
             continue
         known = dict[int, bool]()
 
-        def allowed(place: int, ordered: NDArray[np.float64] = ordered, known: dict[int, bool] = known) -> bool:
+        def allowed(place: int, ordered: Floats = ordered, known: dict[int, bool] = known) -> bool:
             if place not in known:
                 known[place] = _may_be(document, steps, float(ordered[place]))
             return known[place]
@@ -283,6 +282,6 @@ def _plant(document: dict[str, Any], read: Read) -> Broken:
             yield (largest < magnitudes.LEAST_SHARE) | (largest > magnitudes.LARGEST_SHARE)
 
 
-def _asymmetric(matrix: NDArray[np.float64]) -> Any:
+def _asymmetric(matrix: Floats) -> Any:
     gap = np.abs(matrix - np.swapaxes(matrix, -1, -2)).max(axis=(-2, -1))
     return gap > 0.5 * SYMMETRY_TOLERANCE * np.abs(matrix).max(axis=(-2, -1))

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth import _verbs
+from zwidth.arrays import Floats
 from zwidth.device.faults import DeviceError, fail, quote, suggestion
 from zwidth.device.missing import missing_numbers
 from zwidth.device.posture_arguments import joint_angles, positions, rotations, screws, unit_vectors
 from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.operator import ABOUT_AN_AXIS
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response

@@ -14,10 +14,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import KeyPath
 from zwidth.device.schema.value_types import Section
 from zwidth.device.toml_access import is_number, table, tables
-from zwidth.model.design_axes import Floats
 
 GROUPS: Final = ("links", "loops", "drives")
 

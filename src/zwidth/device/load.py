@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
+from zwidth.arrays import Floats
 from zwidth.device import address, build, unsupported
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
@@ -28,7 +29,7 @@ from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import wrong_type
 from zwidth.model.flexible_link import BeamError
 from zwidth.model.load import Load
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.operator import Operator
 from zwidth.model.response import handle_obstacle
 

@@ -7,12 +7,13 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import KeyPath, comma_list, plural
 from zwidth.device.legs import members
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.model.continuation import assemble_batch
 from zwidth.model.joint_space import joint_axes, joint_mass_matrix
-from zwidth.model.mechanism import FIXED, POSE, PRISMATIC, Floats, Mechanism
+from zwidth.model.mechanism import FIXED, POSE, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.mobility import constraints
 

@@ -9,9 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.build import roll_pitch_yaw
 from zwidth.device.faults import fail, quote
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 
 UNIT: Final = 4.0 * np.finfo(float).eps  # from 1, that the length of a unit vector may be by rounding
 

@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import DeviceError, Fault, fail, plural, quote
 from zwidth.device.schema.response import ResponseSection
 from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
 from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, ResponseError, mean_path
 from zwidth.model.sweep_response import sweep_response
 
-Floats = NDArray[np.float64]
 Table = dict[str, Floats]  # columns, with the line of each row under LINE
 Cause = tuple[
     str, list[tuple[int, str]]

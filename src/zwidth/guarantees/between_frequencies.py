@@ -25,12 +25,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.guarantees.disks import Disks
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
 FORM_SIGNS: Final = np.array([1.0, 1.0, -1.0, 1.0])  # of n0, Re n1, Im n1, n2 at mirrored angles
@@ -60,7 +57,7 @@ class CubicPieces:
     nodes: Floats
     values: Complexes
     fifth: Floats
-    odd: NDArray[np.bool_]
+    odd: Flags
 
     @classmethod
     def through(cls, nodes: Floats, values: Complexes, signs: Floats) -> CubicPieces:
@@ -73,7 +70,7 @@ class CubicPieces:
         fifth = fifth[:, np.clip(first, 0, len(window) - 1)].max(axis=2)
         return cls(nodes, values, fifth, signs < 0.0)
 
-    def interval(self, at: Floats) -> NDArray[np.int64]:
+    def interval(self, at: Floats) -> Ints:
         """Number (k,) of the interval that holds each of several places (k,)."""
         return np.clip(np.searchsorted(self.nodes, at, side="right") - 1, 0, len(self.nodes) - 2)
 
@@ -160,7 +157,7 @@ class DisksBetween:
     centres: CubicPieces
     ratio: CubicPieces
     forms: tuple[CubicPieces, ...]
-    kind: NDArray[np.int64]
+    kind: Ints
     below: DisksBetween | None = None
 
     @property
@@ -233,9 +230,7 @@ def disks_between(disks: Disks, scale: float) -> DisksBetween | None:
     return _disks_through(disks, nodes, scale, below)
 
 
-def _disks_through(
-    disks: Disks, nodes: NDArray[np.int64], scale: float, below: DisksBetween | None
-) -> DisksBetween:
+def _disks_through(disks: Disks, nodes: Ints, scale: float, below: DisksBetween | None) -> DisksBetween:
     """The disks between those at some of the measured angles (k,)."""
     theta, C = disks.angles[nodes], disks.centre[nodes] / scale
     R, X = disks.radius[nodes] / scale, disks.power[nodes] / scale**2
@@ -250,9 +245,7 @@ def _disks_through(
     return DisksBetween(theta, scale, centres, ratio, forms, _best_kind(x, centres, ratio, forms), below)
 
 
-def _best_kind(
-    nodes: Floats, centres: CubicPieces, ratio: CubicPieces, forms: tuple[CubicPieces, ...]
-) -> NDArray[np.int64]:
+def _best_kind(nodes: Floats, centres: CubicPieces, ratio: CubicPieces, forms: tuple[CubicPieces, ...]) -> Ints:
     """Which interpolation (n - 1,) makes the disks least larger, near |p| = 1, in the middle of each interval."""
     middle = 0.5 * (nodes[1:] + nodes[:-1])
     middle[MIRRORED - 1] = 0.5 * nodes[MIRRORED]  # of the stretch down to 0 itself
@@ -266,7 +259,7 @@ def _best_kind(
     return np.asarray(np.argmin(np.nan_to_num(np.array(growth), nan=np.inf), axis=0))
 
 
-def _kept(angles: Floats) -> NDArray[np.bool_]:
+def _kept(angles: Floats) -> Flags:
     """Which angles (k,) are nodes: of two that all but coincide among more distant ones the second is none."""
     gaps = np.diff(np.concatenate([-angles[:1], angles, 2.0 * np.pi - angles[-1:]]))
     pair = (gaps[1:-1] < PAIR * gaps[:-2]) & (gaps[1:-1] < PAIR * gaps[2:])

@@ -17,15 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.guarantees.disks import Aliases, Disks, force_filter_response, one_less_z_inverse
-from zwidth.guarantees.port import Floats, Port, port
+from zwidth.guarantees.port import Port, port
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.loop import Loop
-
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 # Functions of the angle, in this order.
 A_K, A_B, C_K, C_B, B_KK, B_KB, B_BB, R_KK, R_KB, R_BB = range(10)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.guarantees.port import Floats, hold_fixed, port
+from zwidth.arrays import Floats
+from zwidth.guarantees.port import hold_fixed, port
 from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffness_text
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.guarantees.two_port import (

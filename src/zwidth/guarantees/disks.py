@@ -21,16 +21,14 @@ from math import ceil
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 from scipy.special import gamma, roots_genlaguerre, zeta
 
-from zwidth.guarantees.port import Floats, Port, port_response
+from zwidth.arrays import Complexes, Floats
+from zwidth.guarantees.port import Port, port_response
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.feedback_response import feedforward_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
-
-Complexes = NDArray[np.complex128]
 
 # Number of terms of the expansion in 1/w for the far aliases, and how far beyond the fastest pole it begins.
 TERMS, REACH = 9, 16

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from zwidth.arrays import Floats
 from zwidth.chart.curve import wall_at
 from zwidth.compiled import compiled
-from zwidth.guarantees.port import Floats
 from zwidth.guarantees.spring_family import SpringFamily
 from zwidth.loop.circle_factors import CircleFactors
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arc
 from zwidth.guarantees.envelope import TouchingPoint, envelope_between, nearest_touching_point, touching_points
-from zwidth.guarantees.port import Floats
 from zwidth.guarantees.spring_family import SpringFamily, polygons_of
 
 # In shares of the set's size: touching points further away do not matter, nor do sweeps wider than this.

@@ -24,11 +24,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.compiled import compiled
 from zwidth.guarantees.conics import A_B, A_K, B_KK, C_B, C_K, QUARTIC, R_KK, Conics, conics
-from zwidth.guarantees.port import Floats, static_compliances
+from zwidth.guarantees.port import static_compliances
 from zwidth.loop.loop import Loop
 
 # Relative accuracy of mu, and largest number of halvings of a stretch.
@@ -157,9 +157,7 @@ def _within(K: float, B: float, piece: Floats, wide: bool, best: float) -> float
 
 
 @compiled
-def _largest(
-    K: Floats, B: Floats, angles: Floats, pieces: Floats, wide: NDArray[np.bool_]
-) -> tuple[Floats, Floats]:
+def _largest(K: Floats, B: Floats, angles: Floats, pieces: Floats, wide: Flags) -> tuple[Floats, Floats]:
     """Largest mu over all angles (k,) of walls (k,), and the angle at the start of the piece it comes from."""
     count, n = len(K), len(pieces)
     out, at = np.zeros(count), np.zeros(count)

@@ -8,12 +8,13 @@ from functools import partial
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.guarantees.coupling import couplings, no_couplings
 from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
 from zwidth.guarantees.passive import passive_region
-from zwidth.guarantees.port import Floats, without_idle_motions
+from zwidth.guarantees.port import without_idle_motions
 from zwidth.guarantees.region import Region, empty_region, stiffest_corner
 from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
 from zwidth.guarantees.stable_alone import AS_BENT, Premise, bent_as_loaded, stable_alone

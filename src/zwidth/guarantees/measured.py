@@ -17,8 +17,8 @@ from typing import Final
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.guarantees.between_frequencies import disks_between
@@ -33,10 +33,6 @@ from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.measured.measured_port import MeasuredPort
 from zwidth.loop.operating_point import OperatingPoint
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 FAR: Final = 1000  # aliases to either side
 NEAR, NODES = 8, 16  # those summed at every angle; and angles at which the others are summed, which vary little

@@ -14,17 +14,14 @@ planes, and the theorem of Colgate and Schenkel 1997 (read in Weir and Colgate's
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.guarantees.gauge import Gauge, gauge
-from zwidth.guarantees.port import Floats
 from zwidth.guarantees.region import Region, empty_region
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.fixed_feedback import Feedforward, feedback_name
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
-
-Complexes = NDArray[np.complex128]
 
 # Largest deviation of chords from the outline, in shares of the wall, inwards and outwards; and largest number of
 # bisections of a direction.
@@ -160,7 +157,7 @@ def _missed_directions(loop_gauge: Gauge, directions: Floats, ends: Complexes, p
     return np.unique(np.angle(tip[farthest]))
 
 
-def _off_chord(between: Complexes, first: Complexes, last: Complexes) -> NDArray[np.bool_]:
+def _off_chord(between: Complexes, first: Complexes, last: Complexes) -> Flags:
     """Whether walls between two others, all (k,), lie off their chord, or between a wall and none."""
     along = last - first
     length = np.maximum(np.abs(along), 1e-300)

@@ -6,14 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.model.idle_motions import IDLE, modal_damping, separated_modes
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import LaggedDamper, Plant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Matrix entries that a response holds at once: 64 MB of complex numbers.
 AT_ONCE = 2**22

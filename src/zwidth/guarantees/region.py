@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry.polygon import orient
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.peak import find_peak
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,7 +45,7 @@ class Region(Result):
             return self
         return replace(self, warning=warning if self.warning is None else f"{self.warning}; {warning}")
 
-    def contains(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Flags:
         """Whether walls K, B of any shape (...) lie inside, to the accuracy of the rings."""
         K, B = np.broadcast_arrays(np.asarray(wall_stiffness, float), np.asarray(wall_damping, float))
         inside = np.zeros(K.shape, dtype=bool)

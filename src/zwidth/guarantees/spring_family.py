@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.robust.instability import unstable
 from zwidth.chart.robust.members import Member, chart_member, member_polygons
 from zwidth.chart.tracer import Tracer
-from zwidth.guarantees.port import Floats, hold_fixed
+from zwidth.guarantees.port import hold_fixed
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.modes import undamped_modes
@@ -127,7 +127,7 @@ class SpringFamily:
             self._members[share] = chart_member(len(self._members), tracer.loop)
         return self._members[share]
 
-    def unstable(self, walls: Floats, shares: Floats) -> NDArray[np.bool_]:
+    def unstable(self, walls: Floats, shares: Floats) -> Flags:
         """Which walls (n, 2) [K unit, B] are certainly unstable with which springs (m,): (m, n)."""
         K, B = np.ascontiguousarray((walls / (self.unit, 1.0)).T)
         out = np.zeros((len(shares), len(walls)), dtype=bool)

@@ -17,7 +17,8 @@ from typing import Any, Final, Literal
 import numpy as np
 import scipy.linalg
 
-from zwidth.guarantees.port import Floats, port
+from zwidth.arrays import Floats
+from zwidth.guarantees.port import port
 from zwidth.loop.closed_plant import close_plant
 from zwidth.loop.closed_sections import zero_poles
 from zwidth.loop.loop import Loop

@@ -26,13 +26,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.guarantees.disks import force_filter_response, response_disks
-from zwidth.guarantees.port import Floats, port, port_response
+from zwidth.guarantees.port import port, port_response
 from zwidth.loop.loop import Loop
-
-Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def _demand(angles: Floats, fixed: Complexes, swing: Complexes, need: Floats, re
     return Demand(angles, centre, radius, np.where(dead, -np.inf, power), np.where(dead, np.inf, need))
 
 
-def allows(demand: Demand, stiffness: ArrayLike, damping: ArrayLike, period: float) -> NDArray[np.bool_]:
+def allows(demand: Demand, stiffness: ArrayLike, damping: ArrayLike, period: float) -> Flags:
     """Whether couplings k_c, b_c (...) meet a demand at all its angles."""
     Z = coupling_impedance(stiffness, damping, demand.angles, period)
     with np.errstate(divide="ignore", invalid="ignore"):

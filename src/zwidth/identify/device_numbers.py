@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import dotted, fail, quote
 from zwidth.device.schema.device_file import may_be_zero
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class DeviceNumbers:
     device: Device
     paths: tuple[str, ...]
     start: Floats
-    positive: NDArray[np.bool_]
+    positive: Flags
 
     @classmethod
     def of(cls, device: Device, paths: Sequence[str]) -> DeviceNumbers:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Floats
 
 LEAST_SHARED: Final = 0.2  # of the power, from which on one part tells of the other
 

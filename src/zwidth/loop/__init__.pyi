@@ -1,6 +1,8 @@
 from .controller import Butterworth as Butterworth
 from .controller import Controller as Controller
 from .controller import FirstOrder as FirstOrder
+from .estimators import LINEAR_METHODS as LINEAR_METHODS
+from .estimators import METHODS as METHODS
 from .estimators import AlphaBeta as AlphaBeta
 from .estimators import BackwardDifference as BackwardDifference
 from .estimators import CentralDifference as CentralDifference
@@ -10,8 +12,6 @@ from .estimators import LeastSquaresSlope as LeastSquaresSlope
 from .estimators import Levant as Levant
 from .estimators import SavitzkyGolay as SavitzkyGolay
 from .estimators import WindowedDifference as WindowedDifference
-from .estimators.__init__ import LINEAR_METHODS as LINEAR_METHODS
-from .estimators.__init__ import METHODS as METHODS
 from .estimators.frequency_response import phase_delay as phase_delay
 from .estimators.frequency_response import relative_response as relative_response
 from .estimators.parameter_checks import quantisation_noise as quantisation_noise

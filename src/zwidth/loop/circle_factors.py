@@ -18,14 +18,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_apart, compiled_inline, compiled_lean
 from zwidth.loop.loop_table import LoopTable
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
-
 
 # Places in `CircleFactors.sizes`.
 SECTIONS, FORCE, VELOCITY, WINDOW, WHOLE_DELAY, SPLIT, COMPUTER, DEGREE = range(8)
@@ -44,7 +40,7 @@ class CircleFactors(NamedTuple):
     window    (n,)       its weights of past samples
     """
 
-    sizes: Whole
+    sizes: Ints
     radius: Floats
     plant: Floats
     force: Floats

@@ -21,8 +21,8 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.controller import Controller, split_delay
 from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.estimators import LinearMethod
@@ -34,9 +34,6 @@ from zwidth.loop.low_pass import LowPass
 from zwidth.loop.plant_states import PlantStates, SampledInput, plant_states
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 SAMPLE, SLOW, FAST, END = range(4)  # what happens in a period, in this order at one instant
 SAME_INSTANT = 1e-12  # shares of the period within which two instants are one

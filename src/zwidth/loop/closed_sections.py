@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.closed_plant import close_plant, closed_form, low_pass_states
 from zwidth.loop.controller import Controller
 from zwidth.loop.filters import Filter, factor_roots, low_pass_factors
@@ -16,9 +16,6 @@ from zwidth.loop.plant_states import PlantStates
 from zwidth.loop.pole_zero_form import PoleZeroForm, pole_zero_form
 from zwidth.loop.sections import Sections, UnmovedError, UnresolvedError, refuse_loss_factor
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 UNRESOLVED = 1e-2  # error of the response where it counts, by which two ways to compute it tell nothing of it
 MOST_WAITING = 8  # samples of delay that the curve's steps need not know of

@@ -7,8 +7,8 @@ from math import floor, inf, nan
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
 from zwidth.loop.fixed_feedback import (
     Feedforward,
@@ -29,7 +29,7 @@ from zwidth.model.design_axes import Number
 ROUNDING: Final = 1e-12  # samples by which a delay may fall short of a whole number by rounding
 
 
-def whole_samples(delay: NDArray[np.float64]) -> NDArray[np.int64]:
+def whole_samples(delay: Floats) -> Ints:
     """Whole samples of delays (...), as `Controller.whole_delay` of one."""
     return np.floor(delay + ROUNDING).astype(np.int64)
 

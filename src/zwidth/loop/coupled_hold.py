@@ -7,8 +7,8 @@ from decimal import Decimal, localcontext
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.exact_polynomials import (
     ARITHMETIC,
     MOST_STATES,
@@ -19,9 +19,6 @@ from zwidth.loop.exact_polynomials import (
 )
 from zwidth.loop.hold import lag_share
 from zwidth.model.first_order_form import FirstOrderForm, invariant_subspace
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Motions slower than this share of the fast ones' rate can lose digits to what rounding leaves of the fast ones.
 MUCH_SLOWER = 0.3

@@ -15,10 +15,9 @@ from decimal import Context, Decimal, localcontext
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from zwidth.arrays import Complexes, Floats
+
 Polynomial = list[Decimal]  # ascending coefficients
 
 # Digits that are kept. What cancels between the two determinants is some 15 digits for each spring on the way, and

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from zwidth.arrays import Complexes, Floats
 
 
 def factor_response(numerator: Floats, denominator: Floats, d: Complexes) -> Complexes:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor
 from zwidth.loop.low_pass import LowPass
-
-Complexes = NDArray[np.complex128]
 
 
 def feedforward_response(ahead: Feedforward, period: float, z: Complexes, d: Complexes) -> Complexes:

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.hold import lag_share
 from zwidth.model.design_axes import stack_numbers
 
-Floats = NDArray[np.float64]
 Rows = list[list[Any]]  # numbers, or arrays over designs
 
 

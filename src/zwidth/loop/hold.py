@@ -15,11 +15,9 @@ from __future__ import annotations
 from math import cos, exp, expm1, sin, sinh, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
-
-Floats = NDArray[np.float64]
 
 
 @compiled_lean

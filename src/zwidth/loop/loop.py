@@ -7,9 +7,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from zwidth import _verbs
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.closed_sections import ClosedSections, closed_sections, closed_table
 from zwidth.loop.controller import Controller, NotKnown
 from zwidth.loop.estimator import Estimator
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
     from zwidth.chart.verdict import Verdicts
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # What to write instead, by the type given as a plant.
 _HINTS = {

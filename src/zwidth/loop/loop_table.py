@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.filters import force_path, velocity_estimator
 from zwidth.model.design_axes import design_shape
 
 if TYPE_CHECKING:
     from zwidth.loop.loop import Loop
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 
 class LoopTable(NamedTuple):
@@ -35,17 +33,17 @@ class LoopTable(NamedTuple):
     """
 
     rows: Floats
-    section_count: Whole
-    computer: Whole
+    section_count: Ints
+    computer: Ints
     period: Floats
-    whole_delay: Whole
-    split: Whole
+    whole_delay: Ints
+    split: Ints
     force: Floats
-    force_count: Whole
+    force_count: Ints
     velocity: Floats
-    velocity_count: Whole
+    velocity_count: Ints
     window: Floats
-    window_count: Whole
+    window_count: Ints
 
 
 def table_of_loops(*loops: Loop) -> LoopTable:
@@ -61,7 +59,7 @@ def table_of_loops(*loops: Loop) -> LoopTable:
     return _table(rows, count, np.arange(len(each)), columns)
 
 
-def loop_table(rows: Floats, section_count: Whole, controller: Controller) -> LoopTable:
+def loop_table(rows: Floats, section_count: Ints, controller: Controller) -> LoopTable:
     """N plants by their sections, all with one controller, or each with its own of N designs of it.
 
     rows, section_count  as in `LoopTable`
@@ -86,14 +84,14 @@ class ComputerColumns(NamedTuple):
     """The computers of a controller, one or one for each of its designs: columns of a `LoopTable`."""
 
     period: Floats
-    whole_delay: Whole
-    split: Whole
+    whole_delay: Ints
+    split: Ints
     force: Floats
-    force_count: Whole
+    force_count: Ints
     velocity: Floats
-    velocity_count: Whole
+    velocity_count: Ints
     window: Floats
-    window_count: Whole
+    window_count: Ints
 
 
 def computer_columns(controller: Controller) -> ComputerColumns:
@@ -139,7 +137,7 @@ def _factors(top: Floats, bottom: Floats, designs: tuple[int, ...]) -> Floats:
     return out.reshape(math.prod(designs), *out.shape[-2:])
 
 
-def _table(rows: Floats, section_count: Whole, computer: Whole, columns: Sequence[ComputerColumns]) -> LoopTable:
+def _table(rows: Floats, section_count: Ints, computer: Ints, columns: Sequence[ComputerColumns]) -> LoopTable:
     """Plants, and computers one after the other."""
     joined = columns[0] if len(columns) == 1 else map(_joined, zip(*columns, strict=True))
     return LoopTable(

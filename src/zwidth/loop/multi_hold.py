@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.modes import (
     REPEATED,
@@ -30,8 +30,6 @@ from zwidth.model.modes import (
     undamped_modes,
 )
 from zwidth.model.multi_plant import MultiPlant
-
-Floats = NDArray[np.float64]
 
 # Condition number of the damped modes' eigenvectors above which their residues are only rounding.
 DEFECTIVE = 1e7
@@ -107,7 +105,7 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
 
 
 def _groups(
-    squared: Floats, drag: Floats, members: NDArray[np.int64], tolerance: Floats, drag_tolerance: float
+    squared: Floats, drag: Floats, members: Ints, tolerance: Floats, drag_tolerance: float
 ) -> list[list[int]]:
     """Modes in groups of equal frequency squared and damping, within tolerances (n,) [1/s^2] and [1/s]."""
     groups: list[list[int]] = []

@@ -15,9 +15,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from zwidth import _verbs
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.controller import Controller
 from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter, velocity_estimator
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 # A state moves from sample to sample, and is read, by less than this share of what others are: no wall
 # sees it.
 UNSEEN = 1e-12
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

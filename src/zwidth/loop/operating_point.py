@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth import _verbs
+from zwidth.arrays import Floats
 from zwidth.loop.controller import Controller
 from zwidth.loop.inertia_share import has_inertia_share, with_inertia_of
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
@@ -23,7 +24,6 @@ from zwidth.loop.point_text import point_text
 from zwidth.loop.posed_device import NO_MODEL, PosedDevice
 from zwidth.model.arm import attach_arm
 from zwidth.model.loaded_plant import LoadedPlants, counting_all, linearise, set_apart
-from zwidth.model.mechanism import Floats
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.controller import Controller
 from zwidth.loop.sections_batch import fill_rows
 from zwidth.model.plant import Plant
 from zwidth.model.plant_modes import fill_modes
-
-Floats = NDArray[np.float64]
 
 MOST: Final = 12  # coordinates of which the kernel finds the modes; of more they are found faster otherwise
 

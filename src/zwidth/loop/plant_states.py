@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.coupled_hold import step_growth, steps_growth
 from zwidth.loop.hold import modal_row, mode_growth
 from zwidth.loop.low_pass import LowPass
@@ -34,9 +34,6 @@ from zwidth.model.first_order_form import (
 )
 from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes, undamped_modes
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 FEW = 12  # coordinates of a plant that is small
 NEUTRAL = 1e-11  # share of what holds a motion, or of what a load adds, that is rounding

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.exact_polynomials import (
     MOST_STATES,
@@ -32,9 +32,6 @@ from zwidth.loop.exact_polynomials import (
     roots_near,
     without_roots,
 )
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 STEPS, SETTLED = 3, 1e-15  # of Newton's method; the step in shares of a root at which it has settled
 # The longest steps that are tried, in shares of the distance to the next root, and how many of any length.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.controller import Controller
 from zwidth.loop.point_errors import MissingNumbersError, NoMechanismError, OperatingPointError
 from zwidth.loop.point_text import points_text
@@ -23,7 +24,7 @@ from zwidth.model.effective_parameters import EffectiveParameters, effective_par
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError, solve_equilibrium
 from zwidth.model.load import Load, unit_of_push
 from zwidth.model.loaded_posture import loaded_postures
-from zwidth.model.mechanism import Drives, Floats, Mechanism
+from zwidth.model.mechanism import Drives, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
 from zwidth.model.operator import ABOUT_AN_AXIS, Operator, OperatorError

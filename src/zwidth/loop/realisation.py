@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats, Ints
 from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.filters import Filter
 from zwidth.loop.sections import Sections
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class StateSpace:
         feedback = K * self.position + B * self.velocity
         return self.open - self.input[..., :, None] * feedback[..., None, :]
 
-    def __getitem__(self, index: NDArray[np.int64]) -> StateSpace:
+    def __getitem__(self, index: Ints) -> StateSpace:
         """Some of the loops, by the first of their axes."""
         return StateSpace(self.open[index], self.input[index], self.position[index], self.velocity[index])
 

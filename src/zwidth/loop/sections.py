@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.coupled_hold import SampledForm, exact_rows, form_rows, rows_error, sample_form, separate_rows
 from zwidth.loop.hold import modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
@@ -20,9 +20,6 @@ from zwidth.model.modes import (
     repeat_tolerance,
 )
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-
 
 # Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
 SAME_POLES = 1e-6

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.hold import held_row, lagged_row
@@ -12,10 +12,8 @@ from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED
 from zwidth.model.pole_pairs import PolePairs
 from zwidth.threads import in_chunks
 
-Floats = NDArray[np.float64]
 
-
-def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, NDArray[np.int64]]:
+def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints]:
     """The rows (N, m, 9) of each plant, and how many of them are used (N,): 0 where its reach is nan.
 
     controller  the same for all plants, or one of N designs for each
@@ -49,7 +47,7 @@ def fill_rows(
     lags: Floats,
     lagging: bool,
     rows: Floats,
-    used: NDArray[np.int64],
+    used: Ints,
     first: int,
     last: int,
 ) -> None:

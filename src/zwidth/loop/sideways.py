@@ -15,11 +15,12 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.loop.closed_plant import close_plant
 from zwidth.loop.controller import Controller
 from zwidth.loop.motion_names import motion_name
 from zwidth.model.modes import undamped_modes
-from zwidth.model.plant import Floats, Plant
+from zwidth.model.plant import Plant
 
 NEUTRAL: Final = 1e-12  # |z| - 1 that is rounding
 

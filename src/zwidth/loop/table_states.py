@@ -6,16 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from zwidth.arrays import Ints
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.filters import Filter
-from zwidth.loop.loop_table import LoopTable, Whole
+from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections
 
 CHAINED = 8  # column of a row that is 1 where it is chained
 
 
-def state_spaces(loops: LoopTable, which: Whole) -> Iterator[tuple[Whole, StateSpace]]:
+def state_spaces(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpace]]:
     """Some of the loops, by structure: their places in `which`, and their states (p, ...).
 
     which   (n,)  numbers of loops; those that have no sections are left out
@@ -30,7 +31,7 @@ def state_spaces(loops: LoopTable, which: Whole) -> Iterator[tuple[Whole, StateS
             yield places, _states(loops, which[places])
 
 
-def _structure(loops: LoopTable, which: Whole) -> Whole:
+def _structure(loops: LoopTable, which: Ints) -> Ints:
     """What loops have in common that are realised together, (n, s); the number of sections first."""
     c = loops.computer[which]
     counts = (loops.whole_delay, loops.split, loops.force_count, loops.velocity_count, loops.window_count)
@@ -38,7 +39,7 @@ def _structure(loops: LoopTable, which: Whole) -> Whole:
     return np.column_stack([loops.section_count[which], *(count[c] for count in counts), *orders]).astype(np.int64)
 
 
-def _states(loops: LoopTable, which: Whole) -> StateSpace:
+def _states(loops: LoopTable, which: Ints) -> StateSpace:
     """States of loops of one structure."""
     c, one = loops.computer[which], loops.computer[which[0]]
     force = loops.force[c, : loops.force_count[one]]

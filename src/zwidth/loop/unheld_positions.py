@@ -11,14 +11,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.model.modes import undamped_modes
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Share of the sizes of force and reading along the free motions that rounding leaves of 0: with less, a motion
 # that no wall moves would count as one that the wall leaves unheld; with more, one that hardly moves would not.

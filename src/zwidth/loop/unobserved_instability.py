@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.hold import denominator
 from zwidth.loop.loop import Loop
 from zwidth.model.first_order_form import first_order_form
 from zwidth.model.modes import real_modes
 from zwidth.model.plant import Plant
 
-Complex = NDArray[np.complex128]
 GROWS = 1e-12  # |z|^2 - 1 above which a pole lies outside the unit circle by more than rounding
 
 
@@ -29,7 +28,7 @@ def unobserved_instability(loop: Loop) -> bool:
     return _unstable_count(_poles(loop.plant, loop.period)) > _unstable_count(observed_poles)
 
 
-def _poles(plant: Plant, period: float) -> Complex:
+def _poles(plant: Plant, period: float) -> Complexes:
     """All poles of the sampled plant, as z - 1; those of free motions, which do not grow, may be missing."""
     modes = real_modes(plant)
     if modes is None:
@@ -39,12 +38,12 @@ def _poles(plant: Plant, period: float) -> Complex:
     return _section_poles(np.array([denominator(decay, squared, period) for decay, squared in pairs]))
 
 
-def _section_poles(denominators: NDArray[np.float64]) -> Complex:
+def _section_poles(denominators: Floats) -> Complexes:
     """Roots e of e^2 + d1 e + d0 for each row d1, d0."""
     roots = [np.roots([1.0, *row]) for row in denominators]
     return np.concatenate([np.zeros(0, dtype=complex), *roots])
 
 
-def _unstable_count(e: Complex) -> int:
+def _unstable_count(e: Complexes) -> int:
     """Number of poles z = 1 + e outside the unit circle."""
     return int(np.sum(2.0 * e.real + np.abs(e) ** 2 > GROWS))

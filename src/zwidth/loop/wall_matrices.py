@@ -14,11 +14,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.model.argument_checks import describe_value
-
-Floats = NDArray[np.float64]
 
 # Entries are symmetric, and eigenvalues not negative, to this share of the largest entry.
 ROUNDING: Final = 1e-12

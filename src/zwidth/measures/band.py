@@ -6,11 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.model.rendered_modes import RenderedModes
-
-Floats = NDArray[np.float64]
 
 SPREAD: Final = 40  # frequencies spread over the band
 HALVINGS: Final = 40
@@ -20,7 +18,7 @@ DEEPEST: Final = 2  # lowest minima that are looked at so
 
 
 def frequencies_in_band(
-    low: Floats, high: Floats, modes: RenderedModes, roots: NDArray[np.complex128], period: Floats
+    low: Floats, high: Floats, modes: RenderedModes, roots: Complexes, period: Floats
 ) -> Floats:
     """Frequencies at which a response at the handle is looked at, ascending.
 

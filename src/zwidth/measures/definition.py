@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from zwidth.arrays import Floats
 from zwidth.measures.moment_units import unit_of_moments
 from zwidth.measures.wanted import WantedWall, WantedWalls
 from zwidth.result import Result
@@ -147,7 +148,7 @@ class MeasureValues(Result):
     notes   reasons of NO_VALUE, UNDECIDED and FAILED, and of NO_EQUILIBRIUM where it shows with the measure alone
     """
 
-    values: NDArray[np.float64]
+    values: Floats
     status: NDArray[np.uint8]
     notes: tuple[Note, ...] = ()
 

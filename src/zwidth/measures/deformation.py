@@ -20,14 +20,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.measures.handle_impedance import handle_of
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Frequencies tried up to the highest, in even steps and again in even ratios from this share of it on; and about
 # each resonance, in units of its half width.
@@ -38,7 +36,7 @@ ABOUT: Final = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 
 SHARP: Final = 1e-10
 
 
-def deformation_ratio(plant: Plant, frequency: ArrayLike) -> Complex:
+def deformation_ratio(plant: Plant, frequency: ArrayLike) -> Complexes:
     """Motion of the handle per motion of the actuator, S = x_h/x_a, the handle free (see above).
 
     frequency  (...)  above 0 [Hz]
@@ -125,7 +123,7 @@ class _FixedActuatorPlant:
     static: float
     mode_deformations: Floats
 
-    def deformation(self, w: Floats) -> Complex:
+    def deformation(self, w: Floats) -> Complexes:
         """1 - S at angular frequencies w (...) [rad/s]."""
         s = 1j * np.asarray(w, dtype=np.complex128)[..., None]
         push = s**2 * self.push[0] + s * self.push[1] + self.push[2] + 1j * self.loss_push
@@ -138,7 +136,7 @@ class _FixedActuatorPlant:
         return np.asarray(self.static - _solve(inner, push) @ self.mode_deformations)
 
     @property
-    def poles(self) -> Complex:
+    def poles(self) -> Complexes:
         """Poles of the motion with the actuator fixed, without the hysteretic loss [1/s]."""
         m, n = len(self.squared_frequencies), len(self.dampers)
         A = np.zeros((2 * m + n, 2 * m + n))
@@ -186,7 +184,7 @@ def _fix_actuator(plant: Plant) -> _FixedActuatorPlant:
     )
 
 
-def _solve(inner: Complex, push: Complex) -> Complex:
+def _solve(inner: Complexes, push: Complexes) -> Complexes:
     """inner^-1 push (..., m); nan where inner is singular, on a resonance without damping."""
     try:
         return np.asarray(np.linalg.solve(inner, push[..., None])[..., 0])

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.bindings import dexterity
 from zwidth.model.argument_checks import require
 from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.flexible_link import FlexibleLink, Method
-from zwidth.model.mechanism import FIXED, Floats, Mechanism
+from zwidth.model.mechanism import FIXED, Mechanism
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant
 from zwidth.result import Result

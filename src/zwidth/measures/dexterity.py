@@ -25,9 +25,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Flags, Floats
 
 ZERO_ROW: Final = 1e-12  # share of the largest entry below which a row of the Jacobian is rounding
 
@@ -161,7 +161,7 @@ def handle_mass_isotropy(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms: 
     return np.asarray(np.where(heavy.all(axis=-1) | np.isnan(ratio), ratio, np.inf))
 
 
-def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[Floats, NDArray[np.bool_]]:
+def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[Floats, Flags]:
     """Singular values of the Jacobian, descending, and which of them belong to directions the handle can move in.
 
     jacobian  (..., 3, d)       J [m/rad]
@@ -184,14 +184,14 @@ def singular_values(jacobian: ArrayLike, freedoms: int | None = None) -> tuple[F
         rows = np.maximum(rows, min(2, count))
     else:
         rows = np.full(unknown.shape, freedoms)
-    used: NDArray[np.bool_] = np.arange(count) < rows[..., None]
+    used: Flags = np.arange(count) < rows[..., None]
     return np.where(unknown[..., None], np.nan, values), used | unknown[..., None]
 
 
-def _without_nan(matrix: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+def _without_nan(matrix: ArrayLike) -> tuple[Floats, Flags]:
     """A matrix (..., m, n) set to 0 where it has a nan, on which LAPACK fails, and a mark (...) of where."""
     A = np.asarray(matrix, dtype=np.float64)
-    unknown: NDArray[np.bool_] = np.asarray(np.isnan(A).any(axis=(-2, -1)))
+    unknown: Flags = np.asarray(np.isnan(A).any(axis=(-2, -1)))
     return np.where(unknown[..., None, None], 0.0, A), unknown
 
 

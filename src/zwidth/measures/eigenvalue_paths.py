@@ -17,15 +17,13 @@ from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.verdict import BAND
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # A step along a path longer than this share of its |z|, or of 1, is halved; one shorter than the second length is
 # not, whatever its neighbours do: it is too small to see.
@@ -72,8 +70,8 @@ class EigenvaluePaths(Result):
     """
 
     values: Floats
-    requested: NDArray[np.bool_]
-    eigenvalues: Complex
+    requested: Flags
+    eigenvalues: Complexes
     crossings: tuple[Crossing, ...]
 
     @property
@@ -185,16 +183,16 @@ class _PathTracer:
         for end in requested[1:].tolist():
             self.trace_to(end, self.eigenvalues_at(end), HALVINGS)
         self.values = np.array([value for value, _ in self.steps])
-        self.z: Complex = np.array([z for _, z in self.steps])
+        self.z: Complexes = np.array([z for _, z in self.steps])
 
-    def eigenvalues_at(self, value: float) -> Complex:
+    def eigenvalues_at(self, value: float) -> Complexes:
         """Eigenvalues in any order."""
         matrix = np.asarray(self.matrix_at(value), dtype=np.float64)
         if not np.all(np.isfinite(matrix)):
             raise PathError(f"the transition matrix at {value:g} is not finite")
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
-    def trace_to(self, end: float, unordered: Complex, halvings: int) -> None:
+    def trace_to(self, end: float, unordered: Complexes, halvings: int) -> None:
         """Step from the last value to `end`."""
         start, z = self.steps[-1]
         if len(z) != len(unordered):
@@ -240,7 +238,7 @@ class _PathTracer:
         return Crossing(float(value), here(value), path, outwards)
 
 
-def _match(z: Complex, others: Complex) -> tuple[Complex, bool]:
+def _match(z: Complexes, others: Complexes) -> tuple[Complexes, bool]:
     """`others` in the order of z, and whether the match is certain."""
     from scipy.optimize import linear_sum_assignment
 

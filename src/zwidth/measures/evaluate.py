@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
 from zwidth.loop.estimator import NonlinearError
@@ -129,11 +130,9 @@ def measure_at(
         raise error.with_name(resolved.name) from None
 
 
-def with_status(
-    point: OperatingPoint, values: NDArray[np.float64], reason: str = "has no value here"
-) -> MeasureValues:
+def with_status(point: OperatingPoint, values: Floats, reason: str = "has no value here") -> MeasureValues:
     """Values with the points' status; NO_VALUE with a reason where they are nan though the point is OK."""
-    none: NDArray[np.bool_] = np.asarray((point.status == OK) & np.isnan(values))
+    none: Flags = np.asarray((point.status == OK) & np.isnan(values))
     status = np.where(none, NO_VALUE, point.status).astype(np.uint8)
     notes = (_note(none, NO_VALUE, reason),) if none.any() else ()
     return MeasureValues(np.where(status == OK, values, np.nan), status, notes)
@@ -148,7 +147,7 @@ def _same_status(point: OperatingPoint, status: int, reason: str) -> MeasureValu
     )
 
 
-def _note(points: NDArray[np.bool_], status: int, reason: str) -> Note:
+def _note(points: Flags, status: int, reason: str) -> Note:
     return Note(status, reason, int(points.sum()), tuple(int(i) for i in np.argwhere(points)[0]))
 
 
@@ -158,7 +157,7 @@ def evaluate_pointwise(compute: Callable[[OperatingPoint], Any], point: Operatin
 
 
 def complete_pointwise(
-    known: NDArray[np.float64], compute: Callable[[tuple[int, ...]], Any], point: OperatingPoint
+    known: Floats, compute: Callable[[tuple[int, ...]], Any], point: OperatingPoint
 ) -> MeasureValues:
     """Values at all points: those known, and where these are nan those that a function of an index returns."""
     status = point.status.copy()
@@ -173,7 +172,7 @@ def complete_pointwise(
 
 def complete_charts(
     point: OperatingPoint,
-    flat: NDArray[np.float64],
+    flat: Floats,
     states: NDArray[np.uint8],
     alone: Callable[[tuple[int, ...]], float],
     none_stable: str = "",

@@ -7,7 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.measures.handle_impedance import Complex, Floats, LimitKind
+from zwidth.arrays import Complexes, Floats
+from zwidth.measures.handle_impedance import LimitKind
 from zwidth.result import Result
 
 LIMIT_HEADINGS: Final[dict[LimitKind, str]] = {
@@ -54,9 +55,9 @@ class FeltWall(Result):
     static_stiffness_limit: float
     static_stiffness_limit_kind: LimitKind
     frequency: Floats
-    felt_impedance: Complex | None
-    commanded_impedance: Complex
-    free_motion_impedance: Complex
+    felt_impedance: Complexes | None
+    commanded_impedance: Complexes
+    free_motion_impedance: Complexes
 
     @property
     def reason(self) -> str | None:
@@ -119,5 +120,5 @@ class FeltWall(Result):
         )
 
 
-def _impedance_columns(name: str, impedance: Complex) -> dict[str, Floats]:
+def _impedance_columns(name: str, impedance: Complexes) -> dict[str, Floats]:
     return {f"{name}_real_Ns_per_m": impedance.real, f"{name}_imag_Ns_per_m": impedance.imag}

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.chart_base import BoundaryArc
 from zwidth.measures.felt import LIMIT_HEADINGS
@@ -22,8 +22,6 @@ from zwidth.measures.handle_impedance import (
 from zwidth.model.argument_checks import require
 from zwidth.model.plant import Plant
 from zwidth.result import Result
-
-Floats = NDArray[np.float64]
 
 # A straight side of the chart becomes a curve; it is cut into pieces of this share of the largest stiffness first.
 PIECE = 1e-3
@@ -126,7 +124,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
     return felt if chart.operating_point is None else felt.about(chart.operating_point)
 
 
-def _runs(inside: NDArray[np.bool_]) -> list[slice]:
+def _runs(inside: Flags) -> list[slice]:
     """Runs of at least two True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]

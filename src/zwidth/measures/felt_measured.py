@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.chart.chart_base import Chart
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response, window_response
@@ -23,9 +23,6 @@ from zwidth.loop.measured.measured_port import MeasuredPort
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.felt import FeltWall
 from zwidth.measures.handle_impedance import commanded_impedance
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 AT_REST: Final = 0.3  # of the lowest mode's frequency, up to which stiffness and mass at rest are read off
 LOWEST_MODE: Final = 0.3  # of half the sampling rate, where no mode is lower

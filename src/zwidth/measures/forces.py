@@ -15,11 +15,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.model.effective_parameters import screw, unit_directions
-
-Floats = NDArray[np.float64]
 
 OFF: Final = (
     1e-6  # largest part of a unit direction outside the handle's motions; above it the handle cannot move along it
@@ -169,7 +168,7 @@ def heat_along(jacobian: ArrayLike, direction: ArrayLike, force: ArrayLike, moto
     return np.asarray(np.sum((torques / np.asarray(motor_constants, dtype=np.float64)) ** 2, axis=-1))
 
 
-def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, Flags]:
     """Rates q = J^+ u of the drives when the handle moves along u with unit speed, and whether it can.
 
     jacobian   (..., 3, d)  J [m/rad], of rank d
@@ -182,7 +181,7 @@ def joint_rates(jacobian: ArrayLike, direction: ArrayLike) -> tuple[Floats, NDAr
     array([2.5, 0. ])
     """
     J, u = np.asarray(jacobian, dtype=np.float64), _directions(direction)
-    unknown: NDArray[np.bool_] = np.asarray(np.isnan(J).any(axis=(-2, -1)))
+    unknown: Flags = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     known = np.where(unknown[..., None, None], 0.0, J)
     q = (np.linalg.pinv(known) @ u[..., None])[..., 0]
     residual = np.linalg.norm(u - (known @ q[..., None])[..., 0], axis=-1)

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.measures.dexterity import isotropy
-from zwidth.model.mechanism import FIXED, FRAME, PRISMATIC, Floats, Mechanism
+from zwidth.model.mechanism import FIXED, FRAME, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture, link_points
-
-Bools = NDArray[np.bool_]
 
 SAME_POINT: Final = 1e-9  # m, within which two points are one
 SHORT: Final = 1e-30  # squared length [m^2] below which a rod is a point
@@ -35,7 +34,7 @@ class Rods:
     first, last  (..., k, 3)  ends [m]
     """
 
-    link: NDArray[np.int64]
+    link: Ints
     first: Floats
     last: Floats
 
@@ -75,7 +74,7 @@ def _to_segment(point: Floats, start: Floats, along: Floats) -> Floats:
     return np.asarray(np.linalg.norm(point - start - at * along, axis=-1))
 
 
-def bodies(mechanism: Mechanism) -> NDArray[np.int64]:
+def bodies(mechanism: Mechanism) -> Ints:
     """Index (n,) of the body that each link belongs to, its first link; -1 for those fixed to the base.
 
     Links on a fixed joint, or welded together by a closure, are one body with what carries them.
@@ -156,7 +155,7 @@ def neighbours(mechanism: Mechanism) -> set[tuple[int, int]]:
     return pairs
 
 
-def _joints_apart(mechanism: Mechanism, posture: Posture, i: int, j: int) -> Bools:
+def _joints_apart(mechanism: Mechanism, posture: Posture, i: int, j: int) -> Flags:
     """Whether two bodies are not both on the base with their joints at one place, at each posture."""
     parent = mechanism.links.parent
     if parent[i] >= 0 or parent[j] >= 0:
@@ -294,7 +293,7 @@ def reciprocal_condition(
 def _homogeneous(T: Floats, R: Floats) -> Floats:
     """[T/L; R] (..., 6, d) with the characteristic length of the Frobenius norm; nan where J is."""
     J = np.concatenate([T, R], axis=-2)
-    unknown: Bools = np.asarray(np.isnan(J).any(axis=(-2, -1)))
+    unknown: Flags = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     inverse = np.linalg.pinv(np.where(unknown[..., None, None], 0.0, J))
     back_T, back_R = inverse[..., :3], inverse[..., 3:]
     sizes = (np.linalg.norm(each, axis=(-2, -1)) for each in (T, R, back_T, back_R))

@@ -34,8 +34,9 @@ from dataclasses import replace
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.closed_plant import path_responses
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response
@@ -48,8 +49,6 @@ from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 LimitKind = Literal["bound", "limit", "infinite", "unknown"]
 
 # Relative size, squared, below which a component along a free motion is rounding of 0.
@@ -70,7 +69,7 @@ def refuse_local_loop(controller: Controller) -> None:
     refuse_feedback(two_rates, UNKNOWN, "leave local_loop out")
 
 
-def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
+def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complexes:
     """Force over velocity at the handle, Z = f/(jw x_h) (see the derivation above).
 
     wall_stiffness, wall_damping  of a stable wall [N/m], [N s/m]; an unstable one has no steady motion, and the
@@ -114,7 +113,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     return np.asarray(1.0 / (s * (_solve(closed, h) @ h)))
 
 
-def _controlled_impedance(loop: Loop, wall: Complex, s: Complex) -> Complex:
+def _controlled_impedance(loop: Loop, wall: Complexes, s: Complexes) -> Complexes:
     """`felt_impedance` with feedforward and a force sensor, at s = jw (...) for a wall C (...)."""
     plant, T, computer = loop.plant, loop.period, loop.controller
     dynamic, act, read, h = _dynamic_stiffness(plant, s)
@@ -140,7 +139,7 @@ def _controlled_impedance(loop: Loop, wall: Complex, s: Complex) -> Complex:
     return np.asarray(1.0 / (s * (x @ h)))
 
 
-def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complex:
+def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complexes:
     """Force over velocity at the handle without a wall, 1/(jw G_hh) [N s/m].
 
     The ideal is 0: of a device in free motion nothing is felt (transparency, after Tavakoli and Howe 2009, known
@@ -151,14 +150,14 @@ def free_motion_impedance(plant: Plant, frequency: ArrayLike) -> Complex:
     return np.asarray(1.0 / (s * (_solve(dynamic, h) @ h)))
 
 
-def free_impedance(loop: Loop, frequency: ArrayLike) -> Complex:
+def free_impedance(loop: Loop, frequency: ArrayLike) -> Complexes:
     """The same of a loop, with its computer's fixed feedback. Raises FeedbackError with a local loop."""
     if loop.has_fixed_feedback:
         return felt_impedance(loop, 0.0, 0.0, frequency)
     return free_motion_impedance(loop.plant, frequency)
 
 
-def commanded_impedance(wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complex:
+def commanded_impedance(wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complexes:
     """K/(jw) + B, what the hand would feel of an ideal wall [N s/m]."""
     return np.asarray(wall_stiffness / (2j * np.pi * np.asarray(frequency, dtype=float)) + wall_damping)
 
@@ -261,7 +260,7 @@ def handle_of(plant: Plant) -> Floats:
     return plant.handle
 
 
-def _dynamic_stiffness(plant: Plant, s: Complex | Floats) -> tuple[Any, Floats, Floats, Floats]:
+def _dynamic_stiffness(plant: Plant, s: Complexes | Floats) -> tuple[Any, Floats, Floats, Floats]:
     """D(s) (..., n, n) with actuator, sensor and handle in modal coordinates, where the rigid modes have no
     stiffness at all: at low frequency nothing else is left of them."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
@@ -274,13 +273,13 @@ def _dynamic_stiffness(plant: Plant, s: Complex | Floats) -> tuple[Any, Floats, 
     return dynamic, shapes.T @ plant.actuator, shapes.T @ plant.sensor, shapes.T @ handle_of(plant)
 
 
-def _solve(matrices: Complex, right: Floats) -> Complex:
+def _solve(matrices: Complexes, right: Floats) -> Complexes:
     """Solutions (..., n) for matrices (..., n, n) and one right-hand side (n,)."""
     column = np.broadcast_to(right.astype(complex)[:, None], (*matrices.shape[:-1], 1))
     return np.asarray(np.linalg.solve(matrices, column)[..., 0])
 
 
-def _hold_response(loop: Loop, s: Complex) -> Complex:
+def _hold_response(loop: Loop, s: Complexes) -> Complexes:
     """H, from commands to the part of the force at s itself."""
     controller, T = loop.controller, loop.period
     numerator, denominator = (
@@ -291,7 +290,7 @@ def _hold_response(loop: Loop, s: Complex) -> Complex:
     return np.asarray(filtered * stairs / (1.0 + s * controller.actuator_time_constant))
 
 
-def _sampled(loop: Loop, log_z: Complex) -> tuple[Complex, Complex]:
+def _sampled(loop: Loop, log_z: Complexes) -> tuple[Complexes, Complexes]:
     """P and w at z = exp(log_z)."""
     z, d = np.exp(log_z), np.expm1(log_z)
     return loop.plant_response(z, d), loop.velocity_response(z, d)

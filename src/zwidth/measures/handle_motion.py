@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.loop.circle_factors import (
     COMPUTER,
@@ -34,9 +34,6 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import modes_of_points, table_of_points
 from zwidth.model.rendered_modes import RenderedModes
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-
 AT_ONCE: Final = 2048  # devices whose responses are in memory at once
 
 
@@ -53,7 +50,7 @@ class HandleMotion:
 
     table: LoopTable
     modes: RenderedModes
-    known: NDArray[np.bool_]
+    known: Flags
     period: Floats
     controller: Controller
 
@@ -72,9 +69,7 @@ class HandleMotion:
         period = np.array(np.broadcast_to(np.ravel(flat.controller.sampling_period), known.shape), dtype=float)
         return cls(table, modes, known, period, flat.controller)
 
-    def compliances(
-        self, rows: NDArray[np.int64], frequency: Floats, K: Floats, B: Floats
-    ) -> tuple[Complexes, ...]:
+    def compliances(self, rows: Ints, frequency: Floats, K: Floats, B: Floats) -> tuple[Complexes, ...]:
         """Motion of the handle per force of the hand on it, without a wall and with one.
 
         rows       (n,)    which devices, of those known
@@ -90,7 +85,7 @@ class HandleMotion:
         C = K[:, None] + B[:, None] * w
         return G, G - H * C * through / (1.0 + P * C)
 
-    def _some(self, rows: NDArray[np.int64], frequency: Floats) -> tuple[Complexes, ...]:
+    def _some(self, rows: Ints, frequency: Floats) -> tuple[Complexes, ...]:
         """G_hh, G_ha G_sh, P, w and H of devices (n,) at frequencies (n, f)."""
         T = self.period[rows][:, None]
         s: Complexes = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
@@ -99,7 +94,7 @@ class HandleMotion:
         _sampled(self.table, rows, 2.0 * np.pi * frequency * T, factor_memory(self.table), P, w)
         return G_hh, G_ha * G_sh, P, w, self._hold(rows, s)
 
-    def _responses(self, rows: NDArray[np.int64], s: Complexes) -> tuple[Complexes, ...]:
+    def _responses(self, rows: Ints, s: Complexes) -> tuple[Complexes, ...]:
         """G_hh, G_ha and G_sh (n, f)."""
         modes = self.modes.rows(rows)
         h, a, y = modes.handle, modes.input, modes.output
@@ -118,7 +113,7 @@ class HandleMotion:
             response[some] = np.einsum("nk,nfk->nf", left[some], moved[..., column])
         return tuple(G)
 
-    def _hold(self, rows: NDArray[np.int64], s: Complexes) -> Complexes:
+    def _hold(self, rows: Ints, s: Complexes) -> Complexes:
         """H (n, f), from commands to the part of the force at s itself."""
         T = self.period[rows][:, None]
         delay, lag = self.delay[rows][:, None], self.lag[rows][:, None]
@@ -145,7 +140,7 @@ class HandleMotion:
     def _of_each(self, number: float | Floats) -> Floats:
         return np.array(np.broadcast_to(np.ravel(np.asarray(number, dtype=np.float64)), self.period.shape))
 
-    def _quadratic(self, c: Floats, rows: NDArray[np.int64], d: Complexes) -> Complexes:
+    def _quadratic(self, c: Floats, rows: Ints, d: Complexes) -> Complexes:
         """c2 d^2 + c1 d + c0 for coefficients (3,) or those of each device (N, 3)."""
         c = c.reshape(-1, 3)
         c2, c1, c0 = (c[rows] if len(c) > 1 else c).T[..., None]
@@ -154,7 +149,7 @@ class HandleMotion:
 
 @compiled
 def _sampled(
-    loops: LoopTable, rows: NDArray[np.int64], theta: Floats, circle: CircleFactors, P: Complexes, w: Complexes
+    loops: LoopTable, rows: Ints, theta: Floats, circle: CircleFactors, P: Complexes, w: Complexes
 ) -> None:
     """Sampled plants P, delay and force path included, and velocity estimates w at z = exp(i theta)."""
     circle.sizes[COMPUTER] = -1

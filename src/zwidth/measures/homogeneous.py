@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Flags, Floats
 
 HALVINGS: Final = 60  # number of halvings of the bracket, which shrinks to 1e-18 of itself
 FLAT: Final = 1e-10  # a smaller slope of log kappa against log L counts as 0; well above its rounding
@@ -81,7 +81,7 @@ def characteristic_length(
     J = np.asarray(jacobian, dtype=np.float64)
     power = _powers(J, rotations, prismatic)
     _check(J, power)
-    unknown: NDArray[np.bool_] = np.asarray(np.isnan(J).any(axis=(-2, -1)))
+    unknown: Flags = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     J = np.where(unknown[..., None, None], np.eye(*J.shape[-2:]), J)
     values = np.linalg.svd(J, compute_uv=False)
     start = _start(J, power)

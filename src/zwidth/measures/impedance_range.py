@@ -18,11 +18,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.conditions import thesis_flexible, thesis_whole_delay
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -105,9 +104,9 @@ def _broadcast(*values: ArrayLike) -> tuple[Floats, ...]:
     return tuple(np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in values)))
 
 
-def _positive(values: Floats) -> NDArray[np.bool_]:
+def _positive(values: Floats) -> Flags:
     return (values > 0.0) & np.isfinite(values)
 
 
-def _masked_range(applies: NDArray[np.bool_], *numbers: Floats) -> ImpedanceRange:
+def _masked_range(applies: Flags, *numbers: Floats) -> ImpedanceRange:
     return ImpedanceRange(*(np.where(applies, number, np.nan) for number in numbers))

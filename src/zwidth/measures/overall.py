@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.measures.definition import MISSING, OK, UNREACHED, Better
 from zwidth.measures.dexterity import singular_values
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 ROUNDING: Final = 1e-9  # amount by which a condition number may lie below 1
 
@@ -145,7 +143,7 @@ def global_isotropy_index(
 
 def _cells(
     values: ArrayLike, status: ArrayLike | None, weights: ArrayLike | None
-) -> tuple[Floats, Floats, Bools, Bools]:
+) -> tuple[Floats, Floats, Flags, Flags]:
     """Flat values and weights, which cells count, and which have a posture."""
     x = np.asarray(values, dtype=np.float64)
     s = np.full(x.shape, OK, dtype=np.uint8) if status is None else np.asarray(status)

@@ -30,15 +30,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.loop_table import LoopTable
 from zwidth.model.rendered_modes import RenderedModes
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 LEAST_SAMPLES, MOST_SAMPLES = 64, 4096  # after the contact
 PERIODS: Final = 2.0  # of the slowest flexible mode, that are simulated
@@ -47,7 +44,7 @@ TERMS: Final = 14  # of the exponential series, of a matrix of norm below a half
 
 
 def rate_hardness(
-    loops: LoopTable, modes: RenderedModes, rows: Whole, delay: Floats, lag: Floats, K: Floats, B: Floats
+    loops: LoopTable, modes: RenderedModes, rows: Ints, delay: Floats, lag: Floats, K: Floats, B: Floats
 ) -> Floats:
     """Rate-hardness of walls for some devices.
 
@@ -91,7 +88,7 @@ def _static(modes: RenderedModes, K: Floats) -> Floats:
 @compiled
 def _several(
     loops: LoopTable,
-    rows: Whole,
+    rows: Ints,
     w2: Floats,
     drag: Floats,
     h: Floats,

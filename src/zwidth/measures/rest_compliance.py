@@ -23,12 +23,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
 
 # Share of a vector, of its length or of a sum's terms, that rounding leaves of 0: with less, a rigid device would
 # give way by its last digits; with more, the stiff part of a device with soft and stiff springs would be taken as
@@ -113,7 +111,7 @@ def rest_compliance(plant: Plant, handle: Floats, gain: float = 0.0) -> RestComp
     return RestCompliance(True, _held(h, s, a, g, q, spring), (q + gain) * g, c)
 
 
-def _free_part(vector: Floats, free: NDArray[np.bool_]) -> Floats:
+def _free_part(vector: Floats, free: Flags) -> Floats:
     """A vector's components along the free motions; 0 where they are rounding of the whole."""
     part = np.where(free, vector, 0.0)
     return part if np.linalg.norm(part) > ROUNDING * np.linalg.norm(vector) else np.zeros_like(vector)

@@ -28,13 +28,12 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.chart.verdict import spectral_radius
 from zwidth.loop.loop import Loop
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
 
 # Masses tried per factor of ten, and how near to the best spectral radius one must be to be refined.
 TRIED: Final = 60

@@ -21,13 +21,15 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from zwidth.arrays import Floats
 
 LEAST: Final = 1e-7  # m
 FLAT_UP_TO, MOST_SENSITIVE = 40.0, 250.0  # Hz
 
 
-def detection_threshold(frequency: ArrayLike) -> NDArray[np.float64]:
+def detection_threshold(frequency: ArrayLike) -> Floats:
     """Amplitude of the least sinusoidal vibration that the hand feels (see above).
 
     frequency  (...)  [Hz], at least 0

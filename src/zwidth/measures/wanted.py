@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Final
 
+from zwidth.arrays import Floats
+
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    pass
 
 
 @dataclass(frozen=True)
@@ -119,15 +120,15 @@ class WantedWalls:
     Each number as in `WantedWall`, of shape (...), which broadcasts with the points; None where it is not given.
     """
 
-    stiffness: NDArray[np.float64] | None = None
-    damping: NDArray[np.float64] | None = None
-    frequency: NDArray[np.float64] | None = None
-    spectral_radius: NDArray[np.float64] | None = None
-    stiffness_margin: NDArray[np.float64] | None = None
-    damping_margin: NDArray[np.float64] | None = None
-    delay_margin: NDArray[np.float64] | None = None
-    lowest_frequency: NDArray[np.float64] | None = None
-    highest_frequency: NDArray[np.float64] | None = None
-    force: NDArray[np.float64] | None = None
-    link_radius: NDArray[np.float64] | None = None
+    stiffness: Floats | None = None
+    damping: Floats | None = None
+    frequency: Floats | None = None
+    spectral_radius: Floats | None = None
+    stiffness_margin: Floats | None = None
+    damping_margin: Floats | None = None
+    delay_margin: Floats | None = None
+    lowest_frequency: Floats | None = None
+    highest_frequency: Floats | None = None
+    force: Floats | None = None
+    link_radius: Floats | None = None
     colliding_links: tuple[str, ...] | None = None

@@ -15,8 +15,9 @@ from math import ceil
 from numbers import Integral
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats, Ints
 from zwidth.model.argument_checks import check_choice, describe_value
 from zwidth.model.beam_integrals import (
     Shapes,
@@ -36,7 +37,7 @@ from zwidth.model.beam_shapes import (
     hermite_bending,
     quadratic_bar,
 )
-from zwidth.model.flexible_body import FlexibleBody, Floats
+from zwidth.model.flexible_body import FlexibleBody
 
 # Stations are one, and a station is at the base or the tip, within this share of the length
 SAME_PLACE = 1e-9
@@ -178,7 +179,7 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
     )
 
 
-def _craig_bampton(M: Floats, K: Floats, family: NDArray[np.int64], interface: int, modes: int) -> Floats:
+def _craig_bampton(M: Floats, K: Floats, family: Ints, interface: int, modes: int) -> Floats:
     """T (e, interface + modes): the first coordinates held one after the other, then the modes with all held.
 
     family  (e,) of each coordinate: coordinates of different families are not coupled. Of equal frequencies, as of
@@ -196,7 +197,7 @@ def _craig_bampton(M: Floats, K: Floats, family: NDArray[np.int64], interface: i
     T[:interface, :interface] = np.eye(interface)
     if e > interface:
         T[inner, :interface] = -solve(K[inner, inner], K[inner, :interface], assume_a="pos")
-    found: list[tuple[float, int, NDArray[np.int64], Floats]] = []
+    found: list[tuple[float, int, Ints, Floats]] = []
     for one in range(int(np.max(family, initial=-1)) + 1 if modes else 0):
         own = interface + np.flatnonzero(family[inner] == one)
         if len(own):

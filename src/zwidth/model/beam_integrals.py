@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.beam_section import BeamProperties
-from zwidth.model.flexible_body import FlexibleBody, Floats, symmetric
+from zwidth.model.flexible_body import FlexibleBody, symmetric
 
 
 class Shapes(NamedTuple):

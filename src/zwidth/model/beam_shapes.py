@@ -10,12 +10,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.model.beam_integrals import Shapes
-from zwidth.model.flexible_body import Floats
-
-Ints = NDArray[np.int64]
 
 BOUNDARIES: Final = ("clamped", "clamped-pinned", "pinned")
 

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import closure_step, equations, passive_rates
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, link_vector, place_links, working_memory
 from zwidth.model.inertia import unit_motions
-from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats, Ints
+from zwidth.model.mechanism import AXIS, POINT, PRISMATIC
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 

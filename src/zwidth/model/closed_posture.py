@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import apply_step, closure_step, equations, passive_rates
 from zwidth.model.continuation import CONTRACTION, LARGEST_TURN, largest_magnitude
 from zwidth.model.forward_kinematics import WorkingMemory, move_joints, place_links, working_memory
-from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NOT_CLOSED: Final = -1.0

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled_inline, compiled_lean
 from zwidth.model.forward_kinematics import WorkingMemory, fill_handle_axes, link_point, link_vector, move_joints
-from zwidth.model.mechanism import AXIS, ORIENTATION, POINT, POSITION, PRISMATIC, Floats, Ints
+from zwidth.model.mechanism import AXIS, ORIENTATION, POINT, POSITION, PRISMATIC
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.rotations import vector_between, vector_between_axes
 

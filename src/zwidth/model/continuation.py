@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import (
     apply_step,
@@ -30,7 +31,7 @@ from zwidth.model.forward_kinematics import (
     place_links,
     working_memory,
 )
-from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, REVOLUTE, Floats, Ints
+from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, REVOLUTE
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.rotations import fill_rotation, vector_between
 

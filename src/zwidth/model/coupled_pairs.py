@@ -19,17 +19,15 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.modes import UNOBSERVED_UNDAMPED
 from zwidth.model.operator import Operator
 from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.rendered_modes import RenderedModes
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 ITERATIONS: Final = 3
 # Two poles nearer than this share of their size, or a pole whose left and right vectors are this near to
@@ -70,16 +68,14 @@ def coupled_pairs(modes: RenderedModes, operator: Operator | None, period: Array
     return pairs.with_free_motion(free) if free.any() else pairs
 
 
-def _matrices(
-    modes: RenderedModes, operator: Operator | None
-) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.bool_]]:
+def _matrices(modes: RenderedModes, operator: Operator | None) -> tuple[Floats, Floats, Floats, Floats, Flags]:
     """M, B, K (N, n, n), input and output (2, N, n) of each plant, and whether it has modes (N,)."""
     N, m = modes.decay.shape
     elastic = operator is not None and not operator.rigid_grasp
     n = m + elastic
     M, B, K = (np.zeros((N, n, n)) for _ in range(3))
     ends = np.zeros((2, N, n))
-    known: NDArray[np.bool_] = np.all(np.isfinite(modes.input + modes.output + modes.decay), axis=1)
+    known: Flags = np.all(np.isfinite(modes.input + modes.output + modes.decay), axis=1)
     at, here = np.arange(m), known[:, None]
     M[:, at, at] = 1.0
     K[:, at, at] = np.where(here, modes.frequency_squared, 1.0)

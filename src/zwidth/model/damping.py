@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.design_axes import Number
-from zwidth.model.mechanism import Floats
 from zwidth.model.modes import undamped_modes
 
 

@@ -15,7 +15,8 @@ from typing import Annotated, Any, TypeAlias, TypeVar, get_args, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Floats
+
 Change: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
 T = TypeVar("T")
 

@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.closed_posture import moved_posture
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.motions import Motions
 
 STEPS: Final = 60  # of the search for the counted posture

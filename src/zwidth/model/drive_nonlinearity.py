@@ -10,7 +10,8 @@ from math import inf
 
 import numpy as np
 
-from zwidth.model.mechanism import DriveNonlinearity, Drives, Floats
+from zwidth.arrays import Floats
+from zwidth.model.mechanism import DriveNonlinearity, Drives
 from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
 
 

@@ -24,12 +24,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations, passive_rates
 from zwidth.model.drive_motion import DriveMotion
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.inertia import unit_motions
-from zwidth.model.mechanism import FIXED, Drives, Floats, Ints, Mechanism
+from zwidth.model.mechanism import FIXED, Drives, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
 from zwidth.model.motions import Motions
 from zwidth.model.posture import Posture

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.model.drive_nonlinearity import kinks
-from zwidth.model.mechanism import Drives, Floats
+from zwidth.model.mechanism import Drives
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class DriveSprings:
         return cls(forward, backward, n**4 * dry.hardening, kinks(drives, dry))
 
     @property
-    def flexible(self) -> NDArray[np.int64]:
+    def flexible(self) -> Ints:
         """Which drives are flexible."""
         return np.flatnonzero(np.isfinite(self.forward))
 
@@ -49,7 +49,7 @@ class DriveSprings:
         near = np.where(flexible, self.forward, 0.0) * np.abs(deflection - self.kink) <= rounding
         return np.where(flexible & near, self.kink, deflection)
 
-    def at_kink(self, deflection: Floats) -> NDArray[np.bool_]:
+    def at_kink(self, deflection: Floats) -> Flags:
         """(d,)  which drives are bent to just where their stiffness changes."""
         return np.asarray(np.isfinite(self.forward) & (self.forward != self.backward) & (deflection == self.kink))
 

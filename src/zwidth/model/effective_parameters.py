@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
-from zwidth.model.mechanism import Floats, Ints, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, pack, per_design
 from zwidth.model.motions import Motions
 from zwidth.model.posture import OK, Posture
 from zwidth.model.ratio_table import at_postures
-
-Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,7 @@ def _stiffness_with_links(mechanism: Mechanism, posture: Posture, screws: Floats
 
 def _solve(A: Floats, h: Floats) -> Floats:
     """A^-1 h of each (N, c); nan where A holds nan."""
-    unknown: Marks = np.asarray(np.isnan(A).any(axis=(1, 2)))
+    unknown: Flags = np.asarray(np.isnan(A).any(axis=(1, 2)))
     known: Floats = np.where(unknown[:, None, None], np.eye(A.shape[1]), A)
     solved = np.linalg.solve(known, h[..., None])[..., 0]
     return np.asarray(np.where(unknown[:, None], np.nan, solved))

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from zwidth.model.mechanism import Drives, Floats
+from zwidth.arrays import Floats
+from zwidth.model.mechanism import Drives
 from zwidth.model.motion_projection import project_onto_motions
 from zwidth.model.plant import LaggedDamper, Plant
 

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Floats
 
 ROUNDING: Final = 1e-12  # of the largest reading, below which a difference is rounding
 LEAST, LEAST_BEND = 1e-9, 1e-4  # of the largest change, and of the largest change of changes, likewise

@@ -21,10 +21,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_posture
 from zwidth.model.drive_springs import DriveSprings
 from zwidth.model.load import ALONG, Load, LoadError, unit_of_push, vector_text
-from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Floats, Mechanism
+from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
 from zwidth.model.posture import Posture

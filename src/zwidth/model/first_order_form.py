@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.model.idle_motions import separated_modes
 from zwidth.model.modes import UNOBSERVED, UNOBSERVED_UNDAMPED, undamped_modes
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # A pole whose left and right vectors are this near to orthogonal shares its motion with a neighbour.
 SHARED = 1e-3
@@ -163,7 +160,7 @@ def _state_matrices(plant: Plant, braked: Floats, basis: Floats, period: float) 
 
 def _poles(
     A: Floats, source: Floats, reading: Floats, period: float, alone_gain: float
-) -> tuple[Complexes, NDArray[np.bool_]]:
+) -> tuple[Complexes, Flags]:
     """All poles, and which of them the force does not move or the sensor does not read.
 
     alone_gain  what a unit force held for T would leave in the reading if no motion held another back [m/N]
@@ -209,7 +206,7 @@ def fast_and_unseen(A: Floats, inputs: Floats, readings: Floats, period: float) 
     return poles[~unseen], poles[unseen]
 
 
-def _partners(poles: Complexes) -> NDArray[np.int64]:
+def _partners(poles: Complexes) -> Ints:
     """The index of each pole's conjugate."""
     return np.asarray(np.argmin(np.abs(poles[:, None] - poles.conj()), axis=1))
 

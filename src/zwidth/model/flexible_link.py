@@ -11,8 +11,9 @@ from typing import Literal
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.beam_section import BeamProperties
-from zwidth.model.flexible_body import FlexibleBody, Floats, clamped_frequencies
+from zwidth.model.flexible_body import FlexibleBody, clamped_frequencies
 
 Method = Literal["assumed-modes", "finite-elements", "lumped"]
 

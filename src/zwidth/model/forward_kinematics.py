@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.model.mechanism import BALL_Z, POSE, PRISMATIC, REVOLUTE, Floats
+from zwidth.model.mechanism import BALL_Z, POSE, PRISMATIC, REVOLUTE
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.rotations import fill_rotation, turned_further
 

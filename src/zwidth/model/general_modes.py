@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_parameters import lever_arms, screw
-from zwidth.model.mechanism import Floats, Ints, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.plant import Plant
 from zwidth.model.plant_modes import plant_modes
@@ -23,8 +23,6 @@ from zwidth.model.posture import OK, Posture
 from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders
 from zwidth.model.rendered_modes import RenderedModes
-
-Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -37,12 +35,12 @@ class Postures:
     rotor, spring, damper (N, d)  at the joints;   spun (N, d)  J_m n
     """
 
-    known: Marks
+    known: Flags
     design: Ints
     h: Floats
     mass: Floats
     side: DriveSide
-    flexible: Marks
+    flexible: Flags
     rotor: Floats
     spring: Floats
     damper: Floats

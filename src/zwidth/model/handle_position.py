@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.compiled import compiled
 from zwidth.model.continuation import OK, SINGULAR_CONDITION
 from zwidth.model.forward_kinematics import (
@@ -29,7 +29,7 @@ from zwidth.model.forward_kinematics import (
     place_links,
     working_memory,
 )
-from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, REVOLUTE, Floats
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, REVOLUTE
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.mobility import constraints
 from zwidth.model.posture_batch import solve_batch
@@ -72,7 +72,7 @@ def answered_goal(mech: MechanismArrays, design: int, references: Floats, goal: 
     return min(found, key=lambda near: goal_distance(mech, design, near, goal), default=None)
 
 
-def _are_reached(mech: MechanismArrays, design: int, references: Floats, goals: Floats) -> NDArray[np.bool_]:
+def _are_reached(mech: MechanismArrays, design: int, references: Floats, goals: Floats) -> Flags:
     """Whether the assembly of one design has each of the goals (N, g)."""
     of_each = np.full(len(goals), design, dtype=np.int64)
     return np.asarray(solve_batch(mech, of_each, references, goals).status == OK)

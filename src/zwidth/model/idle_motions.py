@@ -7,12 +7,10 @@ leaves a little of the others in them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.model.modes import clusters, repeat_tolerance
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
 
 # Modal damping below this share of the largest is rounding of 0.
 UNDAMPED = 1e-13
@@ -35,9 +33,7 @@ def modal_damping(plant: Plant, shapes: Floats) -> Floats:
     return np.where(_coupling(damping), damping, np.diag(np.diag(damping)))
 
 
-def separated_modes(
-    plant: Plant, squared: Floats, shapes: Floats, ends: Floats
-) -> tuple[Floats, NDArray[np.bool_]]:
+def separated_modes(plant: Plant, squared: Floats, shapes: Floats, ends: Floats) -> tuple[Floats, Flags]:
     """Modes of which as few as can be are moved by forces along some ends, or show in a reading there, and which.
 
     Rounding chooses the shapes of equal modes. What is moved of them, by an end or by dampers of what is moved, is
@@ -104,7 +100,7 @@ def _widened(basis: Floats, columns: Floats, level: float) -> Floats:
     return np.hstack([basis, ways[:, sizes > level]])
 
 
-def _coupling(matrix: Floats) -> NDArray[np.bool_]:
+def _coupling(matrix: Floats) -> Flags:
     """Which two modes a symmetric matrix (n, n) in modal coordinates couples by more than a share of what it does
     to both of them."""
     own = np.sqrt(np.abs(np.diag(matrix)))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
 from zwidth.model.forward_kinematics import WorkingMemory, link_point
-from zwidth.model.mechanism import PRISMATIC, Floats
+from zwidth.model.mechanism import PRISMATIC
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NO_TURN: Final = 1e-12  # share of the fastest link's angular velocity that is rounding

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from zwidth.arrays import Complexes, Floats
 
 if TYPE_CHECKING:
     from zwidth.model.response import Response
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 CONFIDENCE: Final = 0.95
 POOLED: Final = 7  # neighbouring frequencies whose scatter is taken together

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations, passive_rates
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.inertia import mass_matrix, unit_motions
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.ratio_table import with_any_ratio
 

@@ -6,11 +6,12 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.beam_bodies import assumed_modes, finite_elements, lumped_tip
 from zwidth.model.beam_section import BeamProperties
 from zwidth.model.flexible_body import FlexibleBody
 from zwidth.model.flexible_link import BeamError, FlexibleLink, Method
-from zwidth.model.mechanism import FIXED, Floats, Mechanism
+from zwidth.model.mechanism import FIXED, Mechanism
 
 NOTHING: Final = 1e-9  # share of a mass or an inertia that is rounding
 POSSIBLE: Final = 1e-6  # share by which the beam may be heavier than its link, as rounded numbers make it

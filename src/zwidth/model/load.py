@@ -10,8 +10,8 @@ from typing import Final, Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.model.argument_checks import check_choice
-from zwidth.model.mechanism import Floats
 
 HandForce = Literal["dead", "follower", "neglected"]
 PostureOf = Literal["handle", "motors"]

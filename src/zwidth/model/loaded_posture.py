@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.closed_posture import moved_posture
 from zwidth.model.closure import equations, passive_rates
@@ -23,7 +24,7 @@ from zwidth.model.equilibrium import Balance, Equilibrium, EquilibriumError
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.load import Load, LoadError, unit_of_push
-from zwidth.model.mechanism import BALL_X, POSITION, Floats, Mechanism
+from zwidth.model.mechanism import BALL_X, POSITION, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture
 from zwidth.model.ratio_table import drives_at
@@ -226,7 +227,7 @@ def _newton(
     mechanism: Mechanism,
     at: Posture,
     off: Callable[[Posture], Floats],
-    moved: NDArray[np.int64],
+    moved: Ints,
     settled: float,
     *,
     downhill: bool = False,

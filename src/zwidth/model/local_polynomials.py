@@ -18,12 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Whole = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from zwidth.arrays import Complexes, Floats, Ints
 
 ORDER = 2  # of the polynomials
 TERMS = 2 * (ORDER + 1)  # coefficients of both
@@ -60,14 +56,14 @@ class Fits:
     excited: Floats
     freedom: Floats
 
-    def at(self, tile: Whole, r: Floats) -> tuple[Complexes, Floats]:
+    def at(self, tile: Ints, r: Floats) -> tuple[Complexes, Floats]:
         """G (n,) and its variance (n,) for noise of variance 1, at places r (n,) of tiles (n,)."""
         powers = r[:, None] ** np.arange(ORDER + 1)
         value = np.sum(self.coefficients[tile] * powers, axis=1)
         spread = np.einsum("ni,nij,nj->n", powers, self.factor[tile], powers).real
         return value, np.maximum(spread, 0.0)
 
-    def curvature(self, tile: Whole, r: Floats) -> Floats:
+    def curvature(self, tile: Ints, r: Floats) -> Floats:
         """Squared difference (n,) that one more term makes at places r (n,) of tiles (n,)."""
         value, _ = self.at(tile, r)
         longer = np.sum(self.cubic[tile] * r[:, None] ** np.arange(self.cubic.shape[1]), axis=1)
@@ -85,7 +81,7 @@ def fit_tiles(U: Complexes, Y: Complexes, width: int) -> Fits:
 
 
 def _fit_windows(
-    U: Complexes, Y: Complexes, middles: Whole, width: int
+    U: Complexes, Y: Complexes, middles: Ints, width: int
 ) -> tuple[Complexes, Complexes, Complexes, Floats, Floats]:
     """Coefficients, their covariance, those with one more term, variance of the noise and mean |U|^2."""
     starts = np.clip(middles - width, 1, len(U) - 1 - 2 * width)

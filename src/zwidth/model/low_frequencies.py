@@ -14,10 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from zwidth.arrays import Complexes, Floats
 
 TERMS = 4
 FEWEST = 5  # frequencies that are fitted

@@ -17,15 +17,12 @@ from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.model.design_axes import Array1, Array2, Array3, design_shape
 from zwidth.model.flexible_link import FlexibleLink
 from zwidth.model.nonlinear import FrictionModel
 from zwidth.model.ratio_table import RatioTable
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 Compensation = Literal["none", "computed", "counterweight"]
 

@@ -11,17 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from zwidth.model.mechanism import (
-    BALL_Z,
-    FIXED,
-    POINT,
-    POSE,
-    PRISMATIC,
-    Floats,
-    Ints,
-    Links,
-    Mechanism,
-)
+from zwidth.arrays import Floats, Ints
+from zwidth.model.mechanism import BALL_Z, FIXED, POINT, POSE, PRISMATIC, Links, Mechanism
 
 
 class MechanismArrays(NamedTuple):

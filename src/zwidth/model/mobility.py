@@ -5,20 +5,18 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations
 from zwidth.model.continuation import ASSEMBLY_TOLERANCE, assemble_batch, set_goal
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.mechanism import POSE, PRISMATIC, Floats, Ints, Mechanism
+from zwidth.model.mechanism import POSE, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NEGLIGIBLE: Final = 1e-6  # singular values below this part of the mechanism's size count as zero
 NEARBY: Final = 0.05  # how far the joints turn to configurations that are not special [rad]
 ELSEWHERE: Final = 16  # configurations tried all over the joints' turns
-
-Marks = NDArray[np.bool_]
 
 
 class Misfit(NamedTuple):
@@ -51,7 +49,7 @@ def check_mobility(mechanism: Mechanism, mech: MechanismArrays, design: int, ref
     return misfit.reason
 
 
-def drives_fit(mechanism: Mechanism, mech: MechanismArrays, designs: Ints, references: Floats) -> Marks:
+def drives_fit(mechanism: Mechanism, mech: MechanismArrays, designs: Ints, references: Floats) -> Flags:
     """Of which of N designs, each at a reference (N, n), the drives control the handle, (N,): `check_mobility`."""
     kinds, kind_of = np.unique(_ranks_near(mech, designs, references), axis=0, return_inverse=True)
     fit = np.array([_misfit(mechanism, mech, ranks) is None for ranks in kinds], dtype=np.bool_)
@@ -73,7 +71,7 @@ def _unit_of_links(mech: MechanismArrays, designs: int | Ints) -> Floats:
     return np.asarray(np.where(mech.kind == PRISMATIC, mech.size[designs, None], 1.0))
 
 
-def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) -> tuple[Floats, Marks]:
+def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) -> tuple[Floats, Flags]:
     """Configurations of N designs from rough angles (N, n), the handle going where it must; and whether their
     loops are closed."""
     angles = np.zeros_like(rough)

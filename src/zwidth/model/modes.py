@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.argument_checks import require
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
 
 # Squared frequencies below this share of the largest are rounding of a rigid mode's exact zero.
 RIGID = 1e-13

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Floats
 
 ROUNDING = 1e-12  # share of a motion that is none
 

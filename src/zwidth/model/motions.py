@@ -35,11 +35,12 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.model.flexible_body import symmetric
 from zwidth.model.flexible_link import FlexibleLink
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.mechanism import AXIS, POINT, PRISMATIC, Floats
+from zwidth.model.mechanism import AXIS, POINT, PRISMATIC
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # rows of a cross product

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
 from zwidth.model.drive_side import is_plain
 from zwidth.model.effective_parameters import screw
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture
 from zwidth.model.ratio_table import at_postures

@@ -11,11 +11,10 @@ from math import inf, isfinite, nan
 from typing import Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.motion_projection import project_onto_motions
 
-Floats = NDArray[np.float64]
 FrictionModel = Literal["coulomb", "dahl", "lugre"]
 
 

@@ -7,9 +7,10 @@ from typing import Final, Literal
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.model.argument_checks import check_choice, check_number, require
 from zwidth.model.design_axes import Number, stack_numbers
-from zwidth.model.plant import Floats, Plant
+from zwidth.model.plant import Plant
 
 
 class OperatorError(ValueError):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.argument_checks import check_number
 from zwidth.model.design_axes import Array1, Array2, Number, stack_numbers
 from zwidth.model.nonlinear import Nonlinear
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.compiled import compiled
 from zwidth.model.design_axes import design_shape
-from zwidth.model.mechanism import Floats
 from zwidth.model.modes import REPEATED, RIGID
 from zwidth.model.plant import Plant
 from zwidth.model.rendered_modes import RenderedModes, jacobi
@@ -64,7 +63,7 @@ def fill_modes(
     leave: Floats,
     held: Floats,
     drag: Floats,
-    coupled: NDArray[np.bool_],
+    coupled: Flags,
     first: int,
     last: int,
 ) -> None:

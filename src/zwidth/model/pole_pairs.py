@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class PolePairs:
             self.reach,
         )
 
-    def with_rows(self, rows: NDArray[np.int64], others: PolePairs) -> PolePairs:
+    def with_rows(self, rows: Ints, others: PolePairs) -> PolePairs:
         """The same with these plants' parts taken from others, one for each of the rows."""
         most = max(self.decay.shape[1], others.decay.shape[1])
         merged = {}

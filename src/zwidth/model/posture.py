@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.argument_checks import require
 from zwidth.model.bias import bias_batch
@@ -23,15 +24,7 @@ from zwidth.model.continuation import (
 )
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.handle_position import answered_goal, goal_distance, goal_of_angles, positions_about_reference
-from zwidth.model.mechanism import (
-    ORIENTATION,
-    POSE,
-    POSITION,
-    PRISMATIC,
-    Floats,
-    Ints,
-    Mechanism,
-)
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
 from zwidth.model.mobility import check_mobility, drives_fit
 from zwidth.model.posture_batch import PostureBatch, failed_batch, solve_batch, solve_from_starts

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.continuation import (
     BEYOND_LIMIT,
@@ -22,7 +23,7 @@ from zwidth.model.continuation import (
 )
 from zwidth.model.forward_kinematics import link_point, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
-from zwidth.model.mechanism import REVOLUTE, Floats, Ints
+from zwidth.model.mechanism import REVOLUTE
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.reach_shells import outside_shells
 from zwidth.model.roadmap import roadmap
@@ -46,7 +47,7 @@ class PostureBatch:
     position: Floats
     residual: Floats
 
-    def overwrite(self, where: NDArray[np.bool_] | Ints, other: PostureBatch) -> None:
+    def overwrite(self, where: Flags | Ints, other: PostureBatch) -> None:
         """Write another batch's results over some of this one's."""
         for mine, new in zip(vars(self).values(), vars(other).values(), strict=True):
             mine[where] = new

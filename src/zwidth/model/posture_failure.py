@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.model.continuation import (
     BEYOND_LIMIT,
@@ -16,7 +17,7 @@ from zwidth.model.continuation import (
 )
 from zwidth.model.forward_kinematics import working_memory
 from zwidth.model.handle_position import goal_difference
-from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Floats, Mechanism
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.ratio_table import RatioTable
 from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix

@@ -17,16 +17,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.model.design_axes import Array1
 
 if TYPE_CHECKING:
     from zwidth.model.mechanism import Drives, Mechanism
     from zwidth.model.posture import Posture
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ROUNDING: Final = 1e-9  # share of a table's length beyond its ends that counts as its end
 TURN: Final = 2.0 * np.pi
@@ -82,7 +80,7 @@ class RatioTable:
         own = (((c[0] * x / 4.0 + c[1] / 3.0) * x + c[2] / 2.0) * x + c[3]) * x
         return np.asarray(np.where(inside, before + own, np.nan))
 
-    def _within(self, coordinate: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def _within(self, coordinate: Floats) -> tuple[Floats, Flags]:
         """Coordinates (...) moved into the table by whole turns, and whether they are in it."""
         q, low, high = np.asarray(coordinate, dtype=np.float64), self.coordinate[0], self.coordinate[-1]
         slack = ROUNDING * (high - low)

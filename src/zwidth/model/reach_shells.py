@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from zwidth.model.mechanism import ORIENTATION, PRISMATIC, Floats, Ints
+from zwidth.arrays import Flags, Floats, Ints
+from zwidth.model.mechanism import ORIENTATION, PRISMATIC
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 BASE: Final = -1
@@ -39,7 +39,7 @@ class Shell(NamedTuple):
         return np.asarray(np.maximum(distance - self.most, self.least - distance))
 
 
-def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> NDArray[np.bool_]:
+def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> Flags:
     """Which goals (N, g) lie outside of a chain's shell, (N,), by more than rounding; nan does not."""
     out = np.zeros(len(goals), dtype=np.bool_)
     for shell in shells(mech, design):
@@ -47,7 +47,7 @@ def outside_shells(mech: MechanismArrays, design: int, goals: Floats) -> NDArray
     return out
 
 
-def far_outside_shells(mech: MechanismArrays, designs: Ints, goals: Floats, tolerance: float) -> NDArray[np.bool_]:
+def far_outside_shells(mech: MechanismArrays, designs: Ints, goals: Floats, tolerance: float) -> Flags:
     """Which of N designs have their goal (N, g) outside of a chain's shell by more than they project it, (N,).
 
     tolerance  how far a position is projected, as a share of the arm's length

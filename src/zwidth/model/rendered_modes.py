@@ -16,8 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.effective_parameters import (
@@ -27,15 +27,13 @@ from zwidth.model.effective_parameters import (
     lever_arms,
     screw,
 )
-from zwidth.model.mechanism import Ints, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.posture import Posture
 from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders, Model
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class RenderedModes:
     output: Floats
     handle: Floats
     drag: Floats | None = None
-    coupled: NDArray[np.bool_] | None = None
+    coupled: Flags | None = None
 
     @property
     def pairs(self) -> PolePairs:

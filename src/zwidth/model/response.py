@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.model.joint_confidence import joint_radius
 from zwidth.model.low_frequencies import LowFrequencies, fit_low_frequencies
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
 SAME_FREQUENCY: Final = 1e-9  # relative difference of two frequencies that are one

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import (
     apply_step,
@@ -39,7 +40,7 @@ from zwidth.model.forward_kinematics import (
     place_links,
     working_memory,
 )
-from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, REVOLUTE, Floats, Ints
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, REVOLUTE
 from zwidth.model.mechanism_arrays import MechanismArrays, one_design
 from zwidth.model.rotations import rotation_vector
 

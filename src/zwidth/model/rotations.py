@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
-from zwidth.model.mechanism import Floats
 
 ROUNDING: Final = 1e-15  # of angles that a conversion leaves
 

@@ -16,12 +16,10 @@ from math import comb
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.model.local_polynomials import CHUNK, ORDER, Fits
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 TERMS: Final = ORDER + 2  # coefficients of a cubic
 PIECES: Final = 4  # in a window

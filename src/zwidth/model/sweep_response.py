@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.model.encoder_step import encoder_step
 from zwidth.model.local_polynomials import (
     MOST_TILES,
@@ -20,10 +20,6 @@ from zwidth.model.local_polynomials import (
 )
 from zwidth.model.response import Response, ResponseError
 from zwidth.model.summed_polynomials import NARROWEST_WINDOW, PieceSums
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 SHORTEST_SEGMENT = 64  # samples
 EXCITED = 1e-7  # power of the force, over its largest, below which a frequency was not excited

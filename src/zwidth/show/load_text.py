@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.model.mechanism import PRISMATIC
 from zwidth.show.units import SPACE, amount, as_written, percent, quantity, seconds, signed, vector
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 ROUNDING: Final = 1e-9  # share of a stiffness, or of the hand's force across the direction, that is
 UNCHANGED: Final = 5e-7  # share of a stiffness that its four digits do not show
-Floats = NDArray[np.float64]
 Row = tuple[str, str]
 
 
@@ -99,7 +98,7 @@ def _stiffness(path: LoadPath) -> str:
     return f"The largest stiffness goes from {ends}: {changes} of the {quantity(free, 'N/m')} without a push."
 
 
-def _that_has_one(have: NDArray[np.bool_]) -> str:
+def _that_has_one(have: Flags) -> str:
     return "" if have.all() else " that has one"
 
 
@@ -165,7 +164,7 @@ def _unanswered(path: LoadPath) -> Iterator[str]:
         yield f"Without an answer, {pushes_text(path.pushes, here)}: {weakest.status.rstrip('.')}."
 
 
-def pushes_text(pushes: Floats, chosen: NDArray[np.bool_]) -> str:
+def pushes_text(pushes: Floats, chosen: Flags) -> str:
     """Some of the pushes in words: each stretch of neighbours from its first to its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]])))
     stretches = [(float(pushes[a]), float(pushes[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.mechanism import FIXED, Mechanism
 from zwidth.model.posture import LinkPoints, Posture, link_points
 
-Floats = NDArray[np.float64]
 Place = tuple[int, Floats]  # a link, -1 for the base, and a point (3,) of its frame [m]
 
 SAME_POINT: Final = 1e-6  # share of the mechanism's size below which points are one

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
 from zwidth.model.posture import Posture, link_points
 from zwidth.show.mechanism_scene import Place, joint_places, stroke_places
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

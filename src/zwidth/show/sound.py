@@ -18,13 +18,12 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.motion_verdict import QUIET, dominant_frequency
 from zwidth.contact.time_response import TimeResponse
 from zwidth.show.output import replacing
 
-Floats = NDArray[np.float64]
 Pitch = float | Literal["auto"] | None
 
 RATE: Final = 48_000  # samples a second

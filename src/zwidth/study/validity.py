@@ -19,8 +19,8 @@ from math import nan, pi
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.tracer import Tracer
@@ -34,7 +34,6 @@ from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model, ModelError
 from zwidth.result import Result
 
-Floats = NDArray[np.float64]
 Interval = tuple[float, float]
 
 TOLERANCE: Final = 0.1  # of e, by default
@@ -99,7 +98,7 @@ class Validity(Result):
     first_natural: float
     frequency: Floats
     walls: Floats
-    arc: NDArray[np.int64]
+    arc: Ints
     fits: tuple[Fit, ...]
 
     def document(self) -> dict[str, Any]:
@@ -298,12 +297,12 @@ def _last_fitting(fits: Callable[[float], bool], fitting: float, outside: float)
     return fitting
 
 
-def _spread(count: int, at_most: int) -> NDArray[np.int64]:
+def _spread(count: int, at_most: int) -> Ints:
     """Evenly spread indices among `count`, the first and the last with them."""
     return np.unique(np.linspace(0, count - 1, min(count, at_most)).round().astype(np.int64))
 
 
-def _runs(good: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _runs(good: Flags) -> Iterator[tuple[int, int]]:
     """First and last of each stretch of True."""
     turns = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
     for start, end in zip(turns[::2], turns[1::2], strict=True):

@@ -6,16 +6,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.measured.root_count import curve_segments, roots_outside
 from zwidth.chart.rings import Window
 from zwidth.model.response import ResponseError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Whole = NDArray[np.int64]
 
 NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
 FAR = 1e9  # how far lines are drawn, in `large_wall_scale`
@@ -42,12 +38,12 @@ class Boundary:
     walls: Floats
     orientation: Floats
     segments: Floats
-    jumps: Whole
-    angle_index: Whole
+    jumps: Ints
+    angle_index: Ints
     reference: Floats
     reference_count: int
 
-    def outside(self, walls: Floats) -> Whole:
+    def outside(self, walls: Floats) -> Ints:
         """Numbers (n,) of roots outside the circle of walls (n, 2)."""
         return roots_outside(
             self.segments, self.jumps, self.reference, self.reference_count, np.ascontiguousarray(walls)
@@ -205,7 +201,7 @@ def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
     return at_end.real if np.isfinite(at_end) else np.inf, float(loop.w(end)[0].real)
 
 
-def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Whole, Whole]:
+def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[Floats, Ints, Ints]:
     """The line of real roots, cut where the curve ends on it: there the count's jump changes its sign.
 
     On it D = K + B w - h = 0. The root moves by -dK / D', and D' (z = +-1) has the sign of -+(B Im w - Im h)
@@ -228,7 +224,7 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
     return segments, jumps, np.full(len(jumps), kind)
 
 
-def _open_end(segments: Floats, jumps: Whole, far: float) -> tuple[Floats, Whole, Whole]:
+def _open_end(segments: Floats, jumps: Ints, far: float) -> tuple[Floats, Ints, Ints]:
     """The curve continued straight to infinity where the data end: higher frequencies are not seen."""
     Ka, Ba, Kb, Bb = segments[-1]
     reach = far / max(abs(Kb - Ka), abs(Bb - Ba))
@@ -236,7 +232,7 @@ def _open_end(segments: Floats, jumps: Whole, far: float) -> tuple[Floats, Whole
     return np.array(onward), jumps[-1:], np.array([-3])
 
 
-def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Whole, Floats]:
+def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Ints, Floats]:
     """Roots outside the circle at walls (n, 2) by the turning of 1 + L, L = P (K + B w), and how clear each is.
 
     From z = 1 + 0 round the integrators (a turn of L by -pi/2 each) and along the upper half circle, 1 + L turns
@@ -281,7 +277,7 @@ def _open_loops(loop: MeasuredLoop, angles: Floats, walls: Floats) -> Iterator[t
         yield some, -(walls[some, :1] + walls[some, 1:] * w) / h
 
 
-def _clear_walls(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Floats, Floats, Whole, Floats]:
+def _clear_walls(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[Floats, Floats, Ints, Floats]:
     """The clearest of walls (n, 2), and the smallest clear ones, counted at every angle.
 
     All are counted at some angles first. Between those a sharp resonance may turn 1 + L, so that a wall is at most

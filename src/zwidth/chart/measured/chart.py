@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.chart_base import BoundaryArc, Chart, DrawnChart
@@ -48,8 +49,6 @@ from zwidth.loop.controller import Controller
 from zwidth.model.argument_checks import require
 from zwidth.model.joint_confidence import CONFIDENCE, joint_radius
 from zwidth.model.response import Response, ResponseError
-
-Floats = NDArray[np.float64]
 
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it

@@ -19,15 +19,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.chart.measured.boundary import real_root
 from zwidth.chart.measured.loop import MeasuredLoop
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 HARDLY_KNOWN = 0.5  # error over the response
 CHUNK = 4_000_000  # walls times frequencies that are judged at once
@@ -84,7 +79,7 @@ class Doubt:
         share = np.clip(-(a.real * along.real + a.imag * along.imag) / length, 0.0, 1.0)
         return F, reach, share, np.abs(a + share * along)
 
-    def stretches(self, walls: Floats) -> tuple[Whole, Whole]:
+    def stretches(self, walls: Floats) -> tuple[Ints, Ints]:
         """Numbers (n,) of separate stretches of frequency that leave walls (n, 2) in doubt, and of those among
         them that can hide that a wall is stable."""
         step = max(1, CHUNK // len(self.angles))
@@ -95,7 +90,7 @@ class Doubt:
             np.concatenate([*(part[1] for part in parts), none]),
         )
 
-    def _stretches(self, walls: Floats) -> tuple[Whole, Whole]:
+    def _stretches(self, walls: Floats) -> tuple[Ints, Ints]:
         F, reach, _, away = self._way(walls)
         flags = np.zeros((len(walls), 2 * len(self.angles) + 1), dtype=bool)
         flags[:, 1::2] = np.abs(F) <= reach
@@ -107,7 +102,7 @@ class Doubt:
         numbers = np.bincount(wall, minlength=len(walls)), np.bincount(wall[hides], minlength=len(walls))
         return numbers[0].astype(np.int64), numbers[1].astype(np.int64)
 
-    def _may_hide(self, F: Complexes, wall: Whole, first: Whole, last: Whole) -> Flags:
+    def _may_hide(self, F: Complexes, wall: Ints, first: Ints, last: Ints) -> Flags:
         """Which stretches (s,), from angle `first` to `last` of a wall, can hide that it is stable.
 
         All of F turns by -pi for each root outside. Where F passes 0 clockwise, it may in truth pass on the other

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.chart.measured.response_interpolation import (
     FEWEST,
     ResponseInterpolation,
@@ -28,11 +28,6 @@ from zwidth.model.joint_confidence import CONFIDENCE, joint_radius
 from zwidth.model.low_frequencies import LowFrequencies
 from zwidth.model.response import Response, ResponseError, integrators_of, low_frequencies, usable_frequencies
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Whole = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
 BETWEEN = 2.0  # times the error that interpolation is expected to leave: what is allowed for between frequencies
 SETTLED = np.radians(3.0)  # phase at the lowest frequency, below which nothing is fitted to what lies below
 UNSURE_ACROSS = 0.1  # relative error from which the response is taken straight across what is not used
@@ -46,7 +41,7 @@ class MeasuredLoop:
 
     response: Response
     controller: Controller
-    usable: NDArray[np.bool_] = field(init=False)
+    usable: Flags = field(init=False)
 
     def __post_init__(self) -> None:
         if self.controller.fixed_feedback:
@@ -202,7 +197,7 @@ class MeasuredLoop:
         return joint_radius(self.response)
 
     @cached_property
-    def _doubted(self) -> Whole:
+    def _doubted(self) -> Ints:
         """Indices of frequencies that are not used, although something was measured there."""
         known = self._radius is not None and np.isfinite(self._radius) & np.isfinite(self.response.value)
         return np.flatnonzero(known & ~self.usable)

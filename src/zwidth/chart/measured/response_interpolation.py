@@ -12,12 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.model.response import ResponseError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 MIRRORED = 3  # points repeated beyond an end
 FEWEST = 6  # frequencies; fewer make no curve
@@ -37,14 +34,14 @@ class ResponseInterpolation:
     nodes: Floats
     values: Complexes
     slopes: Complexes
-    kind: NDArray[np.int64]
-    straight: NDArray[np.bool_]
+    kind: Ints
+    straight: Flags
     error: Floats
     integrators: int
     delay: int
     closed: bool
 
-    def _at(self, theta: Floats) -> NDArray[np.int64]:
+    def _at(self, theta: Floats) -> Ints:
         """Number (...) of the interval that holds each angle."""
         return np.clip(np.searchsorted(self.nodes, theta, side="right") - 1, 0, len(self.nodes) - 2)
 
@@ -89,7 +86,7 @@ def interpolate_response(
     *,
     closed: bool,
     measured_to_half_rate: bool = True,
-    straight: NDArray[np.bool_] | None = None,
+    straight: Flags | None = None,
 ) -> ResponseInterpolation:
     """The interpolation through a response P (n,) at ascending angles (n,) in (0, pi].
 
@@ -137,7 +134,7 @@ def interpolate_response(
     return ResponseInterpolation(x, kinds, slopes, kind, lines, error, integrators, delay, closed)
 
 
-def _windows(n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _windows(n: int) -> tuple[Ints, Flags]:
     """Five neighbouring nodes (n, 5) round each node, and which of them it is itself."""
     window = np.clip(np.arange(n) - 2, 0, n - 5)[:, None] + np.arange(5)
     return window, window == np.arange(n)[:, None]
@@ -164,7 +161,7 @@ def _prediction_error(x: Floats, y: Complexes, size: Floats | Complexes | float)
         return np.asarray(np.nan_to_num(np.abs(predicted - y) / np.abs(size), nan=np.inf))
 
 
-def _products(x: Floats, window: NDArray[np.int64], here: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _products(x: Floats, window: Ints, here: Flags) -> tuple[Floats, Floats]:
     """For every window: the product of each node's distances to the others, and its distance from the middle."""
     at = x[window]
     apart = at[:, :, None] - at[:, None, :]

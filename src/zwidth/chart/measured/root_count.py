@@ -13,15 +13,12 @@ No polynomial and no eigenvalue is needed: only the curve, measured or computed,
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
-
-def curve_segments(K: Floats, B: Floats, orientation: Floats) -> tuple[Floats, Whole]:
+def curve_segments(K: Floats, B: Floats, orientation: Floats) -> tuple[Floats, Ints]:
     """A sampled boundary curve as directed segments (k, 4) of K, B, K, B and their jumps (k,).
 
     K, B         (n,) walls at ascending angles
@@ -41,7 +38,7 @@ def curve_segments(K: Floats, B: Floats, orientation: Floats) -> tuple[Floats, W
 
 
 @compiled
-def roots_outside(segments: Floats, jumps: Whole, reference: Floats, count: int, walls: Floats) -> Whole:
+def roots_outside(segments: Floats, jumps: Ints, reference: Floats, count: int, walls: Floats) -> Ints:
     """Numbers (n,) of roots outside the circle of walls (n, 2).
 
     segments   (k, 4) the boundary as directed segments: the curve (`curve_segments`) and the lines of real roots

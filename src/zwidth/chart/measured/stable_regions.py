@@ -6,17 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.measured.boundary import Boundary, real_root, refine_angles, sample_boundary, wall_scales
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.rings import Window
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
 GRID = 1e-11  # to which lines are noded, as a share of the window
@@ -100,7 +96,7 @@ def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry
     return [line for line in clipped if not line.is_empty]
 
 
-def has_stable_inner_side(edge: Boundary, which: Whole, scale: Floats) -> Flags:
+def has_stable_inner_side(edge: Boundary, which: Ints, scale: Floats) -> Flags:
     """Whether the chords `which` (indices into the segments, of the curve) have stable walls on their inner side.
 
     scale  (2,) or (k, 2) what counts as one unit of K and of B

@@ -16,14 +16,10 @@ from dataclasses import dataclass
 from math import inf, isnan, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.measured.boundary import Boundary
 from zwidth.chart.measured.doubt import Doubt
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 LINES = 120  # of one damping each, evenly spaced up to the largest
 LOW_LINES = 24  # more of them in logarithm below the first of these

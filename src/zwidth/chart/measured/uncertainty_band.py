@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.measured.stable_regions import StableRegions, has_stable_inner_side
 from zwidth.chart.rings import cut_at_holes
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 CORNERS = 24  # of a polygon round an ellipse
 MOST_ELLIPSES = 600
@@ -77,7 +74,7 @@ def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> 
     return _ellipses(loop, cells, scale, curve[beyond])
 
 
-def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Whole) -> shapely.Geometry:
+def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Ints) -> shapely.Geometry:
     """The union of convex hulls of each two neighbouring ellipses along these chords."""
     edge = cells.edge
     every = max(1, len(curve) // MOST_ELLIPSES)

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.measured.response_interpolation import ResponseInterpolation, around_one
 from zwidth.model.response import LEAST_COHERENCE, UNSURE, Response
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 LARGEST_PHASE: Final = np.radians(30.0)  # at the lowest frequency, beyond that of the integrators
 COARSEST: Final = 0.02  # relative error of P that interpolation may be expected to leave
@@ -113,7 +110,7 @@ def _gaps(f: Floats, errors: Floats) -> Iterator[UnusableRange]:
         )
 
 
-def _runs(flags: Flags, reach: int = 1) -> list[NDArray[np.int64]]:
+def _runs(flags: Flags, reach: int = 1) -> list[Ints]:
     """Indices of the true, those together that are no farther apart than `reach`."""
     at = np.flatnonzero(flags)
     return np.split(at, np.flatnonzero(np.diff(at) > reach) + 1) if len(at) else []

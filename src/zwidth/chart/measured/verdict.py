@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.measured.boundary import Boundary
 from zwidth.chart.measured.doubt import Doubt
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import STABLE, UNDECIDED, UNSTABLE, WallVerdicts
 from zwidth.model.argument_checks import broadcast_walls as broadcast_walls
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -27,7 +26,7 @@ class MeasuredVerdicts(WallVerdicts):
     outside  roots outside the unit circle
     """
 
-    outside: NDArray[np.int64]
+    outside: Ints
 
     def table(self) -> dict[str, list[Any]]:
         return super().table() | {"roots_outside": self.outside.ravel().tolist()}

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.chart.arc_kernels import CHORD
 from zwidth.chart.arcs import ArcPoints
 from zwidth.chart.edge_by_eigenvalues import ChartError
@@ -21,8 +22,6 @@ from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require, wrong_type
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -13,13 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.arcs import Arc, Arcs
 from zwidth.chart.robust.member_corner import ArcRun, solve_corner
 from zwidth.chart.robust.members import Member
-
-Floats = NDArray[np.float64]
 
 # Distances in shares of the common set's size: two edges this near are one, ...
 SAME = 1e-9
@@ -40,7 +38,7 @@ class _OutlineChords:
 
     ends: Floats
     angles: Floats
-    origin: NDArray[np.int64]
+    origin: Ints
 
 
 def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: float) -> tuple[Arcs, float]:
@@ -107,7 +105,7 @@ def _starts_anew(arc: Arc, before: float, after: float) -> bool:
     return bool(ahead < -0.5 * abs(arc.end - arc.start))
 
 
-def _nearest_segments(points: Floats, segments: _OutlineChords, near: float) -> NDArray[np.int64]:
+def _nearest_segments(points: Floats, segments: _OutlineChords, near: float) -> Ints:
     """For each edge of a walk the segment that it lies on: the first within `near` of both its ends that runs the
     same way, and of several the one on the arc of the edge before."""
     middles = 0.5 * (points[:-1] + points[1:])

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.off_circle import sides_of_circle
 from zwidth.chart.robust.instability import perhaps_unstable
 from zwidth.chart.robust.members import Member
 from zwidth.chart.traced_edge import TracedEdge
-
-Floats = NDArray[np.float64]
 
 
 def walls_off_edge(edge: TracedEdge, members: Sequence[Member]) -> Floats:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.hurwitz import is_stable, work_array
 from zwidth.chart.loop_polynomials import (
     LoopPolynomials,
@@ -14,15 +14,12 @@ from zwidth.chart.loop_polynomials import (
 )
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
-from zwidth.loop.loop_table import LoopTable, Whole
+from zwidth.loop.loop_table import LoopTable
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
-Marks = NDArray[np.bool_]
 
 
 @compiled
-def unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
+def unstable(polynomials: Floats, K: Floats, B: Floats) -> Flags:
     """Which walls (k,) are certainly unstable for a loop, given by `Tracer.polynomials`."""
     out = np.empty(len(K), dtype=np.bool_)
     N = polynomials.shape[1] - 1
@@ -31,7 +28,7 @@ def unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
 
 
 @compiled
-def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
+def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Flags:
     """Which walls (k,) are not certainly stable for a loop, given by `Tracer.polynomials`."""
     out = np.empty(len(K), dtype=np.bool_)
     N = polynomials.shape[1] - 1
@@ -42,13 +39,13 @@ def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Marks:
 
 
 @compiled_lean
-def mark_unstable(polynomials: Floats, N: int, K: Floats, B: Floats, room: Floats, out: Marks) -> None:
+def mark_unstable(polynomials: Floats, N: int, K: Floats, B: Floats, room: Floats, out: Flags) -> None:
     """Mark the walls (k,) that are certainly unstable for a loop of degree N."""
     for i in range(len(K)):
         out[i] = is_stable(polynomials, N, K[i], B[i], room) < 0
 
 
-def unstable_walls(loops: LoopTable, K: Floats, B: Floats) -> Marks:
+def unstable_walls(loops: LoopTable, K: Floats, B: Floats) -> Flags:
     """Which walls (k,) are certainly unstable for each loop of a table, (N, k); none for one without sections."""
     out = np.zeros((len(loops.rows), len(K)), dtype=bool)
     most, K, B = most_degree(loops), K.copy(), B.copy()
@@ -61,7 +58,7 @@ def unstable_walls(loops: LoopTable, K: Floats, B: Floats) -> Marks:
     return out
 
 
-def softenings(loops: LoopTable, which: Whole, K: Floats, B: Floats) -> Floats:
+def softenings(loops: LoopTable, which: Ints, K: Floats, B: Floats) -> Floats:
     """`softening` [N/m] (p,) of each of p unstable walls K, B (p,) for one loop each, number `which` (p,)."""
     out = np.empty(len(which))
     most, which, K, B = most_degree(loops), which.copy(), K.copy(), B.copy()
@@ -82,7 +79,7 @@ def _unstable_walls(
     room: Floats,
     K: Floats,
     B: Floats,
-    out: Marks,
+    out: Flags,
     first: int,
     last: int,
 ) -> None:
@@ -99,7 +96,7 @@ def _softenings(
     circle: CircleFactors,
     polynomials: LoopPolynomials,
     room: Floats,
-    which: Whole,
+    which: Ints,
     K: Floats,
     B: Floats,
     out: Floats,

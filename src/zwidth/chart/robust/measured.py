@@ -14,9 +14,10 @@ from typing import Final
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry.polygon import orient
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart_base import BoundaryArc
 from zwidth.chart.measured.chart import MeasuredChart
 from zwidth.chart.measured.verdict import MeasuredVerdicts
@@ -25,8 +26,6 @@ from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_set import incompatible_shapes
 from zwidth.chart.robust.members import polygonal
 from zwidth.chart.verdict import STABLE, UNDECIDED
-
-Floats = NDArray[np.float64]
 
 CHORD: Final = 1e-5  # share of a chart's size to which chords of measured charts follow the edge
 SOFTER: Final = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # shares by which the stiffest wall is softened

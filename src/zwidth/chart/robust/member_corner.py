@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arc, Wall
 from zwidth.chart.robust.members import Member
-
-Floats = NDArray[np.float64]
 
 # A corner is at most this share of the set's size from where the polygons have it.
 REACH = 1e-3

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import MINUS, PLUS
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.hurwitz import is_stable, work_array
@@ -18,8 +18,6 @@ from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import ROOTS, Tracer
 from zwidth.loop.loop import Loop
 from zwidth.loop.sections import UnmovedError
-
-Floats = NDArray[np.float64]
 
 # Parts of a polygon smaller than this share of it are rounding.
 ROUNDING_AREA = 1e-12

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import DAMPING, END_MARGIN, STIFFNESS, Arc, ArcPoints
 from zwidth.chart.area import straight_integrals
 from zwidth.chart.several_directions.wall_curves import WallCurve
-
-Floats = NDArray[np.float64]
 
 # Largest distance of a chord from its arc, in shares of the stable set's size.
 CHORD = 1e-6

@@ -12,14 +12,10 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, correct
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 # A wall continues in another one if it misses it by less than these shares of their distance, and of what it
 # misses the next best by.
@@ -109,7 +105,7 @@ def trace_branches(equation: RootEquation, samples: Samples, box: Box) -> tuple[
 
 
 @np.errstate(all="ignore")
-def _link(equation: RootEquation, samples: Samples, box: Box) -> tuple[Whole, list[_Fold], Flags]:
+def _link(equation: RootEquation, samples: Samples, box: Box) -> tuple[Ints, list[_Fold], Flags]:
     """Number (N - 1, q) of the wall at the next parameter in which each continues, -1 for none; folds; and the
     intervals (N - 1,) in which links are missing."""
     forward = _continuations(samples, box)
@@ -125,7 +121,7 @@ def _link(equation: RootEquation, samples: Samples, box: Box) -> tuple[Whole, li
     return forward, folds, np.asarray(ahead[:-1].any(axis=1) | behind[1:].any(axis=1))
 
 
-def _continuations(samples: Samples, box: Box) -> Whole:
+def _continuations(samples: Samples, box: Box) -> Ints:
     """Number (N - 1, q) of the wall at the next parameter in which each clearly continues, -1 for none."""
     x, slopes = samples.walls / box.size, samples.slopes / box.size
     step = np.diff(samples.parameters)[:, None, None, None]
@@ -192,7 +188,7 @@ def _cosine(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.einsum("ni,ni->n", one, other) / length)
 
 
-def _walks(samples: Samples, forward: Whole, folds: list[_Fold]) -> list[CurvePoints]:
+def _walks(samples: Samples, forward: Ints, folds: list[_Fold]) -> list[CurvePoints]:
     """Linked walls, one branch after the other."""
     q = samples.walls.shape[1]
     joints: list[_Fold | None] = []

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry.polygon import orient
 
+from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.chart_base import DrawnChart
 from zwidth.chart.off_circle import sides_of_circle
@@ -26,8 +27,6 @@ from zwidth.chart.verdict import Verdicts, verdicts
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.model.argument_checks import require
-
-Floats = NDArray[np.float64]
 
 # How closely chords follow curves, in shares of the box: at first, and before corners are solved.
 COARSE, CLOSE = 1e-3, 1e-5

@@ -23,17 +23,14 @@ from typing import Final
 import numpy as np
 import scipy.linalg
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.off_circle import WALL_ROUNDING, distances_from_circle
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.raster import ON_EDGE
 from zwidth.chart.several_directions.stable_polygons import FAR, ON_CIRCLE
 from zwidth.chart.several_directions.wall_equation import WallEquation
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Walls judged in one batch of transition matrices, and angles looked at.
 BATCH, MOST_ANGLES = 4000, 3000
@@ -106,7 +103,7 @@ def _eigenvalues(forces: Complexes, readings: Complexes) -> Complexes:
         return np.array([scipy.linalg.eigvals(one, -other) for one, other in pairs], dtype=complex)
 
 
-def _on_edge(loop: MultiLoop, thetas: Floats, walls: Floats) -> NDArray[np.bool_]:
+def _on_edge(loop: MultiLoop, thetas: Floats, walls: Floats) -> Flags:
     """Which walls (k, 2) of [K T, B] have a root at their angle (k,) and none outside the circle."""
     found = np.zeros(len(walls), dtype=bool)
     for first in range(0, len(walls), BATCH):

@@ -10,15 +10,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.branches import Samples, trace_branches
 from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, correct
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 # Rounds in which chords are halved; those are looked at that come as close to the box as this share of its size.
 HALVINGS, BESIDE = 24, 0.1
@@ -105,7 +101,7 @@ def _steps_between(first: Floats, last: Floats) -> Floats:
     return np.asarray((u[apart, None] + step[apart, None] * np.array(SHARES)).ravel())
 
 
-def _turns(traced: CurvePoints, k: Whole, box: Box) -> Flags:
+def _turns(traced: CurvePoints, k: Ints, box: Box) -> Flags:
     """Which steps from points k turn so much that a loop may hide there."""
     ahead = traced.directions[:, 1:] / box.size
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]

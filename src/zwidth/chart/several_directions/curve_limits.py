@@ -10,12 +10,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.several_directions.branches import Samples
 from zwidth.chart.several_directions.traced_curve import CurvePoints, TracedCurve, correct
-
-Floats = NDArray[np.float64]
 
 # Angles from which a limit is extrapolated, in units of the first sample's: each twice the one before.
 ANGLES: Final = 2.0 ** np.arange(-2, 6)

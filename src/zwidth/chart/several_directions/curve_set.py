@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.branches import Samples
 from zwidth.chart.several_directions.curve_chords import followed_branches
@@ -24,8 +24,6 @@ from zwidth.chart.several_directions.traced_curve import TracedCurve
 from zwidth.chart.several_directions.wall_curves import StraightLine, WallCurve
 from zwidth.chart.several_directions.wall_equation import WallEquation
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
 
 # Steps of a curve of real roots across a box, before its chords are looked at.
 STEPS: Final = 48

@@ -6,13 +6,10 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.chart.circle_sampling import sample_angles
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Steps between angles, in shares of the distance to the nearest pole or zero; and the longest.
 SHARE, LONGEST = 0.1, 0.05

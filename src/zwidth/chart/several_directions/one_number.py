@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, linear_sum_assignment
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.chart.several_directions.wall_curves import StraightLine
 from zwidth.chart.several_directions.wall_equation import WallEquation
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Imaginary part of a real number that was solved for, in shares of it; where it passes a pole that is not small.
 REAL: Final = 1e-6

@@ -10,14 +10,11 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.several_directions.loop_features import on_circle
 from zwidth.chart.several_directions.wall_equation import WallEquation
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Directions whose coupling is a smaller share of their own responses are not coupled.
 UNCOUPLED: Final = 1e-11
@@ -68,7 +65,7 @@ def _turned(P: Complexes, stiffness: Floats, damping: Floats) -> Floats:
     return S
 
 
-def _coupled_sets(P: Complexes) -> list[NDArray[np.int64]]:
+def _coupled_sets(P: Complexes) -> list[Ints]:
     """Sets of directions that responses (n, r, r) couple: within one each leads to each."""
     r = P.shape[-1]
     own = np.sqrt(np.abs(np.diagonal(P, axis1=1, axis2=2)))

@@ -12,13 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.arcs import CHORD, CURVED, Arc, Wall
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.wall_curves import WallCurve
-
-Floats = NDArray[np.float64]
 
 # Runs of sides shorter than this share of a ring's size are rounding of its corners.
 SHORT = 1e-7
@@ -126,8 +124,8 @@ class _CurveSteps:
 
     first: Floats
     last: Floats
-    curve: NDArray[np.int64]
-    sample: NDArray[np.int64]
+    curve: Ints
+    sample: Ints
     start: Floats
     end: Floats
 
@@ -141,7 +139,7 @@ class _CurveSteps:
 def _steps(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
     """Steps of curves on which a side of the ring can lie."""
     around = Box(ring.min(axis=0), ring.max(axis=0)).with_margin(AROUND)
-    parts: list[tuple[Floats, Floats, NDArray[np.int64], NDArray[np.int64], Floats, Floats]] = []
+    parts: list[tuple[Floats, Floats, Ints, Ints, Floats, Floats]] = []
     for i, curve in enumerate(curves):
         walls, places = curve.walls, curve.parameters
         k = np.flatnonzero(around.meets(walls))

@@ -11,13 +11,10 @@ from typing import Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.several_directions.box import Box
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Walls along each side of the box, and of the boxes of the first few cells.
 SIDE, CELL_SIDE, MOST_CELLS = 24, 7, 8

@@ -17,12 +17,10 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.several_directions.wall_curves import StraightLine
 from zwidth.chart.several_directions.wall_equation import WallEquation, adjugate, determinant
-
-Floats = NDArray[np.float64]
 
 # A velocity estimate below this share of 1/T, or an imaginary part below this share of its number, is rounding.
 ROUNDING: Final = 1e-9
@@ -144,7 +142,7 @@ def _lines_of_stiffness(
     return [*lines, *(StraightLine(np.array([1.0, 0.0]), k * T, angle, T) for k in sprung)]
 
 
-def _free_at_rest(H: Floats, unsprung: NDArray[np.bool_], least: float) -> tuple[Floats, Floats]:
+def _free_at_rest(H: Floats, unsprung: Flags, least: float) -> tuple[Floats, Floats]:
     """Orthonormal bases (r, n), (r, r - n) of motions that neither plant nor law hold at rest, and of the others.
 
     unsprung  (r,) directions in which the law has no stiffness;  least  stiffness that is more than rounding
@@ -171,7 +169,7 @@ def _pencil(A: Floats, B: Floats, scale: float) -> list[float]:
     return [float(value) if abs(value) > ZERO * scale else 0.0 for value in x]
 
 
-def _real(x: NDArray[np.complex128] | Floats, least: float = 0.0) -> Floats:
+def _real(x: Complexes | Floats, least: float = 0.0) -> Floats:
     """Real parts of what is real but for rounding; nan for what is not."""
     return np.where(np.abs(x.imag) <= ROUNDING * np.abs(x) + least, x.real, np.nan)
 

@@ -11,13 +11,11 @@ from itertools import combinations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.wall_curves import StraightLine, WallCurve
 from zwidth.loop.multi_loop import MultiLoop
-
-Floats = NDArray[np.float64]
 
 # Pieces of the plane below this share of the box's area are rounding of the cuts.
 SLIVER = 1e-14

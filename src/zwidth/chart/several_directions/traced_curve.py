@@ -13,13 +13,9 @@ from functools import cached_property
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.arcs import PAIR, REAL
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Whole = NDArray[np.int64]
 
 CORRECTIONS: Final = 12
 # A correction of this share of the coordinates, or of their scale, is rounding.
@@ -77,7 +73,7 @@ class CurvePoints(NamedTuple):
         own *= np.where(np.einsum("ni,ni->n", own, ahead) < 0.0, -1.0, 1.0)[:, None]
         return CurvePoints(self.points, np.nan_to_num(own * scale, posinf=0.0, neginf=0.0))
 
-    def guess(self, j: Whole, share: Floats, scale: Floats) -> Floats:
+    def guess(self, j: Ints, share: Floats, scale: Floats) -> Floats:
         """Points (k, 3) at shares (k,) of the way from points j to j + 1, by the cubic with their directions.
 
         Where that bulges so far that the parameter leaves its interval by more than its length, it ends there.

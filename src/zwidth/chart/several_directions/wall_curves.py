@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import CHORD, MINUS, PLUS
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 class WallCurve(Protocol):

@@ -22,13 +22,11 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.several_directions.loop_features import on_circle
 from zwidth.loop.multi_loop import MultiLoop
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Matrices = TypeVar("Matrices", Floats, Complexes)
 
 # Imaginary part of a real solution after Newton's method, in shares of the wall's size; how far that may move a
@@ -156,7 +154,7 @@ class WallEquation:
         return f.F, s * f.Y, f.w[:, None, None] * (v * f.Y)
 
 
-def _columns(P: Matrices, H: Matrices | None) -> tuple[Matrices, Matrices, NDArray[np.bool_]]:
+def _columns(P: Matrices, H: Matrices | None) -> tuple[Matrices, Matrices, Flags]:
     """Forces F and readings Y (N, r, r) with Y = P F, and which columns (N, 1, r) are small singular values' of P.
 
     Large singular values are taken from P, small ones from its inverse H, which was computed without forming P:

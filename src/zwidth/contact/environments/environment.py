@@ -15,13 +15,12 @@ from typing import Any, Final
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth import _verbs
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_for
 from zwidth.contact.function_pointer import address_of, function_at
 
-Floats = NDArray[np.float64]
 ForceLaw = Callable[[float, float, float, float, Floats, Floats], float]
 
 MEMORY: Final = 8

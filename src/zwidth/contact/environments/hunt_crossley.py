@@ -1,6 +1,7 @@
 """Contact whose damping grows with depth, so that force neither jumps at the surface nor pulls at slow speeds."""
 
-from zwidth.contact.environments.environment import Floats, Parameter, environment
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Parameter, environment
 
 
 @environment(

@@ -1,6 +1,7 @@
 """A wall whose spring hardens or softens with depth."""
 
-from zwidth.contact.environments.environment import Floats, Parameter, environment
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Parameter, environment
 
 
 @environment(

@@ -1,6 +1,7 @@
 """The Kelvin-Voigt wall as one touches it: it acts inside only."""
 
-from zwidth.contact.environments.environment import Floats, Parameter, environment
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Parameter, environment
 
 
 @environment(

@@ -1,6 +1,7 @@
 """The one-sided wall on which a hand leans: as one touches it about the haptic equilibrium."""
 
-from zwidth.contact.environments.environment import Floats, Parameter, environment
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Parameter, environment
 
 
 @environment(

@@ -1,6 +1,7 @@
 """Two walls that face each other, with room between."""
 
-from zwidth.contact.environments.environment import Floats, Parameter, environment
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Parameter, environment
 
 
 @environment(

@@ -1,6 +1,7 @@
 """The Kelvin-Voigt wall to both sides: the linear wall of all charts."""
 
-from zwidth.contact.environments.environment import Floats, Parameter, environment
+from zwidth.arrays import Floats
+from zwidth.contact.environments.environment import Parameter, environment
 
 
 @environment(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
 from zwidth.contact.mechanism.system import Memory, System
 from zwidth.model.bias import bias
 from zwidth.model.closed_posture import NOT_CLOSED, close_at
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
-from zwidth.model.mechanism import Floats
 
 
 @compiled_lean

@@ -7,12 +7,12 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.mechanism.surfaces import Surface, surface_document
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import Posture
 from zwidth.result import Result
 
@@ -258,7 +258,7 @@ class MechanismMotion(Result):
         return "\n".join([*lines, *([f"  {self.reason}"] if self.reason else [])])
 
 
-def _share(flags: NDArray[np.bool_]) -> float:
+def _share(flags: Flags) -> float:
     """Share of the samples at which something holds; nan without samples."""
     return float(np.mean(flags)) if len(flags) else np.nan
 

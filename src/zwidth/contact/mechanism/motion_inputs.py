@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.loop.controller import Controller
 from zwidth.memory_limit import check_memory
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import Posture
 
 ALONG: Final = 1e-9  # share of a velocity that may be beside what the handle can do

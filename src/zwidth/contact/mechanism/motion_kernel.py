@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.computer import Computer, Computers, arrived_command, computer_at
 from zwidth.contact.mechanism.acceleration import configure
@@ -17,7 +18,6 @@ from zwidth.contact.mechanism.system import Memory, System, memory_of
 from zwidth.model.closure import equations, orientation, passive_rates
 from zwidth.model.continuation import joint_beyond_limit, keep_rows
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links
-from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 DONE: Final = 0

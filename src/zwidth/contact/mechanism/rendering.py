@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.computer import (
     Computer,
@@ -27,7 +28,6 @@ from zwidth.contact.mechanism.system import System
 from zwidth.model.closed_posture import close_at
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, working_memory
 from zwidth.model.inertia import handle_jacobian, unit_motions
-from zwidth.model.mechanism import Floats
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 

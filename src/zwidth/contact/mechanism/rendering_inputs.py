@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from zwidth.model.mechanism import Drives, Floats, Ints
+from zwidth.arrays import Floats, Ints
+from zwidth.model.mechanism import Drives
 
 
 class RenderingInputs(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.contact.computer import computers
 from zwidth.contact.environments import Environment
 from zwidth.contact.mechanism import motion_kernel as kernel
@@ -23,7 +24,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError
 from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.argument_checks import check_choice, require
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import OK, Posture
 from zwidth.model.reduction import reduce_mechanism

@@ -19,12 +19,12 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.exponential import exponential
 from zwidth.contact.friction import bristle_force, coulomb_force
 from zwidth.contact.mechanism.acceleration import accelerate, configure, solve
 from zwidth.contact.mechanism.system import BRISTLES, DRY, Memory, System
-from zwidth.model.mechanism import Floats
 
 LINEARISE_TURN: Final = 0.03  # turn of a joint after which A is taken anew [rad]
 AT_REST: Final = 1e-12  # share of a substep's change of velocity that is rounding

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
-
-Floats = NDArray[np.float64]
 
 NONE: Final = 0
 PLANE: Final = 1

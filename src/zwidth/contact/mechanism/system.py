@@ -16,10 +16,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.bias import LinkAccelerations, new_link_accelerations
 from zwidth.model.forward_kinematics import WorkingMemory, working_memory
-from zwidth.model.mechanism import Drives, Floats, Ints
+from zwidth.model.mechanism import Drives
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.plant import Plant
 

@@ -8,10 +8,10 @@ from math import isfinite
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.contact.environments import ENVIRONMENTS, Environment
 from zwidth.contact.mechanism.motion_inputs import MotionError
 from zwidth.contact.mechanism.surfaces import Plane, Surface
-from zwidth.model.mechanism import Floats
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
 from zwidth.device.robot_files import freedom
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
 from zwidth.device.robot_files.freedom import Motions
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
-from zwidth.model.mechanism import Floats
 from zwidth.model.rotations import roll_pitch_yaw_of
 
 HANDLE_WORDS: Final = re.compile(

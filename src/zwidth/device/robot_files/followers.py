@@ -19,6 +19,7 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import DeviceError, Fault
 from zwidth.device.robot_files.robot import (
     BASE,
@@ -32,7 +33,6 @@ from zwidth.device.robot_files.robot import (
     RobotJoint,
     joint_motion,
 )
-from zwidth.model.mechanism import Floats
 
 OBLIQUE: Final = 0.1  # sine of the angle between two slides from which one wedge does
 ALIGNED: Final = 1e-9  # sine of the angle between axes that count as parallel, and error of a ratio of 1

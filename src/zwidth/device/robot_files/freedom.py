@@ -10,13 +10,14 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ValidationError
 
+from zwidth.arrays import Floats
 from zwidth.device.build_mechanism import mechanism as build_mechanism
 from zwidth.device.faults import DeviceError, Fault, dotted
 from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.validation_messages import validation_messages
 from zwidth.model.handle_position import handle_goal
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.mobility import constraints
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.robot_files.robot import (
     BASE,
     UNMOVED,
@@ -18,7 +19,6 @@ from zwidth.device.robot_files.robot import (
     RobotJoint,
     joint_motion,
 )
-from zwidth.model.mechanism import Floats
 from zwidth.model.rotations import roll_pitch_yaw_of
 
 LONGEST_NAME: Final = 64

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import fail, suggestion
 from zwidth.device.robot_files.compile_mjcf import Compiled, matrix_of_six
 from zwidth.device.robot_files.robot import (
@@ -17,7 +18,6 @@ from zwidth.device.robot_files.robot import (
     Site,
     rotation_of_quaternion,
 )
-from zwidth.model.mechanism import Floats
 from zwidth.model.rotations import rotation_vector
 
 KINDS = {0: "free", 1: "spherical", 2: "prismatic", 3: "revolute"}  # mjtJoint

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.model.mechanism import Floats
+from zwidth.arrays import Floats
 from zwidth.model.rotations import rotation_matrix
 
 BASE: Final = 0  # index of the world among the bodies

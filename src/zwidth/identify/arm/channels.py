@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail
 from zwidth.identify.records.columns import Columns
@@ -17,7 +17,6 @@ from zwidth.identify.records.record import Piece, Record
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import pack
 
-Floats = NDArray[np.float64]
 Side = Literal["joint", "motor"]
 
 COLUMNS: Final = Columns(

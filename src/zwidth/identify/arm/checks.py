@@ -8,16 +8,14 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import comma_list
 from zwidth.identify.arm.channels import Channels
 from zwidth.identify.arm.smoothing import convolved
 from zwidth.identify.identification import Check
 from zwidth.identify.records.record import Piece
 from zwidth.model.encoder_step import encoder_step
-
-Floats = NDArray[np.float64]
 
 COUNTS: Final = 10.0  # that every joint must move, at least
 SLOPE: Final = 0.1  # by which a recorded velocity may differ from the derivative of the position

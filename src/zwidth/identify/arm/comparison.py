@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.arm.parameters import BaseParameters
 from zwidth.identify.arm.smoothing import Band, convolved
 from zwidth.identify.arm.stretches import Stretch
 from zwidth.model.closed_posture import moved_posture
 from zwidth.model.inertia_regressor import inertia_regressor
 from zwidth.model.mechanism import REVOLUTE
-
-Floats = NDArray[np.float64]
 
 PART: Final = 20_000  # smoothed samples whose columns stand in memory at once
 

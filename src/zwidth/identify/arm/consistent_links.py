@@ -21,13 +21,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.arm.parameters import BaseParameters
 from zwidth.model.inertia_regressor import PARAMETERS
 from zwidth.model.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
 
 WIDE: Final = 1.0  # s: the file's numbers may be wrong by a factor of e, or more
 THIN: Final = 1e-3  # least share of the pseudo-inertia's mean width, of a body that is flat or a rod in the file

@@ -14,14 +14,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.arm.parameters import Parameters
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.effective_parameters import lever_arms, screw
 from zwidth.model.inertia_regressor import inertia_regressor
-
-Floats = NDArray[np.float64]
 
 KINDS: Final = ("rigid_mass", "link_side_mass", "motor_side_mass")
 NO_MOTION: Final = 1e-12  # of a lever arm along a direction in which the handle cannot move

@@ -7,8 +7,8 @@ from math import inf, nan
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.identify.arm.consistent_links import body_numbers
@@ -19,8 +19,6 @@ from zwidth.identify.identification import Estimate
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.inertia_regressor import PARAMETERS
 from zwidth.model.mechanism import PRISMATIC, Mechanism
-
-Floats = NDArray[np.float64]
 
 LEVEL: Final = 0.95
 DIGITS: Final = 12  # of numbers written into a device file

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import comma_list
 from zwidth.identify.arm.comparison import Compared
 from zwidth.identify.arm.consistent_links import ConsistentLinks
@@ -15,8 +15,6 @@ from zwidth.identify.arm.effective_masses import mass_columns
 from zwidth.identify.arm.parameters import BaseParameters
 from zwidth.identify.arm.regression import Regression
 from zwidth.identify.identification import Check
-
-Floats = NDArray[np.float64]
 
 FEWEST: Final = 25  # torques of all joints that are compared for each base parameter: fewer make narrow intervals
 CAUSES: Final = (

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, quote
 from zwidth.identify.arm.channels import Channels, Side, channels_of, check_mechanism, left_out
@@ -58,7 +59,6 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.progress import Progress
 
-Floats = NDArray[np.float64]
 Torque = Literal["measured", "commanded"]
 Rotors = Literal["fitted", "known"]
 

@@ -22,14 +22,12 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.model.closed_posture import moved_posture
 from zwidth.model.inertia_regressor import PARAMETERS, inertia_regressor
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-
-Floats = NDArray[np.float64]
 
 SYMBOLS: Final = ("m", "m c_x", "m c_y", "m c_z", "I_xx", "I_yy", "I_zz", "I_xy", "I_xz", "I_yz")
 FRICTION: Final = ("coulomb", "viscous", "offset")

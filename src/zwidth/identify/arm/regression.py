@@ -22,9 +22,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from zwidth.arrays import Flags, Floats, Ints
 
 MOST_TERMS: Final = 12  # of an autoregression
 BLOCKS: Final = 30  # of the filtered samples, between which errors are taken for independent
@@ -73,7 +72,7 @@ class Regression:
             return float(np.inf)
         return float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
 
-    def open_along(self, gradients: Floats) -> NDArray[np.bool_]:
+    def open_along(self, gradients: Floats) -> Flags:
         """Of each gradient (k, b) whether parameters that change no torque change the function."""
         scaled = gradients * self.size
         length = np.linalg.norm(scaled, axis=1)
@@ -96,7 +95,7 @@ def regress(
     columns: Sequence[Floats],
     torques: Sequence[Floats],
     sources: Sequence[Floats] = (),
-    groups: NDArray[np.int64] | None = None,
+    groups: Ints | None = None,
 ) -> Regression:
     """The parameters of torques, and the covariance of their errors.
 
@@ -137,7 +136,7 @@ def _excess(
     information: Floats,
     whitening: Floats,
     weight: Floats,
-    groups: NDArray[np.int64] | None,
+    groups: Ints | None,
 ) -> Floats:
     """By what factors (b + 1,), at least 1, the parameters' variances are larger than of white residuals.
 

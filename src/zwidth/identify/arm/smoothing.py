@@ -22,11 +22,9 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.records.sampling import Sampling
-
-Floats = NDArray[np.float64]
 
 WIDE: Final = 1.6  # edge of the positions' band over that of the analysed one
 WIDTH: Final = 1.2  # s f of the wide kernel: H is flat to 1e-4 up to f/2, 0.5 at f, and 1e-4 at 1.5 f

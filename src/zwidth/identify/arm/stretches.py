@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.arm.channels import Channels
 from zwidth.identify.arm.smoothing import Band, convolved
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
 from zwidth.memory_limit import check_memory
 
-Floats = NDArray[np.float64]
 Table = tuple[bool, Floats]  # whether a stretch begins with it; time, coordinates and forces (n, 1 + 2 d)
 
 

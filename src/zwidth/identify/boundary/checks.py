@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.faults import comma_list, plural
 from zwidth.identify.boundary.points import (
@@ -21,8 +21,6 @@ from zwidth.identify.boundary.points import (
 )
 from zwidth.identify.identification import Check
 from zwidth.identify.records.record import Record
-
-Floats = NDArray[np.float64]
 
 SPARE: Final = 2  # points on the boundary beyond the numbers that are fitted
 THOUSAND: Final = (2.3, 3.7)  # powers of ten that a forgotten thousand may look like
@@ -54,7 +52,7 @@ def complete_points(points: BoundaryPoints, records: Sequence[Record]) -> tuple[
     return kept[~copies], checks
 
 
-def _copies(points: BoundaryPoints) -> NDArray[np.bool_]:
+def _copies(points: BoundaryPoints) -> Flags:
     """Which points (n,) are an earlier one again, in all numbers and words."""
     seen, again = set[tuple[object, ...]](), np.zeros(len(points), dtype=bool)
     for i in range(len(points)):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import comma_list
 from zwidth.identify.boundary.damping_models import HYSTERETIC, MODAL
 from zwidth.identify.boundary.explained import share_of_points
@@ -16,8 +16,6 @@ from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likeliho
 from zwidth.identify.boundary.model import BoundaryModel
 from zwidth.identify.boundary.parameters import BoundaryParameters
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
 
 TELLING: Final = 6.0  # difference of AICc from which on one model is preferred: odds of 20 to 1
 SAME: Final = (

@@ -18,8 +18,8 @@ from math import pi
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, suggestion
@@ -33,7 +33,6 @@ from zwidth.model.plant import Plant
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
 
-Floats = NDArray[np.float64]
 
 START_RATIO: Final = 0.03  # damping ratio that the first try of each model has at the lowest flexible mode
 RIGID: Final = 1e-6  # share of the highest frequency below which a mode counts as rigid

@@ -7,13 +7,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import comma_list
 from zwidth.identify.boundary.fit import BoundaryFit, ranges
 from zwidth.identify.boundary.model import BoundaryModel, Scatter
 from zwidth.identify.boundary.points import EDGE, TIP, BoundaryPoints
 from zwidth.identify.identification import Check
-
-Floats = NDArray[np.float64]
 
 SYSTEMATIC: Final = 1e-3  # probability of scatter below which what remains is called systematic
 PERMUTATIONS: Final = 4000  # orders of the points that it is compared with

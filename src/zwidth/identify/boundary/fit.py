@@ -7,14 +7,12 @@ from itertools import product
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.identify.boundary.model import BoundaryModel, Deviations, Scatter
 from zwidth.identify.boundary.parameters import BoundaryParameters
 from zwidth.identify.boundary.points import EDGE, LOWER, TIP, UPPER, BoundaryPoints
 from zwidth.identify.profile_likelihood import Fit, fit_least_squares
-
-Floats = NDArray[np.float64]
 
 FIRST_SCATTER: Final = 0.02  # share of the measured range that the scatter is taken for at first
 LEAST_SCATTER: Final = 1e-9  # share of the measured range; less would be the rounding of the chart
@@ -168,14 +166,14 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
     return min(fits, key=lambda fit: fit.sum_of_squares).values
 
 
-def _parts(model: BoundaryModel) -> dict[str, NDArray[np.bool_]]:
+def _parts(model: BoundaryModel) -> dict[str, Flags]:
     """Which residuals (m,) are of points along damping, along stiffness, of unknown edges, of frequencies."""
     edges = model.points[model.points.on_edge]
     seen = int(np.sum(edges.frequency > 0.0))
     total = len(edges) + seen + int(np.sum(~model.points.on_edge))
     place = np.arange(total)
 
-    def of(*kinds: str) -> NDArray[np.bool_]:
+    def of(*kinds: str) -> Flags:
         return np.append(edges.of(*kinds), np.zeros(total - len(edges), dtype=bool))
 
     return {
@@ -281,7 +279,7 @@ def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, 
     return total + float(np.sum(residuals[~used] ** 2)), count, kinds
 
 
-def without(points: BoundaryPoints, every: int = 3) -> NDArray[np.bool_]:
+def without(points: BoundaryPoints, every: int = 3) -> Flags:
     """Which points (n,) are kept where every third on the boundary is left out, along each edge."""
     order = np.lexsort((points.chosen, points.kind, ~points.on_edge))
     keep = np.ones(len(points), dtype=bool)

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, comma_list, fail, plural
@@ -37,7 +37,6 @@ from zwidth.progress import Progress
 
 __all__ = ["COLUMNS", "identify_boundary"]
 
-Floats = NDArray[np.float64]
 
 KIND: Final = "boundary"
 ROUTES: Final = (None, "chart", "experiment")

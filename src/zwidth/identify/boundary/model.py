@@ -19,13 +19,12 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeChords, EdgeKind
 from zwidth.identify.boundary.points import EDGE, LOWER, STABLE, TIP, UNSTABLE, UPPER, BoundaryPoints
 from zwidth.identify.boundary.weights import relative_scatter
 
-Floats = NDArray[np.float64]
 EdgeOf = Callable[[Floats], EdgeChords]
 
 NO_EDGE: Final = EdgeChords(np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2)))
@@ -53,7 +52,7 @@ class Deviations(NamedTuple):
     """
 
     value: Floats
-    missing: NDArray[np.bool_]
+    missing: Flags
     exact: Floats
     frequency: Floats
 
@@ -154,7 +153,7 @@ class BoundaryModel:
         depth, *_ = chords.nearest(tried.stiffness, tried.damping, (scatter.stiffness, scatter.damping))
         return np.where(tried.kind == STABLE, depth, -depth)
 
-    def only(self, some: NDArray[np.bool_]) -> BoundaryModel:
+    def only(self, some: Flags) -> BoundaryModel:
         """The model with some of its points (n,)."""
         return replace(self, points=self.points[some], _edges={})
 

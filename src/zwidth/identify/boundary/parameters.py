@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device import address
 from zwidth.device.device import Device
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from zwidth.loop.loop import Loop
     from zwidth.model.operator import Operator
 
-Floats = NDArray[np.float64]
 
 WIDEST: Final = np.log(1e6)  # factor either way within which a positive number is looked for, as logarithm
 HALVINGS: Final = 12  # of the way to where a number is no longer allowed
@@ -73,7 +72,7 @@ class BoundaryParameters:
         return own if self.damping is None else np.append(own, np.log(self.damping.start))
 
     @property
-    def positive(self) -> NDArray[np.bool_]:
+    def positive(self) -> Flags:
         """Which numbers (p,) vary by their logarithm."""
         more = 0 if self.damping is None else len(self.damping.start)
         return np.append(self.numbers.positive, np.ones(more, dtype=bool))

@@ -9,12 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.device.faults import comma_list
 from zwidth.identify.records.columns import Columns
 from zwidth.identify.records.record import Record
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 STIFFNESS: Final = ("stiffness_N_per_m", "stiffness_Nm_per_rad")
 DAMPING: Final = ("damping_Ns_per_m", "damping_Nms_per_rad")
@@ -85,13 +83,13 @@ class BoundaryPoints:
     high: Floats
     trials: Floats
     circumstances: dict[str, NDArray[Any]]
-    record: NDArray[np.int64]
-    row: NDArray[np.int64]
+    record: Ints
+    row: Ints
 
     def __len__(self) -> int:
         return len(self.stiffness)
 
-    def __getitem__(self, some: Flags | NDArray[np.int64]) -> BoundaryPoints:
+    def __getitem__(self, some: Flags | Ints) -> BoundaryPoints:
         """Some of the points."""
         own = {name: value[some] for name, value in vars(self).items() if name != "circumstances"}
         around = {name: values[some] for name, values in self.circumstances.items()}

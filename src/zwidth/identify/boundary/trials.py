@@ -17,6 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.contact.boundary_experiment import StableExtent, measure_edges, measure_tips
 from zwidth.contact.hand import Hand
 from zwidth.contact.stability_trial import StabilityTrial, TrialError
@@ -29,8 +30,6 @@ from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
 
 DISTURBANCE: Final = 1e-3  # m
 TOUCH_SPEED: Final = 0.02  # m/s
@@ -173,11 +172,11 @@ class Crossing(NamedTuple):
     """
 
     value: Floats
-    tip: NDArray[np.bool_]
+    tip: Flags
     inward: Floats
     frequency: Floats
 
-    def only(self, some: NDArray[np.bool_]) -> Crossing:
+    def only(self, some: Flags) -> Crossing:
         """Some of the edges."""
         return Crossing(self.value[some], self.tip[some], self.inward[some], self.frequency[some])
 
@@ -198,7 +197,7 @@ class SimulatedEdges:
         """What is bisected (n,) at the edge, of the device with these numbers."""
         return np.asarray(self.at.value + self.slopes @ (vector - self.centre))
 
-    def only(self, some: NDArray[np.bool_]) -> SimulatedEdges:
+    def only(self, some: Flags) -> SimulatedEdges:
         """Some of the edges."""
         return SimulatedEdges(self.centre, self.at.only(some), self.slopes[some])
 
@@ -235,7 +234,7 @@ class TrialModel(BoundaryModel):
         depth = own.at.inward * (value - own.values(vector)) / unit
         return np.where(tried.kind == STABLE, depth, -depth)
 
-    def only(self, some: NDArray[np.bool_]) -> BoundaryModel:
+    def only(self, some: Flags) -> BoundaryModel:
         """The model with some of its points (n,)."""
         return replace(self, points=self.points[some], simulated=self.simulated.only(some), _edges={})
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.boundary.points import EDGE, TIP, BoundaryPoints
-
-Floats = NDArray[np.float64]
 
 PRIOR: Final = 4.0  # degrees of freedom with which the usual spread counts beside a point's own
 UNIFORM: Final = 12.0**-0.5  # standard deviation of what may lie anywhere between two ends, per width

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, plural
 from zwidth.identify.excitation import LEAST_SHARED, shared_power
@@ -42,8 +42,6 @@ from zwidth.progress import Progress
 
 __all__ = ["COLUMNS", "identify_impedance"]
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 FORCES: Final = ("handle_force_N", "force_N")
 POSITIONS: Final = ("handle_position_m", "position_m")

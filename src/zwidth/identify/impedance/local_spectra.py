@@ -15,13 +15,10 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.identify.records.record import Piece
 from zwidth.identify.records.sampling import joined
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 HALF: Final = 4  # of a window, in spacings of the transform
 ORDER: Final = 2  # of both polynomials

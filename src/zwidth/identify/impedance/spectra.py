@@ -23,12 +23,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbours
 from zwidth.identify.records.record import Piece, Record
 from zwidth.identify.records.sampling import Sampling, joined
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 FORCE, POSITION = "force", "position"
 LEVEL: Final = 0.95
@@ -80,7 +78,7 @@ class MeasuredImpedance:
         """Upper end of the band of |Z| [N s/m]."""
         return np.abs(self.value) + self.half_width()
 
-    def only(self, some: NDArray[np.bool_]) -> MeasuredImpedance:
+    def only(self, some: Flags) -> MeasuredImpedance:
         """Some of the frequencies."""
         return replace(
             self,

@@ -13,12 +13,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.identify.joint.motion import follow_windows
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEVEL: Final = 0.95
 MASS, STIFFNESS = 0, 5  # indices among the numbers
@@ -62,7 +59,7 @@ class Windows:
     driven: bool
     clock: Floats
 
-    def chosen(self, which: NDArray[np.bool_]) -> Windows:
+    def chosen(self, which: Flags) -> Windows:
         """Some of the windows."""
         names = ("first", "length", "period", "time", "run")
         return replace(self, **{name: getattr(self, name)[which] for name in names})
@@ -473,7 +470,7 @@ def _enlarged(S: Floats, P: Floats) -> Floats:
     return np.asarray(inverse_root @ ((axes * factor[:, None, :]) @ np.swapaxes(axes, 1, 2)) @ R)
 
 
-def _inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _inverse(scaled: Floats) -> tuple[Floats, Flags]:
     """Inverse of a normal matrix, and which parameters it leaves undetermined."""
     values, vectors = np.linalg.eigh(scaled)
     felt = values > 1e-11

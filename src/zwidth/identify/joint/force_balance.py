@@ -17,12 +17,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.joint.fit import COUNT, LEVEL, MASS, STIFFNESS, Windows
 from zwidth.identify.joint.start import MOVING, PARTLY, SHORTEST, balance_rows, weighting
-
-Floats = NDArray[np.float64]
 
 BY_CHANCE: Final = 5e-4  # probability that noise alone passes for a mass: a larger one tells masses that are none
 OVERLAP: Final = 2.0  # rows that share each sample: so many fewer of them are independent

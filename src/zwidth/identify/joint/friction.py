@@ -8,8 +8,8 @@ from math import inf, isfinite, nan
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.joint.command import ALIKE, compare_with_command
@@ -21,8 +21,6 @@ from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
 from zwidth.identify.plausible import check_mass_in_file
 from zwidth.identify.records.record import Record
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
 
 ALIKE_SPEEDS: Final = 0.98  # correlation of dry and viscous friction from which one speed is seen
 UNKNOWN_MASS: Final = 0.5  # half the interval over the mass, from which the mass is not known

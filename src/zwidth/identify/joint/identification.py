@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import fail
 from zwidth.identify.identification import Check
@@ -37,8 +37,6 @@ from zwidth.identify.plausible import check_periods
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling, check_sampling
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
 
 UNSEEN: Final = 3  # of so many windows one is kept for validation
 OUTLYING: Final = 6.0  # times the usual deviation, from which a window does not follow the model
@@ -253,7 +251,7 @@ def _numbers(motion: Motion, forward: bool, backward: bool, mass: float, spring:
     return Numbers(mass * ONE[MASS], tuple(sorted(free)), tied)
 
 
-def _unseen(windows: Windows) -> NDArray[np.bool_]:
+def _unseen(windows: Windows) -> Flags:
     """Every third window."""
     return np.asarray(np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1)
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TERMS: Final = 14  # of the exponential's series, enough for a norm of one half
 MOST_HALVINGS: Final = 60

@@ -8,15 +8,13 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.identify.joint.fit import Windows
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
 from zwidth.model.encoder_step import encoder_step
-
-Floats = NDArray[np.float64]
 
 MOST: Final = 300_000  # samples that are fitted or validated on; of a longer record sections all over it
 SECTIONS: Final = 48  # of a longer record
@@ -135,7 +133,7 @@ def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint:
     return Motion(tuple(sections), driven, name, reference, step, noise_of(sections))
 
 
-def planned_sections(runs: NDArray[np.int64], total: int) -> list[tuple[int, int, int]]:
+def planned_sections(runs: Ints, total: int) -> list[tuple[int, int, int]]:
     """First row, the one behind the last, and the stretch of each section that is kept of one record."""
     long = [(int(a), int(b), n) for n, (a, b) in enumerate(runs) if b - a >= FEWEST + BEFORE]
     if total <= MOST:

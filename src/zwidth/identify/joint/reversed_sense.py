@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags
 from zwidth.device.faults import comma_list
 from zwidth.identify.joint.fit import MASS, ONE, Numbers, Windows, explained, squares_of
 from zwidth.identify.joint.force_balance import ForceBalance, force_balance
@@ -97,14 +97,14 @@ def _explained(windows: Windows, motion: Motion, numbers: Numbers) -> float:
     return explained(windows, squares_of(windows, found, starts))
 
 
-def _some(which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _some(which: Flags) -> Flags:
     """Of these windows at most six, evenly spread."""
     places = np.flatnonzero(which)
     kept = places[np.unique(np.linspace(0, len(places) - 1, min(MOST, len(places))).astype(int))]
     return np.isin(np.arange(len(which)), kept)
 
 
-def groups_of(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, NDArray[np.bool_]]:
+def groups_of(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, Flags]:
     """Windows of each record, or of parts of a single one, by their names."""
     record_of_run = {one.run: one.record for one in motion.sections}
     owner = np.array([record_of_run[int(run)] for run in windows.run])

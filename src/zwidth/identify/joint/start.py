@@ -8,11 +8,9 @@ from itertools import islice
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.identify.joint.fit import MASS, STIFFNESS, Numbers, Windows, approach, bounded, predict, scales
-
-Floats = NDArray[np.float64]
 
 SHORTEST: Final = 12  # samples of a weighting function
 MOVING: Final = 0.7  # share of it that must be motion
@@ -63,9 +61,7 @@ def weighted_balance(
     return rows, np.stack(right, axis=1)
 
 
-def balance_rows(
-    windows: Windows, size: int, step: float, moving: float
-) -> tuple[Floats, NDArray[np.int64], Floats]:
+def balance_rows(windows: Windows, size: int, step: float, moving: float) -> tuple[Floats, Ints, Floats]:
     """The motion's side of `weighted_balance`: its rows (s, 5), their samples (s, size), and periods (s,) [s]."""
     weight, slope, bend = weighting(size)
     reach = max(size // 8, 1)

@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags
 from zwidth.identify.identification import Check
 from zwidth.identify.modes.local_response import LocalResponse
 from zwidth.identify.modes.stretches import Levels, Source
-
-Floats = NDArray[np.float64]
 
 UNLIKE: Final = 1.4  # ratio of the forces of two records that tell of the amplitude
 SURE: Final = 4.0  # standard deviations of the sum of squares by which responses differ
@@ -63,9 +61,7 @@ def amplitude_check(
     return Check("amplitude", False, reason, warning=True), smaller
 
 
-def _friction(
-    a: LocalResponse, b: LocalResponse, known: NDArray[np.bool_], force_a: float, force_b: float
-) -> float:
+def _friction(a: LocalResponse, b: LocalResponse, known: Flags, force_a: float, force_b: float) -> float:
     """Coulomb friction [N] by which two sine sweeps of unlike force differ, by least squares.
 
     |1/P_a| - |1/P_b| along the direction of i z^d:   Im (1/P_a - 1/P_b) = 4 f_c/pi (1/X_a - 1/X_b),  X = |P| F

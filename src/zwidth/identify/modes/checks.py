@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
 from zwidth.identify.modes.modal_fit import ModalFit
 from zwidth.identify.modes.spectra import Spectra
 from zwidth.identify.modes.stretches import Levels, Source
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 COUNTS: Final = 10.0  # steps of the encoder that a motion must have
 EXCITED: Final = 1e-6  # power of the force, over its largest, below which a line was not excited
@@ -88,7 +85,7 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
     return checks
 
 
-def excitation_check(spectra: Spectra, label: str) -> tuple[Check, NDArray[np.bool_]]:
+def excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
     """Which lines are excited, and whether they are enough."""
     power = spectra.power("force")
     excited = power > EXCITED * max(float(power.max(initial=0.0)), 1e-300)
@@ -103,7 +100,7 @@ def excitation_check(spectra: Spectra, label: str) -> tuple[Check, NDArray[np.bo
     return Check("excitation", True, reason), excited
 
 
-def coherence_check(spectra: Spectra, excited: NDArray[np.bool_], closed: bool) -> tuple[Check, float]:
+def coherence_check(spectra: Spectra, excited: Flags, closed: bool) -> tuple[Check, float]:
     """Above which frequency the coherence has collapsed for good [Hz], inf where it has not."""
     into = "reference" if closed else "force"
     coherence = np.where(excited, spectra.coherence(into, "position"), 0.0)
@@ -180,7 +177,7 @@ def feedback_check(force: Floats, position: Floats, period: float, free: bool) -
 
 
 def sign_and_unit_checks(
-    spectra: Spectra, excited: NDArray[np.bool_], value: Complexes, own: Complexes, turns: bool
+    spectra: Spectra, excited: Flags, value: Complexes, own: Complexes, turns: bool
 ) -> list[Check]:
     """The response against that of the device as its file has it: its sign, and whether the units are plausible.
 

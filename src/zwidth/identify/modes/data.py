@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes
 from zwidth.identify.modes.local_response import (
     Band,
     BandedRecord,
@@ -23,9 +23,6 @@ from zwidth.identify.modes.modal_fit import MOST_MODES, ModalFit, fit_modes
 from zwidth.identify.modes.overview import UNSEEN, Survey, peaks
 from zwidth.identify.modes.stretches import Source, Stretch
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 UNKNOWN: Final = 1024  # lines that are kept one by one as long as no poles are known
 SETTLED: Final = 1e-3  # of the distance of two lines, by which a pole may move between two rounds

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import fail
 from zwidth.identify.identification import Check, Identification, refused
@@ -53,8 +53,6 @@ from zwidth.model.encoder_step import encoder_step
 from zwidth.model.modes import undamped_modes
 from zwidth.progress import Progress
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Estimator = Literal["H1", "H2", "Hv", "joint"]
 Fitted = Literal["device", "modes"]
 
@@ -171,7 +169,7 @@ class _Seen:
     estimator: str
     value: Complexes
     coherence: Floats
-    excited: NDArray[np.bool_]
+    excited: Flags
     top: float
 
 

@@ -26,10 +26,8 @@ from typing import Final
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from zwidth.arrays import Complexes, Flags, Floats, Ints
 
 DEGREE, TRANSIENT = 4, 3  # of the polynomials in a band
 SMOOTH: Final = 6  # degree of the transient's where lines are single: noise falls with their number's fourth power
@@ -299,7 +297,7 @@ class Lines:
         """Angles 2 pi f T (n,)."""
         return 2.0 * np.pi * self.period * self.frequency
 
-    def where(self, kept: NDArray[np.bool_]) -> Lines:
+    def where(self, kept: Flags) -> Lines:
         """Some of the lines."""
         return Lines(
             self.frequency[kept], self.force[kept], self.position[kept], self.reference[kept], self.period
@@ -376,7 +374,7 @@ class LocalResponse:
         return self.target - self.apply(P)
 
     @cached_property
-    def _telling(self) -> NDArray[np.int64]:
+    def _telling(self) -> Ints:
         """Rows of the bands that say something: all but directions that nothing excited."""
         return np.flatnonzero(np.sum(np.abs(self.banded) ** 2, axis=2).ravel())
 

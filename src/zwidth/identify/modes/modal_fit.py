@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.identify.modes.local_response import LocalResponse
 from zwidth.identify.profile_likelihood import Fit, fit_least_squares
 from zwidth.loop.controller import split_delay
 from zwidth.loop.hold import held_row
 from zwidth.loop.loop import Loop
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Damping = Literal["viscous", "hysteretic"]
 
 RATIOS: Final = (0.005, 0.04, 0.3)  # damping ratios among which a further mode is looked for

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.device.faults import dotted, fail, quote
@@ -19,9 +19,6 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 MATRICES: Final = {
     "mass_kg": ("mass", "kg"),

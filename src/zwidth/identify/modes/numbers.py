@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.identify.identification import Estimate
@@ -17,8 +17,6 @@ from zwidth.identify.modes.modal_fit import ModalFit
 from zwidth.identify.modes.model import DELAYS, LAG, SampledModel
 from zwidth.identify.modes.physical_fit import PhysicalFit
 from zwidth.identify.profile_likelihood import Fit
-
-Floats = NDArray[np.float64]
 
 TOLD: Final = 100.0  # ratio of an interval's ends beyond which the data do not tell a number
 LARGEST: Final = 700.0  # of which the exponential is a number

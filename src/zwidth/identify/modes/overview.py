@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.identify.modes.periodic_force import period_of
 from zwidth.identify.modes.spectra import Spectra, averaged_spectra, merged, segment_length
 from zwidth.identify.modes.stretches import BLOCK, Levels, Source
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 UNSEEN: Final = 4  # a fourth of the data is for the validation
 COVERED: Final = 0.3  # share of a band's power that the fitted part must have

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.identify.modes.stretches import Source
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 SAME: Final = 1e-4  # power of the difference to a period before, over that of the force, that is none
 FEWEST_PERIODS: Final = 3

@@ -8,15 +8,13 @@ from itertools import product
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.modes.local_response import LocalResponse
 from zwidth.identify.modes.modal_fit import FOLDED, ModalFit
 from zwidth.identify.modes.model import SampledModel
 from zwidth.identify.profile_likelihood import Fit, fit_least_squares
 from zwidth.model.modes import undamped_modes
-
-Floats = NDArray[np.float64]
 
 HOPELESS: Final = 100.0  # times the number of residuals: where no modes explain them, no start does
 SPREAD: Final = np.log(6.0)  # about the file's numbers, within which a start is looked for

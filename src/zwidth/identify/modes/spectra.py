@@ -8,12 +8,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.identify.records.record import Piece
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 SHARED: Final = 1.0 / 36.0  # squared correlation of two Hann segments that share a half (Welch 1967)
 BATCH: Final = 1 << 21  # samples that are transformed at once

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling, joined
 from zwidth.loop.operating_point import OperatingPoint
-
-Floats = NDArray[np.float64]
 
 BLOCK: Final = 1 << 20  # samples that are transformed at once
 KEPT: Final = 1 << 21  # samples of all records that are kept in memory; longer ones are read again

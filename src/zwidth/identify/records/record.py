@@ -17,7 +17,6 @@ from zwidth.device.text_file import UnreadableFileError, decode, read_head
 from zwidth.identify.records.columns import Columns
 from zwidth.identify.records.table_copy import TableCopy, TableWriter
 
-Floats = NDArray[np.float64]
 Piece = dict[str, NDArray[Any]]  # columns of numbers, and those of words
 
 ROWS: Final = 500_000  # in a piece: 40 MB of a table of ten columns

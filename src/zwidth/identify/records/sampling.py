@@ -8,8 +8,8 @@ from itertools import chain
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
 from zwidth.identify.records.record import Piece, Record
@@ -38,7 +38,7 @@ class Sampling:
     jitter: float
     rows: int
     missing: int
-    runs: NDArray[np.int64]
+    runs: Ints
 
     @property
     def longest(self) -> int:
@@ -100,7 +100,7 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[Samplin
     if not usual > 0.0:
         what = "falls; sort the rows by rising time" if usual < 0.0 else f"stands still; {MORE_DIGITS}"
         return failed(f"time_s of {record.label} {what}")
-    row, missing, uneven, sums, runs = 0, 0, 0, np.zeros(3), list[NDArray[np.int64]]()
+    row, missing, uneven, sums, runs = 0, 0, 0, np.zeros(3), list[Ints]()
     last, last_whole, first_uneven = np.nan, False, -1
     for piece in chain([first], pieces):
         time = np.append(last, piece["time_s"])
@@ -163,7 +163,7 @@ def unit_of_time(ratio: float) -> str:
     return ""
 
 
-def _usual_step(time: NDArray[np.float64]) -> float:
+def _usual_step(time: Floats) -> float:
     """The mean of the steps that are like the median one [s]: the period to the stamps' last digit."""
     steps = np.diff(time[np.isfinite(time)])
     middle = float(np.median(steps)) if len(steps) else 0.0

@@ -10,6 +10,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Ints
+
 IN_MEMORY: Final = 4_000_000  # bytes up to which there is no file
 CELL: Final = 8  # bytes
 MOST_WORDS: Final = 100  # distinct ones in a column; states and joints are fewer
@@ -81,7 +83,7 @@ class TableWriter:
         words = {name: list(known) for name, known in self._places.items()}
         return None if stream is None else TableCopy(stream, self._names, words, self._rows)
 
-    def _numbers(self, name: str, values: NDArray[Any]) -> NDArray[np.int64]:
+    def _numbers(self, name: str, values: NDArray[Any]) -> Ints:
         """Places of words in the list, new ones put at its end, as long as they are few."""
         known = self._places[name]
         places = np.full(len(values), -1)

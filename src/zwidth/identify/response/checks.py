@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device.device import Device
 from zwidth.identify.identification import Check
 from zwidth.identify.modes.checks import FACTORS_LINEAR, NEAR, flip_check, order_check
 from zwidth.identify.modes.model import sampled_response
 from zwidth.model.response import LEAST_COHERENCE, Response
-
-Floats = NDArray[np.float64]
 
 FEWEST: Final = 8  # coherent frequencies
 ALIKE: Final = 0.8  # share of them at which the response must be off by the same factor
@@ -55,7 +53,7 @@ def _copies(responses: Sequence[Response], labels: Sequence[str]) -> list[Check]
     return []
 
 
-def _coherent(response: Response) -> NDArray[np.bool_]:
+def _coherent(response: Response) -> Flags:
     assert response.coherence is not None
     return (response.coherence >= LEAST_COHERENCE) & (np.abs(response.value) > 0.0) & (response.frequency > 0.0)
 

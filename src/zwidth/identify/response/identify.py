@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.hidden_walls import hidden_walls
 from zwidth.device.device import Device
@@ -24,8 +24,6 @@ from zwidth.loop.controller import Controller
 from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
 from zwidth.model.sweep_response import block_length, sweep_response_of_blocks
 from zwidth.progress import Progress
-
-Floats = NDArray[np.float64]
 
 FORCES: Final = ("force_command_N", "force_N")
 COLUMNS: Final = Columns(("time_s", FORCES, "position_m"))

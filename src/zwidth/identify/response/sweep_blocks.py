@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
 from zwidth.model.encoder_step import encoder_step
-
-Floats = NDArray[np.float64]
 
 FIRST: Final = 2**20  # samples from which the encoder's step is read
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.identify.excitation import shared_power
 from zwidth.identify.response.sweep_blocks import SweepBlocks
-
-Floats = NDArray[np.float64]
 
 SEGMENTS: Final = 8  # in the shorter part, whose spectra are averaged
 

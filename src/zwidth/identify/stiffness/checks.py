@@ -8,8 +8,8 @@ from math import pi
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
 from zwidth.identify.stiffness.strokes import (
@@ -21,8 +21,6 @@ from zwidth.identify.stiffness.strokes import (
     strokes_of,
     without_spikes,
 )
-
-Floats = NDArray[np.float64]
 
 FEWEST_ROWS: Final = 8
 FEWEST_COUNTS: Final = 10.0  # of the angle's range
@@ -58,7 +56,7 @@ class Run:
     angle: Floats
     together: int = 1
     left_out: int = 0
-    kept: NDArray[np.bool_] = field(init=False)
+    kept: Flags = field(init=False)
 
     def __post_init__(self) -> None:
         good = np.ones(len(self.angle), dtype=bool)

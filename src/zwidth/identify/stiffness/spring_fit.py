@@ -20,11 +20,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.identify.stiffness.strokes import Resolution, Strokes
-
-Floats = NDArray[np.float64]
 
 BASE: Final = ("forward", "backward", "rest", "friction")
 EXTENSIONS: Final = ("hardening", "play", "preload", "load", "reversal", "angle drift", "torque drift")
@@ -58,7 +56,7 @@ class SpringFit:
     covariance: Floats
     freedom: int
     residuals: Floats
-    outliers: NDArray[np.bool_]
+    outliers: Flags
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
@@ -126,7 +124,7 @@ def fit_spring(strokes: Strokes, resolution: Resolution, both_sides: bool) -> Sp
 
 
 def _best_extension(
-    fit: SpringFit, strokes: Strokes, resolution: Resolution, kept: NDArray[np.bool_], both_sides: bool
+    fit: SpringFit, strokes: Strokes, resolution: Resolution, kept: Flags, both_sides: bool
 ) -> SpringFit | None:
     """The fit with one more parameter that brings most, of those that differ from zero; None if none does."""
     best, least = None, float(np.sum(fit.residuals[kept] ** 2))
@@ -166,7 +164,7 @@ def _elastic(x: dict[str, float], d: Floats, reach: Floats | float = 0.0) -> Flo
     return np.asarray(forward * above + backward * below + x.get("hardening", 0.0) * (d**3 + d * reach**2))
 
 
-def _across_kink(fit: SpringFit, strokes: Strokes) -> NDArray[np.bool_]:
+def _across_kink(fit: SpringFit, strokes: Strokes) -> Flags:
     """Bins (n,) of several readings over a kink of the fitted spring, whose mean torque is not that of their mean
     angle."""
     half = 0.5 * fit["play"]
@@ -237,7 +235,7 @@ def _fit(
     names: tuple[str, ...],
     strokes: Strokes,
     resolution: Resolution,
-    kept: NDArray[np.bool_],
+    kept: Flags,
     before: SpringFit | None = None,
 ) -> SpringFit:
     """Least squares over the kept bins. Play, friction by the load and the way of a reversal are not negative."""
@@ -301,7 +299,7 @@ def _rounding(pseudo: Floats, strokes: Strokes, resolution: Resolution) -> Float
     return np.asarray(parts.T @ parts)
 
 
-def _clusters(strokes: Strokes) -> NDArray[np.int64]:
+def _clusters(strokes: Strokes) -> Ints:
     """A number (n,) for each bin: bins of one cluster are not independent. Strokes, cut where they are few."""
     _, stroke = np.unique(strokes.stroke, return_inverse=True)
     count = int(stroke.max()) + 1
@@ -315,7 +313,7 @@ def _clusters(strokes: Strokes) -> NDArray[np.int64]:
     return np.unique(label, return_inverse=True)[1]
 
 
-def _outliers(residuals: Floats, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _outliers(residuals: Floats, kept: Flags) -> Flags:
     """Kept bins that lie far from all others; none where they are many, since then the model is wrong."""
     middle = float(np.median(residuals[kept]))
     spread = 1.4826 * float(np.median(np.abs(residuals[kept] - middle)))

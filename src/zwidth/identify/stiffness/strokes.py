@@ -12,11 +12,9 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.model.encoder_step import encoder_step
-
-Floats = NDArray[np.float64]
 
 BINS: Final = 24  # of a stroke
 FEWEST_BINS: Final = 6  # of a stroke: bins across the kink at 0 are left out, and others must remain
@@ -59,9 +57,9 @@ class Strokes:
     reach: Floats
     samples: Floats
     sign: Floats
-    stroke: NDArray[np.int64]
+    stroke: Ints
     time: Floats
-    run: NDArray[np.int64]
+    run: Ints
     since: Floats
 
     @property
@@ -69,7 +67,7 @@ class Strokes:
         """Number of strokes."""
         return len(np.unique(self.stroke))
 
-    def select(self, which: NDArray[np.bool_]) -> Strokes:
+    def select(self, which: Flags) -> Strokes:
         """Some of the bins."""
         return Strokes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
@@ -86,7 +84,7 @@ def resolution_of(values: Floats, known_step: float = 0.0) -> Resolution:
     return Resolution(step, noise)
 
 
-def without_spikes(values: Floats, resolution: Resolution) -> NDArray[np.bool_]:
+def without_spikes(values: Floats, resolution: Resolution) -> Flags:
     """Which readings (n,) are no spikes: single ones far from the middle of five neighbours."""
     if len(values) < 5:
         return np.ones(len(values), dtype=bool)
@@ -151,7 +149,7 @@ def strokes_of(torque: Floats, angle: Floats, resolution: Resolution, run: int =
     return Strokes(torques, angles, reaches, samples, signs, whole[0], places, whole[1], since)
 
 
-def _moving(torque: Floats, angle: Floats, stuck: float) -> NDArray[np.int64]:
+def _moving(torque: Floats, angle: Floats, stuck: float) -> Ints:
     """Rows of a rising stroke (n,) in which the shaft moves: from where it has left its turning point by more than
     `stuck` up to the largest torque, behind which friction holds it again.
 

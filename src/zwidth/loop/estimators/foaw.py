@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.estimator import Estimator, NonlinearError
 from zwidth.loop.estimators.parameter_checks import check_period, check_positive, check_whole
 
-Floats = NDArray[np.float64]
 Fit = Literal["end-fit", "best-fit"]
 
 # Longest window in periods: a best fit over n looks at n^2/2 distances in every sample.

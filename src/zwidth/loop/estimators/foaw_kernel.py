@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from math import inf
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.loop.estimators.foaw import COUNT, ORIGIN, RING, ROUNDING_MARGIN
-
-Floats = NDArray[np.float64]
 
 
 @compiled

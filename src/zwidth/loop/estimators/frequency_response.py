@@ -10,21 +10,19 @@ is the estimator's gain and, by its phase phi, how late it is: tau(f) = -phi(f) 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators import VelocityMethod
 from zwidth.loop.factor_response import window_response
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Points of the phase's trace per sample of the window; a lone zero turns the phase by less than half a turn from
 # one to the next, however near to the unit circle it is.
 POINTS = 64
 
 
-def relative_response(method: VelocityMethod | Estimator, period: float, frequency_Hz: ArrayLike) -> Complex:
+def relative_response(method: VelocityMethod | Estimator, period: float, frequency_Hz: ArrayLike) -> Complexes:
     """The estimate per true velocity, R = w(e^{s T})/s.
 
     method        a velocity estimator, or its factors at this period
@@ -103,13 +101,13 @@ def _factors_and_angles(
     return estimator, np.asarray(np.pi * np.minimum(share, 1.0))
 
 
-def _distance(angle: Floats) -> Complex:
+def _distance(angle: Floats) -> Complexes:
     """d = e^{i theta} - 1, without cancellation."""
     half = np.sin(0.5 * angle)
     return np.asarray(2j * half * np.exp(0.5j * angle))
 
 
-def _difference_quotient(angle: Floats) -> Complex:
+def _difference_quotient(angle: Floats) -> Complexes:
     """d / (i theta)."""
     return np.asarray(np.sinc(angle / (2.0 * np.pi)) * np.exp(0.5j * angle))
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.estimator import Estimator, NonlinearError
 from zwidth.loop.estimators.parameter_checks import check_period, check_positive
-
-Floats = NDArray[np.float64]
 
 # What the memory holds: the number of readings, the first of them, and the two states.
 COUNT, ORIGIN, POSITION, VELOCITY = 0, 1, 2, 3

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from math import copysign, sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.loop.estimators.levant import COUNT, ORIGIN, POSITION, VELOCITY
-
-Floats = NDArray[np.float64]
 
 
 @compiled

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators import Foaw, Levant, VelocityMethod
@@ -12,8 +13,6 @@ from zwidth.loop.estimators.foaw_kernel import foaw_estimate
 from zwidth.loop.estimators.levant_kernel import levant_estimate
 from zwidth.loop.estimators.parameter_checks import check_period
 from zwidth.model.argument_checks import wrong_type
-
-Floats = NDArray[np.float64]
 
 
 def velocity_of(method: VelocityMethod | Estimator, positions: ArrayLike, period: float) -> Floats:

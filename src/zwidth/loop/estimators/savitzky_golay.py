@@ -9,13 +9,10 @@ from itertools import accumulate
 from math import factorial, lcm
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.parameter_checks import LONGEST, check_whole
 from zwidth.loop.estimators.window import mean_difference
-
-Floats = NDArray[np.float64]
 
 # Highest degree. Through eleven positions, the fewest for degree 10, the slope at the newest passes 67 times the
 # noise that the backward difference does.

@@ -15,13 +15,11 @@ the weights' mean age, and the white noise of the position is multiplied by the 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.parameter_checks import check_period
 from zwidth.model.design_axes import stack_numbers
-
-Floats = NDArray[np.float64]
 
 
 def mean_difference(weights: Floats, period: float) -> Estimator:

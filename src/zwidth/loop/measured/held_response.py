@@ -18,15 +18,11 @@ from typing import Final
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.loop.measured.measured_port import MeasuredPort, measured_port
 from zwidth.model.operator import Operator, OperatorError
 from zwidth.model.response import Response
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 
 NODES: Final = 16  # angles at which the aliases beyond the nearest are summed; they vary little
 FAR: Final = 1500  # aliases to either side

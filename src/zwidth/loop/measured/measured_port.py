@@ -19,8 +19,8 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.measured.modal_terms import hold_response
 from zwidth.loop.measured.pole_fit import PathData, PoleModel, fit_poles
 from zwidth.model.response import (
@@ -33,9 +33,6 @@ from zwidth.model.response import (
     integrators_of,
     relative_error,
 )
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 SMALL: Final = 0.02  # a value below this share of its neighbours' counts as if it had that size
 SUREST: Final = 1e-6  # relative deviation below which no value is believed

@@ -5,10 +5,8 @@ from __future__ import annotations
 from math import floor
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from zwidth.arrays import Complexes, Floats
 
 
 def hold_response(theta: Floats, delay: float) -> Complexes:

@@ -13,16 +13,13 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.measured.measured_port import path_data
 from zwidth.loop.measured.modal_terms import continuous_terms, sampled_free_mass, sampled_terms
 from zwidth.loop.measured.pole_fit import PATHS, PathData, PoleModel, fit_poles, mode_atoms, stacked
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response, ResponseError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 POINTS: Final = 250  # frequencies to which a plant is fitted
 STEPS: Final = 300  # of the search

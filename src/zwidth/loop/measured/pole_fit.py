@@ -12,17 +12,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.loop.measured.modal_terms import (
     continuous_terms,
     hold_response,
     sampled_free_mass,
     sampled_terms,
 )
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # The paths of a device by output and input: what is read at the sensor s or the handle h, of a command or actuator
 # a, or of a force at the handle h.

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures import dexterity
-from zwidth.model.mechanism import ORIENTATION, Floats
+from zwidth.model.mechanism import ORIENTATION
 
 
 def manipulability(point: OperatingPoint) -> Floats:

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
@@ -30,7 +30,6 @@ from zwidth.measures.evaluate import complete_charts, complete_pointwise
 from zwidth.measures.handle_motion import HandleMotion
 from zwidth.model.plant_modes import plant_modes
 
-Floats = NDArray[np.float64]
 Index = tuple[int, ...]
 
 HAND: Final = "a frequency at which the hand moves"

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures import forces
 from zwidth.measures.bindings.preconditions import numbers_of
 from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
-from zwidth.model.mechanism import Floats
 
 
 def peak_force(point: OperatingPoint) -> Floats:

@@ -7,13 +7,14 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_errors import NoMechanismError
 from zwidth.measures import geometry
 from zwidth.measures.bindings.dexterity import jacobian_by_drives
 from zwidth.measures.bindings.preconditions import numbers_of
 from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
-from zwidth.model.mechanism import POSE, Floats, Mechanism
+from zwidth.model.mechanism import POSE, Mechanism
 from zwidth.model.posture import Posture
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
@@ -16,7 +15,6 @@ from zwidth.measures.bindings.preconditions import numbers_of
 from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
 from zwidth.measures.evaluate import complete_charts, complete_pointwise, evaluate_pointwise
 
-Floats = NDArray[np.float64]
 Index = tuple[int, ...]
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.edge_memory import DOUBTFUL
 from zwidth.chart.wall_margins import delays_within, stiffness_with_margins, stiffness_with_margins_alone
 from zwidth.loop.loop import Loop
@@ -18,7 +19,6 @@ from zwidth.measures.bindings.preconditions import numbers_of
 from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
 from zwidth.measures.evaluate import complete_charts, complete_pointwise
 
-Floats = NDArray[np.float64]
 Index = tuple[int, ...]
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable with these margins"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, WALL_ALONE, ConditionCase, case_of
 from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.inertia_share import with_inertia_of
@@ -17,8 +17,6 @@ from zwidth.measures.handle_impedance import HandleError, handle_of
 from zwidth.measures.wanted import WANTED_BY_NAME
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
-
-Floats = NDArray[np.float64]
 
 # One mass in place of a mechanism, where only the computer matters.
 UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(1))

@@ -6,8 +6,8 @@ See `measures.vibration_decay` for the formulas. Stability is that of the device
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.point_radii import radii_at_points
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, Verdicts, judge
 from zwidth.loop.operating_point import OperatingPoint
@@ -16,7 +16,6 @@ from zwidth.measures.bindings.preconditions import walls_of
 from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
 from zwidth.measures.evaluate import complete_pointwise
 
-Floats = NDArray[np.float64]
 Index = tuple[int, ...]
 
 

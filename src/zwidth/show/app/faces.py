@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.nyquist import terms_along
 from zwidth.chart.verdict import eigenvalues
@@ -17,7 +16,6 @@ from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.show.app.request import Wall
 
-Floats = NDArray[np.float64]
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
 LOWEST: Final = 1e-3  # rad, of the angles at which the Nyquist plot is computed

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
@@ -24,7 +24,6 @@ from zwidth.show.mass_chain import MassChain, as_chain
 from zwidth.show.mechanism_scene import mechanism_scene, stays_in_plane
 from zwidth.show.scene_rates import mode_strokes
 
-Floats = NDArray[np.float64]
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
 Layer = Callable[[OperatingPoint, Any, State, Device], Contents]

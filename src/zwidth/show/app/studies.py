@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.contact_simulation import ContactSimulation
 from zwidth.contact.engine_arrays import ACTUATOR, CONTROLLER, ESTIMATE, HOLD, QUANTISER, WALL
 from zwidth.progress import Progress
@@ -122,7 +122,7 @@ def contact(opened: OpenedDevices, request: ContactRequest, progress: Progress) 
     return {**document, "touch": blocks, "scene": still}, arrays
 
 
-def _made_by_wall(contact: ContactSimulation) -> NDArray[np.float64]:
+def _made_by_wall(contact: ContactSimulation) -> Floats:
     """Energy that the wall has made since the start, at each sample [J]; negative: taken out.
 
     What it gave to the device, less what its spring had stored at the start and has not now: an ideal spring makes
@@ -133,7 +133,7 @@ def _made_by_wall(contact: ContactSimulation) -> NDArray[np.float64]:
     if contact.environment.name == "one-sided":
         depth = np.maximum(depth, 0.0)
     stored = 0.5 * contact.parameters["stiffness"] * depth**2
-    made: NDArray[np.float64] = given + stored - stored[0]
+    made: Floats = given + stored - stored[0]
     return made
 
 

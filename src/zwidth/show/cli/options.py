@@ -15,13 +15,10 @@ from zwidth.show.circumstances import AS_GIVEN
 from zwidth.study.boundary.points_file import wall_number
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from zwidth.arrays import Floats
     from zwidth.device.device import Device
     from zwidth.loop.operating_point import OperatingPoint
 
-    Floats = NDArray[np.float64]
     ParamType = click.ParamType[Any]
 else:
     ParamType = click.ParamType  # generic in newer releases only

@@ -12,15 +12,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart
 from zwidth.conditions import Bound
 from zwidth.show.figures.stability import frame
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, fitted_columns
 from zwidth.show.units import quantity
-
-Floats = NDArray[np.float64]
 
 DAMPINGS: Final = 1001  # at which each line is computed
 ALIKE: Final = 0.02  # share of the view by which two lines differ that are drawn as one

@@ -12,11 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.ticker import FixedLocator, MaxNLocator
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.show.units import MINUS, as_written, exponent_of, scaled
-
-Floats = NDArray[np.float64]
 
 COLOURS: Final = "cividis"  # even steps of lightness, the same to every eye
 LEVELS: Final = 10

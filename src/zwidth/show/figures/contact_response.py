@@ -9,14 +9,12 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.time_response import SOURCES, TimeResponse
 from zwidth.show.energies import energy_label
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
 from zwidth.show.units import quantity
-
-Floats = NDArray[np.float64]
 
 LONGEST_LINE: Final = 6000  # samples drawn as lines; above, what they sweep over is drawn instead
 BETWEEN: Final = 4  # points of the handle's line for each of these

@@ -6,13 +6,11 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.loop.estimators import VelocityMethod
 from zwidth.loop.estimators.frequency_response import phase_delay, relative_response
 from zwidth.show.figures.style import GREY, LINES, label, legend_above
-
-Floats = NDArray[np.float64]
 
 # One line more than other figures have: so many methods are compared at once.
 STYLES = (*LINES, (GREY, "-"))

@@ -7,8 +7,8 @@ from math import isfinite
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
+from zwidth.arrays import Complexes, Floats
 from zwidth.measures.felt import LIMIT_HEADINGS
 from zwidth.measures.felt_chart import FeltChart
 from zwidth.show.figures.style import (
@@ -27,10 +27,10 @@ from zwidth.show.units import quantity
 
 def draw_impedance(
     ax: Axes,
-    frequency: NDArray[np.float64],
-    felt: NDArray[np.complex128],
-    commanded: NDArray[np.complex128],
-    free_motion: NDArray[np.complex128],
+    frequency: Floats,
+    felt: Complexes,
+    commanded: Complexes,
+    free_motion: Complexes,
 ) -> None:
     """Magnitudes of the felt, the commanded and the free-motion impedance over frequency, both axes logarithmic.
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.friction_quantisation_plane import DevicePlane
 from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle
 from zwidth.contact.limit_cycle_prediction import LimitCycleAnswer, LimitCyclePrediction
@@ -75,7 +75,7 @@ def draw_balance(ax: Axes, balance: HarmonicBalance, answers: Sequence[LimitCycl
     legend_above(ax)
 
 
-def _scale_growth(ax: Axes, visible: NDArray[np.float64], *, crossings: bool) -> None:
+def _scale_growth(ax: Axes, visible: Floats, *, crossings: bool) -> None:
     """Linear where the growth rates that are seen differ little, else logarithmic on both sides of zero.
 
     crossings  does the line cross zero, near which the rates are small?

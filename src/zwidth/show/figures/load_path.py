@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.rings import window_of
 from zwidth.chart.tracer import tracer_of
@@ -31,8 +31,6 @@ from zwidth.show.figures.style import (
 from zwidth.show.moment_units import spoken_unit
 from zwidth.show.units import as_written, quantity
 from zwidth.study.load.load_path import LoadPath, PushedChart
-
-Floats = NDArray[np.float64]
 
 # From blue over black to vermilion: the farther from no push the lighter, either side in its own colour.
 COLOURS: Final = LinearSegmentedColormap.from_list(

@@ -14,6 +14,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.measures.definition import (
     BEYOND_LIMIT,
     FAILED,
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.study.workspace.common_area import CommonArea
 
-Floats = NDArray[np.float64]
 ProjectedMechanism = tuple[list[Floats], Floats, Floats]  # strokes of the links, joints, handle
 
 MARKS: Final = {
@@ -198,7 +198,7 @@ def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
     return [drawn]
 
 
-def _spaced_indices(x: Floats, apart: float) -> NDArray[np.int64]:
+def _spaced_indices(x: Floats, apart: float) -> Ints:
     """Indices of coordinates about so far apart."""
     step = max(1, round(apart / float(x[1] - x[0])))
     return np.arange(min(step // 2, len(x) - 1), len(x), step)

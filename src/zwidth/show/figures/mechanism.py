@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import withStroke
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.model.posture import Posture
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, label, legend_beside
 from zwidth.show.mechanism_scene import SAME_POINT, MechanismScene, mechanism_scene
 from zwidth.show.units import quantity
 
-Floats = NDArray[np.float64]
 AXES = "xyz"
 # Where x, y and z go in the picture of a spatial mechanism, (2, 3): it is looked at from the right and above.
 TURNED, TILTED = np.radians(35.0), np.radians(22.0)

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.contact.mechanism.motion import MechanismMotion
 from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_normal
 from zwidth.model.mechanism import Mechanism
@@ -21,8 +21,6 @@ from zwidth.show.figures.mechanism import AXES
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
 from zwidth.show.mechanism_scene import drawn_links, joint_points, link_stroke, projection_axes
 from zwidth.show.units import quantity
-
-Floats = NDArray[np.float64]
 
 WALL: Final = "#E3E3E3"
 GRID: Final = 801  # points across a drawing at which a surface's depth is computed

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.show.figures.style import (
     BLUE,
     GREEN,
@@ -26,8 +26,6 @@ from zwidth.show.units import printed
 from zwidth.study.designs.column import Column
 from zwidth.study.optimise.front import undominated
 from zwidth.study.optimise.optimisation import Optimisation
-
-Floats = NDArray[np.float64]
 
 MOST_PANELS: Final = 3  # pairs of objectives that are drawn
 MOST_POINTS: Final = 4000  # designs that are drawn of those tried; a vector file holds each of them

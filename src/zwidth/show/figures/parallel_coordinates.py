@@ -13,6 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.ticker import LogLocator, MaxNLocator
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.measures.definition import OK
 from zwidth.show.figures.colour_bands import COLOURS, WIDE
 from zwidth.show.figures.style import BLACK, VERMILION
@@ -21,7 +22,6 @@ from zwidth.show.units import MINUS, exponent_of, printed, scaled
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 
 DARKEST: Final = 0.9  # of the colours' scale: its light end looks like paper
 LETTERS: Final = 17

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from zwidth.model.plant import Plant
 from zwidth.show.figures.style import BLACK, GREY, VERMILION
 from zwidth.show.mass_chain import MassChain
 from zwidth.show.units import as_written
 
-Floats = NDArray[np.float64]
 WIDTH, GAP, HALF = 1.2, 1.6, 0.55  # of a mass, between masses, half the height of a mass
 
 

@@ -8,14 +8,12 @@ from math import isnan
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.measured.chart import MeasuredChart
 from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, draw_empty, label, legend_above
 from zwidth.show.units import quantity
-
-Floats = NDArray[np.float64]
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
 Window = tuple[float, float, float, float]

@@ -16,6 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import AutoLocator, MaxNLocator
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.measures.definition import (
     BEYOND_LIMIT,
     FAILED,
@@ -36,7 +37,6 @@ from zwidth.show.units import printed, quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 
 SYMBOLS: Final = {
     OUT_OF_REACH: "x",

@@ -12,7 +12,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
 
 from zwidth.show.figures.stability import edges_of, frame
 from zwidth.show.figures.style import BLACK, BLUE, TICK_SIZE, VERMILION, context, draw_empty, label, legend_above
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from zwidth.study.tolerances.intervals import Interval
     from zwidth.study.tolerances.result import ToleranceStudy
 
-Floats = NDArray[np.float64]
 
 # From the rarest walls to the likeliest: light to dark, which a grey print and any colour vision tell apart.
 LIGHTEST: Final = np.array([0.86, 0.92, 0.96])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.conditions import Bound
@@ -16,7 +17,6 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.unobserved_instability import unobserved_instability
 from zwidth.measures.felt_chart import FeltChart, felt_chart
 from zwidth.model.effective_parameters import EffectiveParameters
-from zwidth.model.mechanism import Floats
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
 from zwidth.study.load.bending import Bending, bending

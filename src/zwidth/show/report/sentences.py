@@ -14,11 +14,11 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.chart.decay import FastestDecay
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference
 from zwidth.loop.motion_names import listed_names
-from zwidth.model.mechanism import Floats
 from zwidth.show.circumstances import load_text
 from zwidth.show.figures.decay import tenfold_time
 from zwidth.show.moment_units import speaks_of_moments

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_crossings import EdgeKind, exact_edge
@@ -45,8 +45,6 @@ from zwidth.study.boundary.experiment_plan import Plan
 from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint
 from zwidth.study.boundary.user_points import UserPoint, compare_points
 from zwidth.study.jobs.journal import Journal, fingerprint
-
-Floats = NDArray[np.float64]
 
 EXPLAINED: Final = 3  # number of stiffnesses at which the edges are measured again to find causes
 STEPS: Final = 3.0  # encoder steps: a vibration of this amplitude is just visible

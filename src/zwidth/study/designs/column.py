@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import comma_list, nearest
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import FAILED, NO_VALUE, OK, Better, Measure, MeasureValues
@@ -91,7 +91,7 @@ class Column:
         self,
         values: MeasureValues,
         point: Callable[[], OperatingPoint],
-        weights: NDArray[np.float64] | None = None,
+        weights: Floats | None = None,
     ) -> tuple[float, int, str]:
         """Value, status and reason of a design, from the measure's values over its workspace.
 

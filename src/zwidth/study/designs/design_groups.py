@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.device import address
 from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
 from zwidth.device.faults import DeviceError, KeyPath
@@ -19,7 +19,7 @@ from zwidth.device.load import check
 from zwidth.device.operator_choice import with_operator
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
 
-Rows = NDArray[np.int64]
+Rows = Ints
 
 
 class DesignColumn(NamedTuple):
@@ -48,8 +48,8 @@ class DesignGroup:
 
     rows: Rows
     batch: DesignBatch
-    valid: NDArray[np.bool_]
-    positions: NDArray[np.float64] | None
+    valid: Flags
+    positions: Floats | None
     chosen: dict[str, Any]
 
 
@@ -82,7 +82,7 @@ class DesignGrouping:
             if group is not None:
                 yield group
 
-    def _kinds(self, key: str, values: Sequence[Any]) -> tuple[NDArray[np.int64], Sequence[Any]]:
+    def _kinds(self, key: str, values: Sequence[Any]) -> tuple[Ints, Sequence[Any]]:
         """A number for each value that stands for its kind, and the kinds by these numbers: what must be alike in
         designs that are built together."""
         steps = self._path(key)

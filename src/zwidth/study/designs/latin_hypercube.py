@@ -18,6 +18,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
+
 ROUNDS: Final = 10  # of the network; four make it random for large n, small n need more
 FEW: Final = 4096  # designs that are put in order
 BLOCK: Final = 1024  # designs that are computed at once where one is asked for
@@ -27,7 +29,7 @@ _BELOW_ONE: Final = float(np.nextafter(1.0, 0.0))
 Words = NDArray[np.uint64]
 
 
-def shares(seed: int, axis: int, size: int, first: int, last: int) -> NDArray[np.float64]:
+def shares(seed: int, axis: int, size: int, first: int, last: int) -> Floats:
     """How far along an axis designs first to last - 1 lie, from 0 to below 1, (last - first,).
 
     seed  of the random numbers;   axis  number of the axis;   size  number of all designs
@@ -50,7 +52,7 @@ def share(seed: int, axis: int, size: int, design: int) -> float:
 
 
 @lru_cache(maxsize=64)
-def _block(seed: int, axis: int, size: int, number: int) -> NDArray[np.float64]:
+def _block(seed: int, axis: int, size: int, number: int) -> Floats:
     return shares(seed, axis, size, number * BLOCK, min((number + 1) * BLOCK, size))
 
 
@@ -60,7 +62,7 @@ def _keys(seed: int, axis: int) -> Words:
 
 
 @lru_cache(maxsize=64)
-def _ordered(seed: int, axis: int, size: int) -> NDArray[np.int64]:
+def _ordered(seed: int, axis: int, size: int) -> Ints:
     """A permutation of the numbers below `size`, by sorting."""
     hashes = _hash(np.arange(size, dtype=np.uint64) * _GAMMA + _keys(seed, axis)[0])
     return np.argsort(hashes, kind="stable")

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from zwidth.arrays import Flags, Floats
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import Measure
 
@@ -32,7 +33,7 @@ class Requirement:
         """The requirement as a user types it: "stiffness_max>=5000"."""
         return f"{self.measure.name}{'>=' if self.at_least else '<='}{self.value:g}"
 
-    def margin(self, values: ArrayLike) -> NDArray[np.float64]:
+    def margin(self, values: ArrayLike) -> Floats:
         """Margin by which values meet the bound, in the measure's unit; negative where they do not.
 
         >>> from zwidth.measures.catalogue import MEASURES
@@ -42,7 +43,7 @@ class Requirement:
         beyond = np.asarray(values, dtype=np.float64) - self.value
         return beyond if self.at_least else -beyond
 
-    def met(self, values: ArrayLike) -> NDArray[np.bool_]:
+    def met(self, values: ArrayLike) -> Flags:
         """Which values meet the bound; nan does not."""
         with np.errstate(invalid="ignore"):
             return np.asarray(self.margin(values) >= 0.0)

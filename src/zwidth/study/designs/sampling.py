@@ -8,8 +8,8 @@ from math import exp, log, prod
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.measures.wanted import WANTED_BY_KEY
 from zwidth.study.designs.catalogue import Part
 from zwidth.study.designs.latin_hypercube import share, shares
@@ -111,7 +111,7 @@ class Axis:
             return float(min(max(exp(log(low) + share * (log(high) - log(low))), low), high))
         return float(min(low + share * (high - low), high))
 
-    def values_at(self, shares: NDArray[np.float64]) -> list[Any]:
+    def values_at(self, shares: Floats) -> list[Any]:
         """The values at many shares, the same as of `at`.
 
         >>> Axis("a", (), (1.0, 3.0)).values_at(np.array([0.0, 0.5]))
@@ -184,7 +184,7 @@ class Sampling:
         steps = np.unravel_index(design, self.shape)
         return tuple(axis.values[int(step)] for axis, step in zip(self.axes, steps, strict=True))
 
-    def columns(self, first: int, last: int) -> list[tuple[Axis, Sequence[Any], NDArray[np.int64]]]:
+    def columns(self, first: int, last: int) -> list[tuple[Axis, Sequence[Any], Ints]]:
         """Of designs first to last - 1: each axis, values along it, and at which of them each design is.
 
         >>> Sampling((Axis("a", (1, 2)), Axis("b", ("x", "y", "z")))).columns(2, 5)[0][1:]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.compiled_mechanism_check import masses_moved
 from zwidth.device.device import Device
@@ -51,7 +52,7 @@ from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.workspace.workspace_summary import areas
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
 Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
@@ -97,10 +98,10 @@ class SweepJob:
     operators: dict[str, Any]
     sampling: Sampling
     columns: tuple[Column, ...]
-    positions: NDArray[np.float64] | None
-    weights: NDArray[np.float64] | None
+    positions: Floats | None
+    weights: Floats | None
     fixed_circumstances: dict[str, Any]
-    directions: NDArray[np.float64] | None = None
+    directions: Floats | None = None
     complete: bool = False
     cells: bool = False
     _cache: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
@@ -226,7 +227,7 @@ class SweepJob:
                         if one is not None:
                             yield int(row), column, one
 
-    def points_together(self, first: int, last: int) -> Iterator[tuple[NDArray[np.int64], OperatingPoint]]:
+    def points_together(self, first: int, last: int) -> Iterator[tuple[Ints, OperatingPoint]]:
         """Designs first to last - 1 that are built together at the handle's position: their numbers from `first`
         (P,), and their points (P,). The others are to be built alone (`point_alone`)."""
         for group in self._grouping.groups(list(self._design_columns(first, last))):
@@ -249,9 +250,7 @@ class SweepJob:
         except _NoPoint as none:
             return none.status, none.reason
 
-    def _measured(
-        self, one: Column, point: OperatingPoint, designs: NDArray[np.int64], same: bool
-    ) -> Iterator[Found | None]:
+    def _measured(self, one: Column, point: OperatingPoint, designs: Ints, same: bool) -> Iterator[Found | None]:
         """Value, status and reason of a column for each of several designs; None for one to be asked for alone.
 
         point  of all designs along its first axis; `same`: one for all
@@ -313,7 +312,7 @@ class SweepJob:
         except MeasureError as error:
             return np.nan, NO_VALUE, error.spelled(as_key)
 
-    def _walls(self, designs: NDArray[np.int64], point: OperatingPoint) -> WantedWall | WantedWalls:
+    def _walls(self, designs: Ints, point: OperatingPoint) -> WantedWall | WantedWalls:
         """The walls wanted of some designs, along the first of the points' axes."""
         each = [self.design(int(number)).wall for number in designs]
         given = [name for name in WALL if getattr(each[0], name) is not None]  # and so of all of them

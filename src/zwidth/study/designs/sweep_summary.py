@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.measures.definition import OK
 from zwidth.study.jobs.job import Cells
 
@@ -22,9 +23,9 @@ class ColumnSummary:
 
     lowest: tuple[float, int] | None = None
     highest: tuple[float, int] | None = None
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
+    counts: Ints = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
 
-    def add(self, first: int, values: NDArray[np.float64], status: NDArray[np.uint8]) -> None:
+    def add(self, first: int, values: Floats, status: NDArray[np.uint8]) -> None:
         """Add consecutive designs, the first of them by its number, in ascending order."""
         self.counts += np.bincount(status, minlength=256)
         there = np.flatnonzero(status == OK)

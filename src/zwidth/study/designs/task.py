@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
 from zwidth.device.toml_access import is_number, table
@@ -20,7 +20,6 @@ from zwidth.measures.definition import MeasureError
 from zwidth.model.posture import PostureError, handle_motions
 from zwidth.study.workspace.extreme_direction import sphere
 
-Floats = NDArray[np.float64]
 Fault = tuple[tuple[str | int, ...], str]
 
 # Key of [task] -> the measure that it bounds, and whether it is a lower bound.

@@ -15,8 +15,8 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags
 from zwidth.measures.definition import MISSING
 from zwidth.memory_limit import check_memory
 from zwidth.processors import Processor, check_processor, computing_on
@@ -190,7 +190,7 @@ class _Plan:
         self, job: Job, store: Store | None, size: int, time_limit: float | None, again: bool = True
     ) -> None:
         self.count, self.size = job.count, size
-        self.done: NDArray[np.bool_] = np.zeros(-(-job.count // size), dtype=bool)
+        self.done: Flags = np.zeros(-(-job.count // size), dtype=bool)
         if store is not None:
             self.done = store.done(time_limit if again else 0.0)
             store.limit_time(time_limit)

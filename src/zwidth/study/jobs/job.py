@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.measures.definition import Note
 
 Notes = tuple[tuple[Note, ...], ...]
@@ -23,7 +24,7 @@ class Cells(Protocol):
     """
 
     @property
-    def values(self) -> NDArray[np.float64]: ...
+    def values(self) -> Floats: ...
     @property
     def status(self) -> NDArray[np.uint8]: ...
     @property
@@ -42,7 +43,7 @@ class Cells(Protocol):
 class CellValues:
     """Measures of consecutive cells in memory; see `Cells`."""
 
-    values: NDArray[np.float64]
+    values: Floats
     status: NDArray[np.uint8]
     notes: Notes
 

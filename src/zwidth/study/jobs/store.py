@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth._version import __version__
+from zwidth.arrays import Flags, Floats
 from zwidth.device.format_version import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS
 from zwidth.memory_limit import check_memory
@@ -135,7 +136,7 @@ class Store:
             shutil.rmtree(draft, ignore_errors=True)
         self._open()
 
-    def done(self, time_limit: float | None = None) -> NDArray[np.bool_]:
+    def done(self, time_limit: float | None = None) -> Flags:
         """Which batches are done, (batches,).
 
         time_limit  of this run [s]; None: none. Batches of which cells were given up after a shorter time are not
@@ -304,7 +305,7 @@ def _descriptions(folder: Path) -> dict[str, str]:
     return {name: hashlib.sha256((folder / name / DESCRIPTION).read_bytes()).hexdigest() for name in ARRAYS}
 
 
-def _digest_of_cells(values: NDArray[np.float64], status: NDArray[np.uint8]) -> int:
+def _digest_of_cells(values: Floats, status: NDArray[np.uint8]) -> int:
     """Digest of a batch's numbers; all nan are alike, of which zarr keeps none apart."""
     plain = np.where(np.isnan(values), np.nan, values).astype("<f8")
     return zlib.crc32(np.asarray(status, dtype=np.uint8).tobytes(), zlib.crc32(plain.tobytes()))
@@ -336,7 +337,7 @@ class StoredCells:
             yield first, self.store.read_batch(first)
 
     @cached_property
-    def values(self) -> NDArray[np.float64]:
+    def values(self) -> Floats:
         """All values in memory. Raises TooLarge."""
         self._check()
         return np.concatenate([cells.values for _, cells in self.pieces()])

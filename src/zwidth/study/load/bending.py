@@ -20,6 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.build_beams import own_body
@@ -38,7 +39,7 @@ from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.flexible_link import BeamError
 from zwidth.model.link_beams import carried_body
-from zwidth.model.mechanism import Floats, Mechanism
+from zwidth.model.mechanism import Mechanism
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 from zwidth.result import Result

@@ -19,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.optimize import brentq
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, largest_stiffness, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
@@ -32,7 +33,6 @@ from zwidth.model.argument_checks import require
 from zwidth.model.effective_parameters import screw
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError
 from zwidth.model.load import HandForce, Load
-from zwidth.model.mechanism import Floats
 from zwidth.model.posture import PostureError
 from zwidth.progress import Progress
 from zwidth.result import Result

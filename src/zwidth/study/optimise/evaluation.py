@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import in_order
@@ -23,7 +24,6 @@ from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.optimise.problem import Problem
 from zwidth.study.tolerances.draws import MemberChanges, member_changes
 
-Floats = NDArray[np.float64]
 LARGEST: Final = 1e150  # of a cost; its square is finite
 MOST_VIOLATED: Final = 10.0  # a demand is violated by more only where there is no value
 

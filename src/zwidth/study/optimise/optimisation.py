@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import plural
 from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note
 from zwidth.measures.unit_text import unit_text
@@ -21,8 +21,6 @@ from zwidth.study.optimise.front import hypervolume, knee
 from zwidth.study.optimise.problem import Demand, Problem
 from zwidth.study.optimise.recheck import Bars, Contact
 from zwidth.study.optimise.variables import pieces, value_at, values_at
-
-Floats = NDArray[np.float64]
 
 BEST_FOUND: Final = "best found"
 NO_BETTER: Final = "no better design lies within the bounds"
@@ -84,7 +82,7 @@ class Optimisation(Result):
     problem: Problem
     shares: Floats
     judgement: Judgement
-    front: NDArray[np.int64]
+    front: Ints
     baseline: Judgement | None
     searched: int
     polished: int

@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.faults import DeviceError
 from zwidth.measures.definition import Note
@@ -37,8 +37,6 @@ from zwidth.study.optimise.recheck import (
 )
 from zwidth.study.optimise.search import generations
 from zwidth.study.optimise.variables import share_of, values_at
-
-Floats = NDArray[np.float64]
 
 POLISHED: Final = 0.25  # share of the budget that the polish of a front may take
 POLISHED_ALONE: Final = 0.5  # the same with one objective: there it counts most
@@ -184,7 +182,7 @@ class _Archive:
             return None
         return self.judging.judge(self._run([tuple(own)], "judging the device as it is", 0, 1))
 
-    def front(self) -> NDArray[np.int64]:
+    def front(self) -> Ints:
         """Designs that keep all demands and that no other dominates."""
         if not len(self.shares):
             return np.zeros(0, dtype=np.int64)
@@ -192,7 +190,7 @@ class _Archive:
         costs[self.judgement.violations(self.problem).any(axis=1)] = np.nan
         return undominated(costs)
 
-    def best_apart(self) -> NDArray[np.int64]:
+    def best_apart(self) -> Ints:
         """Some of the best designs that keep all demands, of a single objective, not close to each other."""
         kept = np.asarray(~self.judgement.violations(self.problem).any(axis=1))
         costs, shares = self.judgement.costs(self.problem)[:, 0], self.shares
@@ -204,15 +202,13 @@ class _Archive:
                 chosen.append(row)
         return np.array(chosen, dtype=np.int64)
 
-    def result(
-        self, best: NDArray[np.int64], baseline: Judgement | None, searched: int, polished: int
-    ) -> Optimisation:
+    def result(self, best: Ints, baseline: Judgement | None, searched: int, polished: int) -> Optimisation:
         """The front's designs and how they were found."""
         notes = {name: merge_notes(each) for name, each in self.notes.items()}
         found = Optimisation(self.problem, self.shares, self.judgement, best, baseline, searched, polished, notes)
         return replace(found, finer=self._finer(best), bars=self._bars(best), contacts=self._contacts(found))
 
-    def _bars(self, best: NDArray[np.int64]) -> Bars | None:
+    def _bars(self, best: Ints) -> Bars | None:
         """What tolerances make of the front; None without any."""
         if not self.problem.tolerances or not len(best):
             return None
@@ -221,7 +217,7 @@ class _Archive:
         cells = self._compute(job, "judging the front as it is produced", 0, len(best))
         return bars_of(self.problem, judging.judge_produced(cells))
 
-    def _finer(self, best: NDArray[np.int64]) -> Judgement | None:
+    def _finer(self, best: Ints) -> Judgement | None:
         """The front on a finer grid of the task."""
         problem = finer_problem(self.problem)
         if problem is None or not len(best):

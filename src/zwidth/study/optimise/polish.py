@@ -25,13 +25,12 @@ from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.study.optimise.evaluation import Judgement
 from zwidth.study.optimise.problem import Problem
 from zwidth.study.optimise.variables import continuous
 
-Floats = NDArray[np.float64]
 Judges: TypeAlias = Callable[[Floats], Judgement]
 
 STEP: Final = 1e-5  # of the bounds, by which designs are changed for derivatives
@@ -123,7 +122,7 @@ def polish(
     return spent
 
 
-def _extend_bundles(problem: Problem, designs: list[_Design], free: NDArray[np.int64], judge: Judges) -> int:
+def _extend_bundles(problem: Problem, designs: list[_Design], free: Ints, judge: Judges) -> int:
     """Add to each bundle the designs that are to join it. Returns the number of designs judged."""
     joining = [(one, *new) for one in designs for new in one.joining]
     if not joining:
@@ -148,7 +147,7 @@ def _try_all(problem: Problem, tried: list[tuple[_Design, Floats]], weights: Flo
     return first
 
 
-def _probes(one: _Design, free: NDArray[np.int64]) -> Floats:
+def _probes(one: _Design, free: Ints) -> Floats:
     """Designs in which each of the free variables is changed by itself, up and down, by some amounts."""
     rows = []
     for amount in PROBES:
@@ -160,7 +159,7 @@ def _probes(one: _Design, free: NDArray[np.int64]) -> Floats:
     return np.array(rows)
 
 
-def neighbours(shares: Floats, free: NDArray[np.int64]) -> Floats:
+def neighbours(shares: Floats, free: Ints) -> Floats:
     """Designs (2 f, v) from which the derivatives by f variables are taken: a step down and one up of each, or two
     steps to the inside at a bound."""
     rows = np.repeat(shares[None], 2 * len(free), axis=0)
@@ -177,7 +176,7 @@ def _offsets(share: float) -> Floats:
     return np.array([-STEP, STEP])
 
 
-def gradients(shares: Floats, free: NDArray[np.int64], here: Floats, around: Floats) -> Floats:
+def gradients(shares: Floats, free: Ints, here: Floats, around: Floats) -> Floats:
     """Derivatives (..., f) of values by the shares of f variables.
 
     here    (...)       values of the design
@@ -195,7 +194,7 @@ def gradients(shares: Floats, free: NDArray[np.int64], here: Floats, around: Flo
     return np.stack(slopes, axis=-1)
 
 
-def _step(problem: Problem, one: _Design, free: NDArray[np.int64], weights: Floats) -> Floats | None:
+def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats | None:
     """The step (f,) that the linear program takes; None where none makes the design better.
 
     Where the bundle allows none, D shrinks, and designs farther away leave the bundle, until one is found.
@@ -233,7 +232,7 @@ def _pieces(
     column: int,
     shares: Floats,
     own: Judgement,
-    free: NDArray[np.int64],
+    free: Ints,
     around: Judgement,
     sign: float,
 ) -> tuple[Floats, Floats]:
@@ -249,7 +248,7 @@ def _pieces(
         return sign * here, sign * gradients(shares, free, here, there)
 
 
-def _trials(shares: Floats, free: NDArray[np.int64], step: Floats) -> Floats:
+def _trials(shares: Floats, free: Ints, step: Floats) -> Floats:
     rows = np.repeat(shares[None], len(LENGTHS), axis=0)
     rows[:, free] = np.clip(rows[:, free] + np.outer(LENGTHS, step), 0.0, 1.0)
     return rows

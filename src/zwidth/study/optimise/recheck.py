@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.device.faults import DeviceError
 from zwidth.device.load import from_document
@@ -19,8 +19,6 @@ from zwidth.study.designs.sampling import CIRCUMSTANCES
 from zwidth.study.designs.task import Task, task_of
 from zwidth.study.optimise.evaluation import margins
 from zwidth.study.optimise.problem import Problem
-
-Floats = NDArray[np.float64]
 
 FINER: Final = 2  # times as many steps between points, and directions
 PRODUCED: Final = 64  # devices within the tolerances for the bars of each design

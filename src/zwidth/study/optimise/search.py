@@ -11,13 +11,12 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.study.designs.sampling import Axis, Sampling
 from zwidth.study.optimise.problem import Problem
 from zwidth.study.optimise.variables import pieces, settle
 
-Floats = NDArray[np.float64]
 # Designs of a generation: enough of them to spread over a front, few enough for some tens of generations.
 FEWEST, MOST, GENERATIONS = 12, 100, 40
 CHOSEN_ANEW: Final = 0.5  # of the variables in pieces that change, how many jump anywhere and not to a neighbour

@@ -11,11 +11,9 @@ from math import ceil, exp, floor, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.study.designs.sampling import Axis
-
-Floats = NDArray[np.float64]
 
 
 def pieces(axis: Axis) -> int:
@@ -29,7 +27,7 @@ def pieces(axis: Axis) -> int:
     return floor(axis.span[1]) - ceil(axis.span[0]) + 1 if axis.whole else 0
 
 
-def continuous(axes: Sequence[Axis]) -> NDArray[np.bool_]:
+def continuous(axes: Sequence[Axis]) -> Flags:
     """Which variables (v,) take any number within their bounds."""
     return np.array([pieces(axis) == 0 for axis in axes], dtype=bool)
 

@@ -9,9 +9,9 @@ from math import isfinite
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from zwidth.arrays import Floats
 from zwidth.device import address, build
 from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.device import Device
@@ -141,7 +141,7 @@ class Family:
         """Indices of the ranges whose low and high differ."""
         return tuple(k for k, one in enumerate(self.ranges) if one.low < one.high)
 
-    def member(self, operator: int, free: NDArray[np.float64]) -> FamilyMember:
+    def member(self, operator: int, free: Floats) -> FamilyMember:
         """The member with these shares of the free ranges; of fixed ranges the share is 0."""
         shares = np.zeros(len(self.ranges))
         shares[list(self.free)] = free

@@ -14,7 +14,6 @@ from math import floor
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
@@ -30,8 +29,6 @@ from zwidth.model.operator import Operator
 from zwidth.model.response import Response, handle_obstacle
 from zwidth.progress import Progress
 from zwidth.study.robust.family import Family, FamilyMember, RangeError, RangeFault
-
-Floats = NDArray[np.float64]
 
 MEAN: Final = "mean"
 SAME: Final = 1e-9  # samples, or a share of the period, that are no change

@@ -17,7 +17,6 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
@@ -33,7 +32,6 @@ from zwidth.study.robust.violation_search import MemberRadii, violating_members
 
 __all__ = ["RobustError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
 
-Floats = NDArray[np.float64]
 
 REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
 MEMBERS, UNSEEN = 256, 10_000  # charted, and tried afterwards

@@ -16,16 +16,14 @@ from typing import Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.measured.boundary import coarse_angles, real_root
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.robust.measured import MeasuredRobustChart
 from zwidth.progress import Progress
 from zwidth.study.robust.measured_family import MeasuredFamily, MeasuredMember
 from zwidth.study.robust.unseen_members import STAGE, Violation
-
-Floats = NDArray[np.float64]
 
 DEPTH: Final = 1e-3  # share of the set's size by which a curve may run inside, since it is polygons
 LINE_WALLS: Final = 200  # on each line of real roots

@@ -10,18 +10,16 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.robust.chart import RobustChart
 from zwidth.chart.robust.instability import softenings, unstable_walls
 from zwidth.chart.table_radii import spectral_radii
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, Whole
+from zwidth.loop.loop_table import LoopTable
 from zwidth.progress import Progress
 from zwidth.study.robust.family import Family, FamilyMember, build_together
-
-Floats = NDArray[np.float64]
 
 EDGE_WALLS: Final = 200  # walls along the edge that random members are tried on
 RASTER: Final = 12  # walls inside, per axis
@@ -93,7 +91,7 @@ def _random_members(family: Family, count: int, seed: int) -> Iterator[FamilyMem
 
 def _tried(
     family: Family, members: list[FamilyMember], walls: Floats, report: Callable[[int], None], before: int
-) -> Iterator[tuple[Whole, Floats, Floats]]:
+) -> Iterator[tuple[Ints, Floats, Floats]]:
     """Places of members, and their `_worst_walls`: of those built together, then of each of the others; one that
     cannot be built is left out.
 
@@ -121,7 +119,7 @@ def _worst_walls_alone(loop: Loop, walls: Floats) -> tuple[Floats, Floats]:
 
 
 def _worst_walls(
-    loops: LoopTable, walls: Floats, radii: Callable[[Whole, Floats, Floats], Floats]
+    loops: LoopTable, walls: Floats, radii: Callable[[Ints, Floats, Floats], Floats]
 ) -> tuple[Floats, Floats]:
     """Of the walls (k, 2) that are unstable for each loop of a table: the largest spectral radius, 1 where there
     is none; and the largest stiffness [N/m] by which one with K > 0, B >= 0 must be softened to be stable.

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.chart.point_radii import radii_at_points
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
@@ -35,8 +35,6 @@ from zwidth.study.safe_walls.grid import CellGrid, Sectors
 from zwidth.study.safe_walls.limits import NONE, Limits, Tightest
 from zwidth.study.safe_walls.samples import Sampler, Samples
 from zwidth.study.safe_walls.stable_intervals import common_interval, stable_intervals
-
-Floats = NDArray[np.float64]
 
 POSTURES: Final = 3  # of the lattice, along each axis of a cell
 # Of the lattice, along each component of a direction: by dimensions, for one sector a face and for smaller ones
@@ -168,7 +166,7 @@ class _Slot:
             raise _Failed(NO_VALUE, NOTHING_COMMON)
         return top / (1.0 + question.margin), ranges
 
-    def _lattice(self, halvings: int) -> tuple[Samples, NDArray[np.bool_]]:
+    def _lattice(self, halvings: int) -> tuple[Samples, Flags]:
         """Samples of the lattice, its spacing halved so often, and which of them belong to that of every second
         point."""
         d = self.question.grid.dimensions

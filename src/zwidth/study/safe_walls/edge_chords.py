@@ -7,8 +7,8 @@ from threading import local
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.arcs import PAIR
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.chart_numbers import fill_nodes, read_edge
@@ -24,9 +24,6 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import table_of_points
 from zwidth.loop.sections import UnmovedError
 from zwidth.threads import in_chunks
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 PIECES: Final = 8  # chords between two neighbouring samples of a curve
 MOST_CHORDS: Final = 3072  # of one loop; one with more is charted alone
@@ -49,8 +46,8 @@ class EdgeChords:
     """
 
     chords: Floats
-    offsets: Whole
-    known: NDArray[np.bool_]
+    offsets: Ints
+    known: Flags
 
     def __len__(self) -> int:
         return len(self.known)
@@ -118,7 +115,7 @@ def _charted_alone(point: OperatingPoint) -> Floats:
     return np.concatenate([np.empty((0, 6)), *each])
 
 
-def _fill_all(loops: LoopTable, chords: Floats, counts: Whole, doubtful: NDArray[np.bool_]) -> None:
+def _fill_all(loops: LoopTable, chords: Floats, counts: Ints, doubtful: Flags) -> None:
     own = local()
 
     def several(first: int, last: int) -> None:
@@ -134,8 +131,8 @@ def _fill_several(
     loops: LoopTable,
     memory: EdgeMemory,
     chords: Floats,
-    counts: Whole,
-    doubtful: NDArray[np.bool_],
+    counts: Ints,
+    doubtful: Flags,
     first: int,
     last: int,
 ) -> None:

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device.device import Device
 from zwidth.model.mechanism import ORIENTATION
 from zwidth.study.advice import Advice
 from zwidth.study.workspace.plane_grid import FLAT, PlaneError, plane_of, reachable_set, rounded_outwards
-
-Floats = NDArray[np.float64]
 
 LONG_SIDE: Final = {2: 20, 3: 6}  # cells along the longest side, by default, of a plane and of a space
 MOST: Final = 10**6  # cells
@@ -208,7 +206,7 @@ class Sectors:
             out[:, (face + k) % d] = 2.0 * (piece + wide) / self.parts - 1.0
         return out
 
-    def places(self, directions: Floats) -> tuple[NDArray[np.int64], Floats]:
+    def places(self, directions: Floats) -> tuple[Ints, Floats]:
         """Sectors (n,) of vectors (n, d), none of them zero, and their shares (n, d - 1) of the sectors' size: the
         inverse of `directions`.
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.study.safe_walls.samples import Sampler, Samples
 from zwidth.study.safe_walls.stable_intervals import common_interval
-
-Floats = NDArray[np.float64]
 
 LEAST: Final = 0.002  # share of the widest range of a cell's bands by which each limit is narrowed at least
 HALF: Final = 0.5  # share of a narrowing that a sample may use up
@@ -81,7 +79,7 @@ class Limits:
     coarse     (N,)  which samples belong to the lattice of every second point
     """
 
-    def __init__(self, intervals: Floats, coarse: NDArray[np.bool_], narrowing: bool) -> None:
+    def __init__(self, intervals: Floats, coarse: Flags, narrowing: bool) -> None:
         count = intervals.shape[1]
         self.centre, self.extreme, self.narrowing = (
             np.full(count, np.nan),

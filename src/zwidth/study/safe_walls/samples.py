@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.study.safe_walls.grid import Sectors, lattice
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 # Share of random coordinates that lie on the border of the cell: limits are tightest there more often than not
 BORDER: Final = 0.3
@@ -28,10 +25,10 @@ class Samples:
     """
 
     posture: Floats
-    sector: Whole
+    sector: Ints
     direction: Floats
 
-    def __getitem__(self, rows: Whole) -> Samples:
+    def __getitem__(self, rows: Ints) -> Samples:
         return Samples(self.posture[rows], self.sector[rows], self.direction[rows])
 
     def __len__(self) -> int:
@@ -42,7 +39,7 @@ class Samples:
         self.posture[row], self.sector[row] = other.posture[its], other.sector[its]
         self.direction[row] = other.direction[its]
 
-    def where(self, chosen: NDArray[np.bool_], other: Samples) -> Samples:
+    def where(self, chosen: Flags, other: Samples) -> Samples:
         """These samples where `chosen` (n,), and others elsewhere."""
         return Samples(
             np.where(chosen[:, None], self.posture, other.posture),
@@ -79,13 +76,13 @@ class Sampler:
         d = self.sectors.dimensions
         return d << d
 
-    def group(self, samples: Samples) -> Whole:
+    def group(self, samples: Samples) -> Ints:
         """Group (n,) of each sample: the corner of the cell that is nearest, and the face of its direction."""
         d = self.sectors.dimensions
         corner = (samples.posture > 0.5) @ (2 ** np.arange(d))
         return np.asarray(corner * d + samples.sector // self.sectors.parts ** (d - 1), dtype=np.int64)
 
-    def lattice(self, of_postures: int, of_directions: int) -> tuple[Samples, NDArray[np.bool_]]:
+    def lattice(self, of_postures: int, of_directions: int) -> tuple[Samples, Flags]:
         """Samples of a lattice of so many points along each axis of the cell, and of each sector; and which of
         them belong to that of every second point."""
         d = self.sectors.dimensions

@@ -11,13 +11,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.study.safe_walls.edge_chords import B0, B1, K0, K1, MOST_CHORDS, SAG_B, SAG_K, EdgeChords
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 GAPS: Final = 4  # stable intervals kept of a band, the longest
 # Where in the band the ray runs: at no special place, so that it passes no corner; both have to agree.
@@ -38,7 +35,7 @@ def stable_intervals(edges: EdgeChords, bands: Floats) -> Floats:
 
 
 @compiled
-def _fill_intervals(chords: Floats, offsets: Whole, bands: Floats, room: Floats, out: Floats) -> None:
+def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, out: Floats) -> None:
     for i in range(len(offsets) - 1):
         first, last = offsets[i], offsets[i + 1]
         for j in range(len(bands)):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device.device import Device
 from zwidth.measures.definition import NO_VALUE, OK, STATUS
 from zwidth.result import Result
@@ -21,7 +22,6 @@ from zwidth.study.safe_walls.limits import NONE
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 
 INSIDE: Final = 0  # answers of the exported program
 OUTSIDE: Final = 1
@@ -65,7 +65,7 @@ class SafeWalls(Result):
     reasons: tuple[str, ...]
     top: Floats
     ranges: Floats
-    level: NDArray[np.int64]
+    level: Ints
     outside: Rectangle
 
     @property
@@ -331,7 +331,7 @@ def _level(top: float, ranges: Floats, span: float | None) -> int:
     return int(area.argmax()) + 1
 
 
-def _common_rectangle(top: Floats, ranges: Floats, level: NDArray[np.int64], span: float | None) -> Rectangle:
+def _common_rectangle(top: Floats, ranges: Floats, level: Ints, span: float | None) -> Rectangle:
     """The rectangle that is safe in all cells, chosen as in a cell but no stiffer than the rectangle of any; of
     zeros where there is none.
 

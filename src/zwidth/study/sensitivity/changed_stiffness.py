@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.edge_by_eigenvalues import ChartError
@@ -20,7 +20,6 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.study.designs.built_designs import build_at_point
 from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping
 
-Floats = NDArray[np.float64]
 Change = tuple[str, float]  # a number by its path, and the value that it gets
 
 

@@ -19,8 +19,8 @@ from math import nan, pi
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.curve import wall_at
 from zwidth.chart.loop_polynomials import (
@@ -38,7 +38,6 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
 from zwidth.threads import in_chunks
 
-Floats = NDArray[np.float64]
 Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
 
 # If a Newton step of K'(angle) is longer than this share of the angle, the wall is not a smooth maximum.
@@ -62,7 +61,7 @@ class EdgePieces(NamedTuple):
     wall    (2,)    K [N/m], B [N s/m] of the wall
     """
 
-    kind: NDArray[np.int64]
+    kind: Ints
     angle: Floats
     normal: Floats
     start: Floats

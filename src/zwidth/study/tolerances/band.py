@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.study.tolerances.intervals import Interval
 
-Floats = NDArray[np.float64]
 Pieces = tuple[tuple[float, float], ...]
 
 
@@ -93,7 +92,7 @@ class Coverage:
     """
 
     def __init__(self, dampings: Floats, intervals: Floats) -> None:
-        self.dampings, self._ends, self._depths = dampings, list[Floats](), list[NDArray[np.int64]]()
+        self.dampings, self._ends, self._depths = dampings, list[Floats](), list[Ints]()
         for d in range(len(dampings)):
             low, high = intervals[:, d, :, 0].ravel(), intervals[:, d, :, 1].ravel()
             there = high > low

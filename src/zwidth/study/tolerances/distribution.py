@@ -7,10 +7,11 @@ from math import exp, inf, isfinite, log, log1p, nextafter, sqrt
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from zwidth.arrays import Floats
 
 Kind = Literal["normal", "uniform", "triangular", "lognormal"]
-Floats = NDArray[np.float64]
 
 CUT: Final = (
     4.0  # standard deviations from the middle at which a distribution with tails is cut off, if none is given

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from zwidth.study.tolerances.distribution import Floats
+from zwidth.arrays import Floats
 from zwidth.study.tolerances.tolerance import Tolerance
 
 DRAWN, UNSEEN = range(2)  # devices that answers are found with, and those that try the answers afterwards

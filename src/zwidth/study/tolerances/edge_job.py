@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.point_chart import chart_at
@@ -19,8 +19,6 @@ from zwidth.measures.definition import FAILED, OK, UNDECIDED, Note
 from zwidth.study.designs.sweep_job import SweepJob
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
-
-Floats = NDArray[np.float64]
 
 MOST_KNOWN: Final = 4096  # devices whose outlines are kept in memory; each takes some 20 kB
 MOST_INTERVALS: Final = 4  # of stable stiffness on one line of one device; of more, the longest are kept

@@ -16,11 +16,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.study.tolerances.intervals import CONFIDENCE, Interval
 
-Floats = NDArray[np.float64]
 RESAMPLES: Final = 500
 
 

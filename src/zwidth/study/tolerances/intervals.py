@@ -7,7 +7,8 @@ from math import ceil, log, sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from zwidth.arrays import Floats
 
 CONFIDENCE: Final = 0.95  # of every interval
 OUTSIDE: Final = 0.5 * (1.0 - CONFIDENCE)  # on either side of one
@@ -69,7 +70,7 @@ def quantile_ranks(share: float, count: int) -> tuple[int, int, int]:
     return estimate, low, high
 
 
-def quantile_interval(ordered: NDArray[np.float64], share: float) -> Interval:
+def quantile_interval(ordered: Floats, share: float) -> Interval:
     """A quantile of draws (n,) in ascending order, with its interval; infinite on a side without a bound."""
     estimate, low, high = quantile_ranks(share, len(ordered))
     bounds = np.concatenate([[-np.inf], ordered, [np.inf]])

@@ -9,15 +9,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
 from zwidth.study.designs.column import Column
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.tolerances.indices import Indices, indices_of
 from zwidth.study.tolerances.intervals import Interval, quantile_interval
 from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
-
-Floats = NDArray[np.float64]
-Marks = NDArray[np.bool_]
 
 STABLE, UNSTABLE = "stable", "unstable"  # outcomes of the wanted wall; the others are a status in words
 WITH_WALL, WITHOUT_WALL = "with a stable wall", "without a stable wall"  # outcomes where no wall is wanted
@@ -89,13 +87,13 @@ def outcome_counts(columns: Sequence[Column], cells: CellValues) -> dict[str, in
     return {name: count for name, count in counts.items() if count}
 
 
-def stable_marks(columns: Sequence[Column], cells: CellValues) -> Marks:
+def stable_marks(columns: Sequence[Column], cells: CellValues) -> Flags:
     """Which devices render the wanted wall stably, beyond doubt."""
     column = [one.name for one in columns].index(WALL_IS_STABLE.name)
     return np.asarray(cells.values[:, column] == 1.0)
 
 
-def counted_values(column: Column, values: Floats, status: NDArray[np.uint8]) -> tuple[Floats, Marks]:
+def counted_values(column: Column, values: Floats, status: NDArray[np.uint8]) -> tuple[Floats, Flags]:
     """A measure of all devices, and which of them have a value.
 
     A device without a stable wall has a largest stiffness of 0: what it can render. One that cannot be built or

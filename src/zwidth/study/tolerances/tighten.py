@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.study.designs.sampling import Axis
-from zwidth.study.tolerances.distribution import Floats
 from zwidth.study.tolerances.intervals import Interval, difference_interval, share_interval
 from zwidth.study.tolerances.tolerance import Tolerance
 
@@ -70,7 +69,7 @@ def tightened_axes(tolerances: Sequence[Tolerance], values: Sequence[Floats]) ->
     return axes
 
 
-def tightened(keys: Sequence[str], before: NDArray[np.bool_], after: NDArray[np.bool_]) -> tuple[Tightened, ...]:
+def tightened(keys: Sequence[str], before: Flags, after: Flags) -> tuple[Tightened, ...]:
     """What each narrower tolerance does, the largest gain first.
 
     before  (n,)  whether each drawn device renders the wall stably

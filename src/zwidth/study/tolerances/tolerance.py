@@ -7,8 +7,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from zwidth.arrays import Floats
 from zwidth.study.designs.sampling import Axis, Tie
-from zwidth.study.tolerances.distribution import Distribution, Floats
+from zwidth.study.tolerances.distribution import Distribution
 
 
 @dataclass(frozen=True)

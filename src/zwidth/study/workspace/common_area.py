@@ -14,8 +14,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.result import Result
 from zwidth.study.designs.requirement import Requirement
 from zwidth.study.workspace.map import measures_of, reachable
@@ -24,7 +24,6 @@ from zwidth.study.workspace.reach_outline import continued, reach_outline
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 
 ROUNDING: Final = (
     1e-9  # share of the largest margin; a smaller margin counts as 0, so that a bound met exactly is met

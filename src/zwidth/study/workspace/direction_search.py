@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import OK, Measure, MeasureValues
 from zwidth.measures.evaluate import evaluate
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STILL: Final = 1e-9  # share of the fastest motion; along slower directions the handle counts as fixed
 TRIED: Final = 16  # largest number of points at which a direction is compared with its opposite

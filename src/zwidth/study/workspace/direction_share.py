@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import Measure, MeasureError
 from zwidth.measures.evaluate import NO_MECHANISM
 from zwidth.study.designs.requirement import Requirement
-from zwidth.study.workspace.direction_search import DirectionSearch, Floats, Ints, direction_searches
-
-Bools = NDArray[np.bool_]
+from zwidth.study.workspace.direction_search import DirectionSearch, direction_searches
 
 NAME: Final = "share_of_directions"
 SAMPLES: Final = 24  # of a half circle
@@ -141,7 +139,7 @@ def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
     return sample, where, offset[sample, where]
 
 
-def _met_share(margin, mark: Floats, met: Bools, turn: float) -> Floats:  # type: ignore[no-untyped-def]
+def _met_share(margin, mark: Floats, met: Flags, turn: float) -> Floats:  # type: ignore[no-untyped-def]
     """The share of the turn between marks (s, n) that is met; where it ends between two, that is bisected."""
     after, after_met = np.roll(mark, -1, axis=0), np.roll(met, -1, axis=0)
     after[-1] += turn

@@ -14,10 +14,11 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import MISSING, OK, Measure, MeasureError, MeasureValues, Note
 from zwidth.measures.evaluate import NO_MECHANISM, evaluate
-from zwidth.study.workspace.direction_search import DirectionSearch, Floats, Ints, direction_searches
+from zwidth.study.workspace.direction_search import DirectionSearch, direction_searches
 
 Extreme = Literal["worst", "best", "lowest", "highest"]
 EXTREMES: Final = ("worst", "best", "lowest", "highest")
@@ -30,8 +31,6 @@ COMPASS: Final = 60  # rounds
 FINEST: Final = 3e-6  # rad, where a compass search ends
 NEAR: Final = 0.1  # share of the values' spread within which a second extreme is refined, too
 CHUNK: Final = 4096  # points computed at once
-
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Flags, Floats
 from zwidth.device.device import Device
 from zwidth.loop.linear_omissions import load_omissions
 from zwidth.loop.operating_point import OperatingPoint
@@ -99,7 +100,7 @@ class MapJob:
         return max(FEWEST, -(-self.count // BATCHES))
 
     @cached_property
-    def _positions(self) -> NDArray[np.float64]:
+    def _positions(self) -> Floats:
         return self.plane.positions.reshape(-1, 3)
 
     def compute(self, first: int, last: int) -> CellValues:
@@ -128,7 +129,7 @@ class MapJob:
 
     def _column(
         self, measure: Measure, points: OperatingPoint
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint8], tuple[Note, ...]]:
+    ) -> tuple[Floats, NDArray[np.uint8], tuple[Note, ...]]:
         """Values (n, columns) of one measure at n points, status (n,) and notes."""
         if not isinstance(self.direction, str) or not measure.along:
             result = evaluate(measure, points)
@@ -289,7 +290,7 @@ def measures_of(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset.data_vars if f"{name}_status" in dataset]
 
 
-def reachable(dataset: xr.Dataset, name: str) -> NDArray[np.bool_]:
+def reachable(dataset: xr.Dataset, name: str) -> Flags:
     """Whether each cell (ny, nx) has a posture; the measure `name` may still have no value in it."""
     status = dataset[f"{name}_status"].values
     return np.asarray(~np.isin(status, UNREACHED))

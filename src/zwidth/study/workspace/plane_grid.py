@@ -8,8 +8,8 @@ from math import ceil, floor, log10
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.model.argument_checks import require
 from zwidth.model.mechanism import ORIENTATION, Mechanism
@@ -17,8 +17,6 @@ from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import reachable_positions
 from zwidth.model.reach_shells import Shell, shells
 from zwidth.study.advice import Advice, AdvisedError
-
-Floats = NDArray[np.float64]
 
 AXES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 LONG_SIDE: Final = 81  # points along the longer side, by default

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.measures.definition import BEYOND_LIMIT, NO_POSTURE, OUT_OF_REACH, SINGULAR
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
@@ -21,7 +22,6 @@ from zwidth.study.workspace.workspace_summary import positions
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = NDArray[np.float64]
 
 KEY: Final = "reach_shells_m"  # attribute of a map: centre x, y, z, least and most distance of each shell
 QUARTER: Final = 256  # chords of a quarter of a circle; its area is too small by a share of 6e-6

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
 
@@ -39,7 +39,7 @@ def over_the_workspace(dataset: xr.Dataset, name: str, device: Device | None = N
     return summary
 
 
-def positions(dataset: xr.Dataset) -> NDArray[np.float64]:
+def positions(dataset: xr.Dataset) -> Floats:
     """Handle positions (ny, nx, 3) of a map's cells in the base frame [m]."""
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=np.float64).reshape(2, 3)
     through = np.asarray(dataset.attrs["plane_through_m"], dtype=np.float64)
@@ -47,7 +47,7 @@ def positions(dataset: xr.Dataset) -> NDArray[np.float64]:
     return np.asarray(through + x[None, :, None] * axes[0] + y[:, None, None] * axes[1])
 
 
-def areas(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def areas(x: Floats, y: Floats) -> Floats:
     """Area [m^2] that belongs to each point (ny, nx) of a grid by the trapezoidal rule.
 
     >>> areas(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0])).tolist()
@@ -56,6 +56,6 @@ def areas(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]
     return np.outer(_trapezoids(y), _trapezoids(x))
 
 
-def _trapezoids(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _trapezoids(x: Floats) -> Floats:
     step = np.diff(x)
     return np.asarray(0.5 * (np.append(step, 0.0) + np.append(0.0, step)))
