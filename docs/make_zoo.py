@@ -18,7 +18,7 @@ import zwidth
 from docs._markdown import table
 from docs.make_examples import run
 from zwidth.device import bundled_names
-from zwidth.measures.bindings.dexterity import isotropy
+from zwidth.measures.dexterity import isotropy_at
 
 HERE = Path(__file__).parent
 PAGE = HERE / "zoo.md"
@@ -162,7 +162,7 @@ def row(name: str) -> Row:
     by_hand, place = SET_BY_HAND.get(name, ("", ""))
     lacks = {"dynamics": "inertia", "sampling": "period"}
     known = "charts" if not missing else "lacks " + ", ".join(lacks[kind] for kind in missing)
-    condition = "" if device.mechanism is None else f"{float(isotropy(point)):.3g}"
+    condition = "" if device.mechanism is None else f"{float(isotropy_at(point)):.3g}"
     felt, stiffness, wall = "", "", ""
     if not missing:
         felt = " to ".join(dict.fromkeys(f"{mass:.3g}" for mass in masses(point)))

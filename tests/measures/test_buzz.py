@@ -11,7 +11,7 @@ from systems import mass, two_mass
 from zwidth.device.load import load
 from zwidth.loop import Controller, OperatingPoint
 from zwidth.measures import MeasureError
-from zwidth.measures.vibration_threshold import detection_threshold
+from zwidth.measures.buzz import detection_threshold
 from zwidth.model import Counter, Friction, Nonlinear
 
 ONE = np.ones(1)

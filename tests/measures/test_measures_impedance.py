@@ -8,8 +8,7 @@ import pytest
 from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.device.load import load
 from zwidth.loop import Loop
-from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, find_measure
-from zwidth.measures.bindings import impedance
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, find_measure, impedance_range
 from zwidth.measures.evaluate import evaluate
 
 AT = np.array([[[0.0, 0.25, 0.0], [0.08, 0.2, 0.0]], [[-0.12, 0.22, 0.0], [0.9, 0.9, 0.0]]])
@@ -57,7 +56,7 @@ def test_places_without_a_stable_wall_say_so():
     found = evaluate(find_measure("stiffness_max"), device.at(AT))
     assert (found.status[found.status != OUT_OF_REACH] == NO_VALUE).all()
     (note,) = found.notes
-    assert (note.reason, note.count, note.first) == (impedance.NONE_STABLE, 3, (0, 0))
+    assert (note.reason, note.count, note.first) == (impedance_range.NONE_STABLE, 3, (0, 0))
 
 
 def test_a_direction_in_which_the_handle_cannot_move_has_no_value_and_says_why():

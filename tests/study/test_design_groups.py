@@ -13,8 +13,7 @@ from tests.study_sizes import study_size
 from zwidth.chart import judge
 from zwidth.device import address
 from zwidth.device.load import load
-from zwidth.measures import FAILED, OK, OUT_OF_REACH
-from zwidth.measures.bindings import impedance, wall_decay
+from zwidth.measures import FAILED, OK, OUT_OF_REACH, impedance_range, vibration_decay
 from zwidth.study import Axis, Sampling, SweepJob, Tie
 from zwidth.study.designs.column import column_named
 
@@ -158,7 +157,7 @@ def test_walls_of_designs_decay_as_each_alone(kind, seed):
 @pytest.mark.parametrize("kind", ["loops", "filters and lag", "a rigid drive", "held"])
 def test_only_walls_near_the_circle_are_judged_alone(kind, monkeypatch):
     judged = []
-    monkeypatch.setattr(wall_decay, "judge", lambda *arguments: judged.append(arguments) or judge(*arguments))
+    monkeypatch.setattr(vibration_decay, "judge", lambda *arguments: judged.append(arguments) or judge(*arguments))
     job = wall_job(kind, 3, 60)
     taken = sum(len(group.rows) for group in job._grouping.groups(list(job._design_columns(0, 60))))
     job.compute(0, 60)
@@ -228,8 +227,8 @@ def test_arcs_that_lie_between_two_samples_are_found(monkeypatch):
     )
     job = job_of("five-bar", axes, 300, ("stable_area",))
     doubtful = []
-    chart = impedance.stability_chart
-    monkeypatch.setattr(impedance, "stability_chart", lambda *a, **k: doubtful.append(1) or chart(*a, **k))
+    chart = impedance_range.stability_chart
+    monkeypatch.setattr(impedance_range, "stability_chart", lambda *a, **k: doubtful.append(1) or chart(*a, **k))
     assert (job.compute(0, job.count).status == OK).all()
     assert len(doubtful) <= 3
 

@@ -9,14 +9,28 @@ from typing import Final
 from zwidth.measures.definition import Better, Measure
 from zwidth.model.argument_checks import wrong_type
 
-_BINDINGS: Final = "zwidth.measures.bindings"
-_OF_THE_MECHANISM: Final = ("dexterity", "forces", "geometry")  # files whose measures need no loop
+# Group of measures -> the file in which they stand, each as the function NAME_at of an operating point.
+_FILES: Final = {
+    "dexterity": "dexterity",
+    "forces": "forces",
+    "geometry": "geometry",
+    "impedance": "impedance_range",
+    "margins": "impedance_range",
+    "closed_forms": "impedance_range",
+    "load": "load_effect",
+    "wall_decay": "vibration_decay",
+    "wanted_wall": "deformation",
+    "modes": "deformation",
+    "felt": "handle_motion",
+    "buzz": "buzz",
+}
+_OF_THE_MECHANISM: Final = ("dexterity", "forces", "geometry")  # groups whose measures need no loop
 _OF_A_WALL: Final = (
     "wanted_wall",
     "wall_decay",
     "margins",
     "felt",
-)  # files whose measures are all about a wanted wall
+)  # groups whose measures are all about a wanted wall
 _OF_DESIGNS: Final = (
     *_OF_THE_MECHANISM,
     "impedance",
@@ -24,11 +38,11 @@ _OF_DESIGNS: Final = (
     "margins",
     "modes",
     "felt",
-)  # files that take designs at once
+)  # groups that take designs at once
 
 
 def _measure(
-    file: str,
+    group: str,
     name: str,
     title: str,
     unit: str,
@@ -40,10 +54,10 @@ def _measure(
     wall: bool | None = None,
     linear: bool | None = None,
 ) -> Measure:
-    linear = file not in _OF_THE_MECHANISM if linear is None else linear
-    function = f"{_BINDINGS}.{file}:{name}"
-    of_designs = file in _OF_DESIGNS and not each
-    wall = file in _OF_A_WALL if wall is None else wall
+    linear = group not in _OF_THE_MECHANISM if linear is None else linear
+    function = f"zwidth.measures.{_FILES[group]}:{name}_at"
+    of_designs = group in _OF_DESIGNS and not each
+    wall = group in _OF_A_WALL if wall is None else wall
     return Measure(
         name, title, unit, better, source, function, each, along, linear, of_wall=wall, of_designs=of_designs
     )

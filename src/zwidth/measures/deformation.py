@@ -12,6 +12,13 @@ resonances with the actuator held (its antiresonances), not those of the free de
 Moreyra and Hannaford (A practical measure of dynamic response of haptic devices, ICRA 1998) measure a device by a
 ratio of this name. Their text could not be read: that it compares the motions at the two ends of the structure,
 over frequency, is known at second hand, and the formula is ours.
+
+The catalogue's measures of how a wanted wall feels, at operating points.
+
+See `measures.vibration_decay`, `measures.deformation` and `measures.handle_impedance` for the formulas. Stability
+is that of the device with its operator; the felt impedance and the deformation are those of the device without.
+
+The catalogue's measure of the structure's vibration: the first flexible mode at operating points.
 """
 
 from __future__ import annotations
@@ -23,8 +30,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Complexes, Floats
+from zwidth.conditions.assumptions import SPRUNG, UNDELAYED
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_loops import modes_of_points
+from zwidth.measures.definition import OK, MeasureError, MeasureValues, WantedWall
+from zwidth.measures.evaluate import evaluate_pointwise, with_status
 from zwidth.measures.handle_impedance import handle_of
-from zwidth.model.modes import undamped_modes
+from zwidth.measures.preconditions import (
+    frequency_of,
+    loop_case,
+    plant_with_handle,
+    require_assumptions,
+    require_motor_encoders,
+    wall_of,
+)
+from zwidth.measures.vibration_decay import OptimalMass, optimal_mass
+from zwidth.model.modes import natural_frequencies, undamped_modes
 from zwidth.model.plant import Plant
 
 # Frequencies tried up to the highest, in even steps and again in even ratios from this share of it on; and about
@@ -192,3 +213,59 @@ def _solve(inner: Complexes, push: Complexes) -> Complexes:
         if inner.ndim == 2:
             return np.full(push.shape, complex(np.nan, np.nan))
         return np.array([_solve(one, by) for one, by in zip(inner, push, strict=True)])
+
+
+_NOT_REACHED = (
+    "no motor-side mass reaches (5.15) at this wall: it needs B > K T/2 and a remaining real root that is not "
+    "slower; or the drives are rigid here"
+)
+
+
+def optimal_spectral_radius_at(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
+    """Least spectral radius of the wanted wall over all motor-side masses (thesis eq. 5.15).
+
+    Of the motor side on the structure's spring; the device's own masses do not matter.
+    """
+    return with_status(point, _optimal(point, wanted).spectral_radius, _NOT_REACHED)
+
+
+def optimal_motor_side_mass_at(point: OperatingPoint, wanted: WantedWall) -> MeasureValues:
+    """Motor-side mass with which vibration at the wanted wall decays fastest [kg] (thesis eq. 5.14 with 5.15)."""
+    return with_status(point, _optimal(point, wanted).mass, _NOT_REACHED)
+
+
+def structural_distortion_at(point: OperatingPoint, wanted: WantedWall) -> float:
+    """Largest share of the motors' motion that deforms the structure, up to the wanted frequency."""
+    return structural_distortion(plant_with_handle(point), frequency_of(wanted))
+
+
+def _optimal(point: OperatingPoint, wanted: WantedWall) -> OptimalMass:
+    K, B = wall_of(wanted)
+    case = loop_case(point)
+    require_assumptions(case, UNDELAYED)
+    require_motor_encoders(point)
+    stiffness = point.effective.stiffness
+    if point.mechanism is None and np.isnan(stiffness):
+        if SPRUNG in case.unmet:
+            raise MeasureError("needs the stiffness between motors and handle, which the device does not have")
+        stiffness = np.asarray(case.traits.side_stiffness)
+    return optimal_mass(K, B, stiffness, point.controller.sampling_period)
+
+
+def first_mode_at(point: OperatingPoint) -> MeasureValues:
+    """Least natural frequency above 0 of the plant without wall and hand [Hz]; inf where nothing bends."""
+    modes = modes_of_points(point)
+    if modes is None:
+        return evaluate_pointwise(_first_mode_at, point)
+    squared = modes.frequency_squared
+    with np.errstate(invalid="ignore"):
+        least = np.where(squared > 0.0, squared, np.inf).min(axis=1, initial=np.inf)
+    values = np.sqrt(least).reshape(point.shape) / (2.0 * np.pi)
+    known = np.isfinite(squared).all(axis=1).reshape(point.shape) & (point.status == OK)
+    return with_status(point, np.where(known, values, np.nan))
+
+
+def _first_mode_at(point: OperatingPoint) -> float:
+    frequencies = natural_frequencies(point.ungripped_plant)
+    flexible = frequencies[frequencies > 0.0]
+    return float(flexible.min()) if len(flexible) else float("inf")

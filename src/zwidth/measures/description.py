@@ -10,7 +10,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.bindings import dexterity
+from zwidth.measures.dexterity import dynamic_manipulability_at, isotropy_at, manipulability_at
 from zwidth.model.argument_checks import require
 from zwidth.model.effective_parameters import EffectiveParameters
 from zwidth.model.flexible_link import FlexibleLink, Method
@@ -140,9 +140,9 @@ def describe(point: OperatingPoint) -> Description:
         jacobian=point.jacobian,
         angular_jacobian=point.posture.angular_jacobian,
         mass_matrix=point.mass_matrix if known else None,
-        manipulability=float(dexterity.manipulability(point)),
-        dynamic_manipulability=float(dexterity.dynamic_manipulability(point)) if known else None,
-        isotropy=float(dexterity.isotropy(point)),
+        manipulability=float(manipulability_at(point)),
+        dynamic_manipulability=float(dynamic_manipulability_at(point)) if known else None,
+        isotropy=float(isotropy_at(point)),
         beams=tuple(_describe_beam(each, point.mechanism) for each in point.mechanism.flexible),
     )
 

@@ -1,11 +1,14 @@
 """Room that a mechanism needs and leaves: links as rods, joint limits, distance to singularities, extent.
 
 A link is taken for straight rods from its joint to the joints, loop closures and the handle that it carries.
+
+The catalogue's measures of the room that a mechanism needs and leaves: formulas are in `measures.geometry`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,8 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.measures.dexterity import isotropy
-from zwidth.model.mechanism import FIXED, FRAME, PRISMATIC, Mechanism
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_errors import NoMechanismError
+from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
+from zwidth.measures.dexterity import isotropy, jacobian_by_drives
+from zwidth.measures.preconditions import numbers_of
+from zwidth.model.mechanism import FIXED, FRAME, POSE, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture, link_points
 
@@ -304,3 +311,86 @@ def _homogeneous(T: Floats, R: Floats) -> Floats:
     return np.asarray(
         np.where(unknown[..., None, None], np.nan, np.concatenate([T / L[..., None, None], R], axis=-2))
     )
+
+
+def distance_to_singularity_at(point: OperatingPoint) -> Floats:
+    """Reciprocal of the condition number of the homogeneous Jacobian, from 0 to 1."""
+    mechanism, posture = _mechanism(point)
+    J = jacobian_by_drives(point)
+    if mechanism.controls == POSE:
+        return reciprocal_condition(J, angular=posture.angular_jacobian[..., : J.shape[-1]])
+    return reciprocal_condition(J, min(3, J.shape[-1]))
+
+
+def joint_margin_at(point: OperatingPoint) -> Floats:
+    """Least distance of a joint from its limits, as a share of half its range."""
+    mechanism, posture = _mechanism(point)
+    return limited_joints(mechanism, posture)
+
+
+def link_clearance_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Floats:
+    """Least distance between links that share no joint, rods of the wanted radius with round ends [m]."""
+    mechanism, posture = _mechanism(point)
+    (radius,) = numbers_of(wanted, point.shape, "the radius of the links", "link_radius")
+    pairs = _pairs(mechanism, wanted.colliding_links)
+    with _links_of_a_length():
+        return np.asarray(link_distance(mechanism, posture, pairs) - 2.0 * radius)
+
+
+def reach_at(point: OperatingPoint) -> Floats:
+    """Largest distance of any point of a link from the middle of the base [m]."""
+    return _reach(point, (0, 1, 2))
+
+
+def reach_x_at(point: OperatingPoint) -> Floats:
+    """The same along x alone [m]."""
+    return _reach(point, (0,))
+
+
+def reach_y_at(point: OperatingPoint) -> Floats:
+    """The same along y alone [m]."""
+    return _reach(point, (1,))
+
+
+def reach_z_at(point: OperatingPoint) -> Floats:
+    """The same along z alone [m]."""
+    return _reach(point, (2,))
+
+
+def _reach(point: OperatingPoint, axes: tuple[int, ...]) -> Floats:
+    mechanism, posture = _mechanism(point)
+    with _links_of_a_length():
+        return largest_distance(mechanism, posture, axes)
+
+
+@contextmanager
+def _links_of_a_length() -> Iterator[None]:
+    """Say what to give where no link has a length."""
+    try:
+        yield
+    except NoRodsError:
+        raise MeasureError("needs links with a length; give length_m of the links, or handle.point_m") from None
+
+
+def _mechanism(point: OperatingPoint) -> tuple[Mechanism, Posture]:
+    if point.mechanism is None or point.posture is None:
+        raise NoMechanismError
+    return point.mechanism, point.posture
+
+
+def _pairs(mechanism: Mechanism, written: tuple[str, ...] | None) -> list[tuple[int, int]] | None:
+    """Pairs of links by their names, each written as "A:B". Raises MeasureError for what is no such pair."""
+    if written is None:
+        return None
+    index = {name: i for i, name in enumerate(mechanism.links.names)}
+    pairs = []
+    for text in written:
+        names = [name.strip() for name in text.split(":")]
+        unknown = [name for name in names if name not in index]
+        if len(names) != 2 or names[0] == names[-1]:
+            raise MeasureError(f"needs pairs of links in colliding_links, each written as 'A:B', got {text!r}")
+        if unknown:
+            known = ", ".join(name for name in index if "/" not in name)
+            raise MeasureError(f"has no link {unknown[0]!r} to check in colliding_links; there are {known}")
+        pairs.append((index[names[0]], index[names[1]]))
+    return pairs

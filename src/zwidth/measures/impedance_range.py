@@ -11,17 +11,99 @@ only. Both are exact where their assumptions hold: no W = sqrt(k/m) T is too lar
 coefficient the scan has lost, is (12 - 16 ln 2) m^2/T^3; (5.7) is extended beyond W = pi; (5.8), damaged in the
 scan, is read with ln(1 + c). (4.46), the largest damping of all stable K, at K = -k, is not used: here it is that
 of K -> 0. The numbers below (4.32) in the thesis are a misprint: they are those without delay.
+
+The catalogue's measures of the stable walls, from the exact chart at operating points.
+
+The catalogue's measure of the stiffest wall with margins, at operating points: see `chart.wall_margins`.
+
+The catalogue's closed forms of the impedance range at operating points: see `measures.impedance_range`.
+
+As in the thesis's maps (Figs. 5.2, 5.3), damping is left out although the device is damped; the titles say so. A
+MeasureError is raised unless all other assumptions hold: the model is `rigid` or `motor-mass`, there is no
+operator, the delay is whole (none for `motor-mass`), the velocity is the plain backward difference.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from zwidth.arrays import Flags, Floats
+from zwidth.chart.chart import largest_stiffness, stability_chart
+from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
+from zwidth.chart.edge_memory import DOUBTFUL
+from zwidth.chart.point_numbers import numbers_of_points
+from zwidth.chart.wall_margins import delays_within, stiffness_with_margins, stiffness_with_margins_alone
 from zwidth.conditions import thesis_flexible, thesis_whole_delay
+from zwidth.conditions.assumptions import RIGID, SPRUNG, UNDELAYED, WHOLE_DELAY
+from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import joined_tables
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_loops import pieces_of_points, tables_of_points
+from zwidth.measures.definition import MeasureError, MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.evaluate import complete_charts, complete_pointwise, evaluate_pointwise, with_status
+from zwidth.measures.preconditions import loop_case, numbers_of, require_assumptions, require_motor_encoders
+
+NONE_STABLE_WITH_MARGINS: Final = "no wall with K > 0 and B >= 0 is stable with these margins"
+
+
+def stiffness_max_with_margins_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Supremum of K over the walls that are stable with stiffness, damping and delay off by margins [N/m]."""
+    names = "stiffness_margin", "damping_margin", "delay_margin"
+    margins = numbers_of(wanted, point.shape, "margins in stiffness, damping and delay", *names)
+
+    def alone(at: Index) -> float:
+        stiffness, damping, delay = (float(margin[at]) for margin in margins)
+        loop, count = point[at].loop, delays_within(delay)
+        computer = loop.controller
+        own = float(computer.delay)
+        loops = [
+            Loop(loop.plant, replace(computer, delay=own + share * delay))
+            for share in np.linspace(0.0, 1.0, count)
+        ]
+        found = stiffness_with_margins_alone(loops, stiffness, damping)
+        if found is None:
+            raise NoValueError(NONE_STABLE_WITH_MARGINS)
+        return found[0]
+
+    together = _together(point, *(margin.ravel() for margin in margins))
+    if together is None:
+        return complete_pointwise(np.full(point.shape, np.nan), alone, point)
+    return complete_charts(point, *together, alone, NONE_STABLE_WITH_MARGINS)
+
+
+def _together(
+    point: OperatingPoint, stiffness: Floats, damping: Floats, delay: Floats
+) -> tuple[Floats, NDArray[np.uint8]] | None:
+    """Stiffnesses and statuses of all points, flat; None where compiled code cannot treat any of them."""
+    values, status = np.full(delay.size, np.nan), np.full(delay.size, DOUBTFUL, dtype=np.uint8)
+    each = np.array([delays_within(one) for one in np.unique(delay)])
+    counts = each[np.unique(delay, return_inverse=True)[1].ravel()]
+    for at, piece in pieces_of_points(point):
+        rows = np.arange(delay.size)[at]
+        for count in np.unique(counts[rows]):
+            some = np.flatnonzero(counts[rows] == count)
+            own = piece if len(some) == len(rows) else piece.flat[some]
+            margin = delay[rows[some]]
+            alike = bool((margin == margin[0]).all())
+            own, longer = (own, margin[0]) if alike else (own.flat, margin)
+            controller = own.controller
+            first = np.asarray(controller.delay)
+            delays = [first + share * longer for share in np.linspace(0.0, 1.0, int(count))]
+            computers = [replace(controller, delay=d if d.ndim else float(d)) for d in delays]
+            tables = tables_of_points(own, computers)
+            if tables is None:
+                return None
+            at_rows = rows[some]
+            walls, status[at_rows] = stiffness_with_margins(
+                joined_tables(tables), int(count), stiffness[at_rows], damping[at_rows]
+            )
+            values[at_rows] = walls[:, 0]
+    return values, status
 
 
 @dataclass(frozen=True)
@@ -110,3 +192,131 @@ def _positive(values: Floats) -> Flags:
 
 def _masked_range(applies: Flags, *numbers: Floats) -> ImpedanceRange:
     return ImpedanceRange(*(np.where(applies, number, np.nan) for number in numbers))
+
+
+Index = tuple[int, ...]
+
+NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
+NONE_DECAYS: Final = "no wall with K > 0 and B >= 0 has a spectral radius below the wanted one"
+
+
+def stiffness_max_at(point: OperatingPoint) -> MeasureValues:
+    """Supremum of K over the stable walls with K > 0, B >= 0, of the points' models and loops [N/m]."""
+    return _computed(point, STIFFEST, "stiffness", _stiffness_max_at, NONE_STABLE)
+
+
+def stiffness_max_decaying_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Supremum of K over the walls with K > 0, B >= 0 whose spectral radius is below the wanted one [N/m]."""
+    what = "the spectral radius that the wall must not exceed"
+    (radius,) = numbers_of(wanted, point.shape, what, "spectral_radius")
+
+    def alone(at: Index) -> float:
+        peak = largest_stiffness(point[at].loop, float(radius[at]))
+        if peak is None:
+            raise NoValueError(NONE_DECAYS)
+        return peak.stiffness
+
+    numbers = numbers_of_points(point, STIFFEST, radius)
+    if numbers is None:
+        return complete_pointwise(np.full(point.shape, np.nan), alone, point)
+    return complete_charts(point, numbers.stiffness, numbers.status, alone, NONE_DECAYS)
+
+
+def damping_max_at(point: OperatingPoint) -> MeasureValues:
+    """Supremum of B >= 0 that is stable for all sufficiently small K > 0, of the points [N s/m]; 0 if none is."""
+    return _computed(point, ALL_NUMBERS, "largest_damping", _damping_max_at)
+
+
+def stable_area_at(point: OperatingPoint) -> MeasureValues:
+    """Area of the stable walls with K >= 0, B >= 0 of the points [N^2 s/m^2]."""
+    return _computed(point, ALL_NUMBERS, "area", _stable_area_at)
+
+
+def fastest_decay_at(point: OperatingPoint) -> MeasureValues:
+    """Spectral radius of the wall whose slowest motion decays fastest, of the points."""
+    return _computed(point, DECAY, "spectral_radius", _fastest_decay_at, "no wall is stable")
+
+
+def _computed(
+    point: OperatingPoint,
+    what: int,
+    number: str,
+    alone: Callable[[OperatingPoint], float],
+    none_stable: str = "",
+) -> MeasureValues:
+    """A number of all points' charts, computed together (`chart.point_numbers`), and of a point in doubt, or of a
+    device whose modes are not in that form, by the chart of each alone.
+
+    number       attribute of `ChartNumbers`
+    none_stable  the reason where no wall is stable and there is no number therefore; "": there is one
+    """
+    numbers = numbers_of_points(point, what)
+    if numbers is None:
+        return evaluate_pointwise(alone, point)
+    states = numbers.decay_status if what == DECAY else numbers.status
+    return complete_charts(point, getattr(numbers, number), states, lambda at: alone(point[at]), none_stable)
+
+
+def _stiffness_max_at(point: OperatingPoint) -> float:
+    peak = largest_stiffness(point.loop)
+    if peak is None:
+        raise NoValueError(NONE_STABLE)
+    return peak.stiffness
+
+
+def _damping_max_at(point: OperatingPoint) -> float:
+    return stability_chart(point.loop, decay=False).damping_max
+
+
+def _stable_area_at(point: OperatingPoint) -> float:
+    return stability_chart(point.loop, decay=False).stable_area
+
+
+def _fastest_decay_at(point: OperatingPoint) -> float:
+    wall = stability_chart(point.loop).fastest_decay
+    if wall is None:
+        raise NoValueError("no wall is stable")
+    return wall.spectral_radius
+
+
+_NONE = "no wall of positive stiffness is stable, or the mass or the spring of the model is not there"
+
+
+def stiffness_max_closed_form_at(point: OperatingPoint) -> MeasureValues:
+    """Thesis eq. 5.4, 5.6 and 5.7."""
+    return with_status(point, _range(point).stiffness_max, _NONE)
+
+
+def damping_max_closed_form_at(point: OperatingPoint) -> MeasureValues:
+    """Thesis eq. 5.4, 5.6 and 5.7, for stiffnesses near 0."""
+    return with_status(point, _range(point).damping_max, _NONE)
+
+
+def stable_area_closed_form_at(point: OperatingPoint) -> MeasureValues:
+    """Thesis eq. 5.5 and 5.8."""
+    return with_status(point, _range(point).stable_area, _NONE)
+
+
+def _range(point: OperatingPoint) -> ImpedanceRange:
+    if point.operator is not None and point.model != "motor-mass":
+        raise MeasureError("has a closed form for the device alone", [("operator", "none")])
+    case = loop_case(point)
+    T, delay_samples = point.controller.sampling_period, point.controller.whole_delay
+    mass: ArrayLike
+    motor: ArrayLike
+    stiffness: ArrayLike
+    if point.mechanism is None:
+        traits, rigid, sprung = case.traits, RIGID not in case.unmet, SPRUNG not in case.unmet
+        mass, motor, stiffness = traits.rigid_mass, traits.side_mass, traits.side_stiffness
+    else:
+        numbers, rigid, sprung = point.effective, point.model == "rigid", point.model == "motor-mass"
+        mass, motor, stiffness = numbers.rigid_mass, numbers.motor_side_mass, numbers.stiffness
+    if rigid:
+        require_assumptions(case, WHOLE_DELAY)
+        return rigid_range(mass, T, delay_samples)
+    if sprung:
+        require_motor_encoders(point)
+        require_assumptions(case, UNDELAYED)
+        return sprung_range(motor, stiffness, T)
+    models = [("model", "rigid"), ("model", "motor-mass")]
+    raise MeasureError("has a closed form for two models only", models, True)

@@ -4,6 +4,10 @@
 
 both in the posture that the device has under load. A motion that no wall moves without load grows or decays under
 one (`loop.sideways`); the fastest-growing one counts.
+
+The catalogue's measures of what a load does to the stiffest wall and along the surface, one point at a time.
+
+See `measures.load_effect` for what is computed.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import numpy as np
 from zwidth.chart.chart import largest_stiffness
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.sideways import SidewaysMotion
+from zwidth.measures.definition import MeasureError, NoValueError
 from zwidth.model.loaded_plant import moved_motions
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
@@ -60,3 +65,31 @@ def fastest_sideways_motion(point: OperatingPoint) -> SidewaysMotion | None:
     whole = point.plant if point.mechanism is None else point.in_model("full").plant
     free = moved_motions(whole)[1].squared == 0.0
     return SidewaysMotion(0.0, 0.0) if np.any(free) else None
+
+
+def load_change_at(point: OperatingPoint) -> float:
+    """Relative change of the largest stiffness by all of the load, in the posture under it."""
+    _require_load(point)
+    try:
+        return load_change(point)
+    except NoWallError as error:
+        raise NoValueError(str(error)) from None
+
+
+def sideways_growth_at(point: OperatingPoint) -> float:
+    """Growth rate of the fastest-growing motion along the surface [1/s]; 0 if none grows."""
+    _require_load(point)
+    motion = fastest_sideways_motion(point)
+    return 0.0 if motion is None else max(motion.growth_rate, 0.0)
+
+
+def sideways_force_at(point: OperatingPoint) -> float:
+    """Size of the hand's force across the direction that the posture needs [N], about an axis of its moment."""
+    _require_load(point)
+    return float(np.linalg.norm(point.equilibrium.sideways_force))
+
+
+def _require_load(point: OperatingPoint) -> None:
+    """Raises MeasureError for a device that bears nothing."""
+    if point.load is None:
+        raise MeasureError("needs a load, about which the device is linearised", [("load", None)])

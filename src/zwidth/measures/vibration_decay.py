@@ -20,6 +20,10 @@ mass of that g, if the two roots are conjugate, the third, g D/rho^2, is not slo
 is B > K T/2 and a third root of at most rho: the rest follows. Where it is not reached the least spectral radius
 is larger and with another mass (`fastest_mass` finds it, for any model). The scan damages the last
 term under the root of (5.15) to "KZAL"; it is (K T)^2.
+
+The catalogue's measures of how fast vibration at a wanted wall decays, for many points together.
+
+See `measures.vibration_decay` for the formulas. Stability is that of the device with its operator.
 """
 
 from __future__ import annotations
@@ -31,13 +35,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.chart.verdict import spectral_radius
+from zwidth.chart.point_radii import radii_at_points
+from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, Verdicts, judge, spectral_radius
 from zwidth.loop.loop import Loop
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.evaluate import complete_pointwise
+from zwidth.measures.preconditions import walls_of
 from zwidth.model.plant import Plant
 
 # Masses tried per factor of ten, and how near to the best spectral radius one must be to be refined.
 TRIED: Final = 60
-NEAR: Final = 1e-2
+NEAR_BEST: Final = 1e-2
 
 
 @dataclass(frozen=True)
@@ -119,7 +128,7 @@ def fastest_mass(
     best = (float(radii.min()), float(scale[np.argmin(radii)]))
     padded = np.concatenate([[np.inf], radii, [np.inf]])
     lowest_of_three = (radii <= padded[:-2]) & (radii <= padded[2:])
-    for i in np.flatnonzero(lowest_of_three & (radii <= best[0] + NEAR)).tolist():
+    for i in np.flatnonzero(lowest_of_three & (radii <= best[0] + NEAR_BEST)).tolist():
         bounds = scale[max(i - 1, 0)], scale[min(i + 1, len(scale) - 1)]
         refined = minimize_scalar(radius, bounds=bounds, method="bounded", options={"xatol": 1e-10})
         best = min(best, (float(refined.fun), float(refined.x)))
@@ -156,3 +165,44 @@ def decay_time(radius: ArrayLike, sampling_period: ArrayLike) -> Floats:
         raise ValueError(f"sampling_period must be greater than 0 s, got {float(np.min(T)):g}")
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(rho <= 1.0, T / np.abs(np.log(rho)), np.nan))
+
+
+Index = tuple[int, ...]
+
+
+def spectral_radius_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Spectral radius of the wanted wall by eigenvalues, for any model and loop."""
+
+    def alone(at: Index) -> float:
+        return float(_verdicts(point, wanted, at).spectral_radius[0])
+
+    return complete_pointwise(_radii(point, wanted), alone, point)
+
+
+def decay_time_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """Time in which the slowest vibration at the wanted wall shrinks to 1/e [s]."""
+    radii, period = _radii(point, wanted), np.broadcast_to(point.controller.sampling_period, point.shape)
+    known = np.where(radii < 1.0 - NEAR, decay_time(radii, period), np.nan)
+
+    def alone(at: Index) -> float:
+        radius, verdict = radii[at], UNSTABLE
+        if not radius > 1.0 + NEAR:
+            verdicts = _verdicts(point, wanted, at)
+            radius, verdict = verdicts.spectral_radius[0], int(verdicts.verdict[0])
+        if verdict != STABLE:
+            raise NoValueError(f"the wanted wall is {NAMES[verdict]} here, so that vibration does not decay")
+        return float(decay_time(radius, period[at]))
+
+    return complete_pointwise(known, alone, point)
+
+
+def _radii(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Floats:
+    """Spectral radius at each of many points; nan where a point is to be asked alone."""
+    walls = walls_of(wanted, point.shape)
+    # a single point has the digits that `Loop.check` has
+    return radii_at_points(point, *walls) if point.shape else np.full((), np.nan)
+
+
+def _verdicts(point: OperatingPoint, wanted: WantedWall | WantedWalls, at: Index) -> Verdicts:
+    K, B = walls_of(wanted, point.shape)
+    return judge(point[at].loop, [K[at]], [B[at]])

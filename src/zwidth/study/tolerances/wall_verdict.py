@@ -11,9 +11,9 @@ from zwidth.chart.point_chart import check_at
 from zwidth.chart.point_radii import radii_at_points
 from zwidth.chart.verdict import NEAR, STABLE, UNDECIDED
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.bindings.preconditions import walls_of
 from zwidth.measures.definition import Measure, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluate import complete_pointwise
+from zwidth.measures.preconditions import walls_of
 from zwidth.study.designs.column import Column
 
 
