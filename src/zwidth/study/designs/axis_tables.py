@@ -22,15 +22,15 @@ UNITS: Final = {key: one.unit for key, one in WANTED_BY_KEY.items()}
 NUMBER: Final = ("number", "integer")
 SEARCH: Final = "search"  # how designs are spread over bounds
 
-Fault = tuple[KeyPath, str]
-Faults = list[Fault]
+TableFault = tuple[KeyPath, str]
+TableFaults = list[TableFault]
 SetNumbers = dict[KeyPath, tuple[str, str]]  # what is set: as it is written, and the axis that sets it
 
 
 def axes_of(
     document: dict[str, Any],
     device: Device | None,
-    faults_of_axes: Faults,
+    faults_of_axes: TableFaults,
     folder: Path = Path(),
     *,
     bounds: bool = False,
@@ -85,7 +85,7 @@ def unit_of(document: dict[str, Any], key: str) -> str:
     return schema.key_unit(address.resolve(document, key))
 
 
-def _pairing_faults(document: dict[str, Any]) -> Iterator[Fault]:
+def _pairing_faults(document: dict[str, Any]) -> Iterator[TableFault]:
     """Faults of paired axes that have unlike numbers of values."""
     counts: list[tuple[int, str, int]] = []
     for n, table in tables(document, "axis"):
@@ -101,7 +101,7 @@ def _pairing_faults(document: dict[str, Any]) -> Iterator[Fault]:
             yield (("axis", n, key), message)
 
 
-def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
+def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[TableFault]:
     """Faults of an axis that has no values, gives them twice (range and values), or has a key too many."""
     span, values = table.get("range"), table.get("values")
     if "catalogue" in table:
@@ -139,7 +139,7 @@ def _values_faults(table: dict[str, Any], sampling: str) -> Iterator[Fault]:
 
 
 def _catalogue_axis(
-    table: dict[str, Any], key: str, device: Device | None, folder: Path, taken: SetNumbers, faults: Faults
+    table: dict[str, Any], key: str, device: Device | None, folder: Path, taken: SetNumbers, faults: TableFaults
 ) -> Axis | None:
     """The axis of a catalogue; None where it has a fault, which is added to `faults`."""
     given, file = table.get("set"), table["catalogue"]
@@ -205,7 +205,7 @@ def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> 
 
 def overlap_faults(
     key: str, where: KeyPath, axis: str, device: Device | None, taken: SetNumbers, kind: str = "axis"
-) -> Iterator[Fault]:
+) -> Iterator[TableFault]:
     """Faults of a key that another axis or tie sets too, as a whole or in part, or that excludes such a key.
 
     key    of the axis itself, or of a number tied to it
@@ -243,7 +243,7 @@ def _exclude(one: KeyPath, other: KeyPath) -> bool:
 
 def key_faults(
     document: dict[str, Any], key: str, values: list[tuple[KeyPath, Any]], *, whole_ranges: bool = False
-) -> Iterator[Fault]:
+) -> Iterator[TableFault]:
     """Faults of a key that no device file has, or of values of a kind that the schema does not allow there.
 
     whole_ranges  whether a number that is whole may have a range
@@ -313,7 +313,12 @@ def _value_fault(value: Any, kinds: set[Any], key: str, texts: list[str]) -> str
 
 
 def ties_of(
-    table: dict[str, Any], key: str, device: Device, taken: SetNumbers, faults_of_axes: Faults, kind: str = "axis"
+    table: dict[str, Any],
+    key: str,
+    device: Device,
+    taken: SetNumbers,
+    faults_of_axes: TableFaults,
+    kind: str = "axis",
 ) -> Iterator[Tie]:
     """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`.
 
@@ -353,7 +358,7 @@ def mirrored(document: dict[str, Any], key: str) -> str | None:
 
 def _tie_faults(
     document: dict[str, Any], key: str, to: str, factor: Any, power: Any, table: dict[str, Any]
-) -> Iterator[Fault]:
+) -> Iterator[TableFault]:
     try:
         address.resolve(document, to)
         own = address.get(document, to) if address.exists(document, to) else None
@@ -387,7 +392,7 @@ def _numbers(value: Any) -> bool:
     return bool(value) and all(map(_numbers, value)) if isinstance(value, list) else is_number(value)
 
 
-def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None) -> Iterator[Fault]:
+def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None) -> Iterator[TableFault]:
     """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
     if key in WANTED:
         number = WANTED_BY_KEY[key]

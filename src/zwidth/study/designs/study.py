@@ -17,7 +17,7 @@ from zwidth.device.validation_messages import validation_messages
 from zwidth.measures.definition import Measure, Spelling, WantedWall
 from zwidth.measures.wanted import WANTED_NUMBERS
 from zwidth.memory_limit import TooLarge
-from zwidth.study.designs.axis_tables import Faults, axes_of, circumstance_fault
+from zwidth.study.designs.axis_tables import TableFaults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
 from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
@@ -97,7 +97,7 @@ def check_study(
     device: Device | None,
     operators: dict[str, Any],
     user_measures: Mapping[str, Measure] | None,
-    faults: Faults,
+    faults: TableFaults,
     *,
     plane: PlaneGrid | None = None,
     spelling: Spelling = as_key,
@@ -179,7 +179,9 @@ def _missing(document: dict[str, Any], needs: Sequence[str]) -> Iterator[tuple[K
             yield (key,), f"is missing; add it ({description((key,))})"
 
 
-def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], faults: Faults) -> tuple[Column, ...]:
+def _columns(
+    document: dict[str, Any], user_measures: Mapping[str, Measure], faults: TableFaults
+) -> tuple[Column, ...]:
     """The columns whose measures exist; unknown and repeated ones are added to `faults`."""
     names = document.get("measures")
     columns: list[Column] = []
@@ -197,7 +199,7 @@ def _columns(document: dict[str, Any], user_measures: Mapping[str, Measure], fau
     return tuple(columns)
 
 
-def _check_sampling(document: dict[str, Any], faults: Faults) -> None:
+def _check_sampling(document: dict[str, Any], faults: TableFaults) -> None:
     """Add the faults of `count` and `seed`, which belong to a Latin hypercube."""
     if document.get("sampling", "grid") == "latin-hypercube":
         if "count" not in document:
@@ -208,7 +210,7 @@ def _check_sampling(document: dict[str, Any], faults: Faults) -> None:
             faults.append(((key,), "is read with sampling = 'latin-hypercube' only; remove it, or set that"))
 
 
-def _check_circumstances(document: dict[str, Any], device: Device | None, faults: Faults) -> None:
+def _check_circumstances(document: dict[str, Any], device: Device | None, faults: TableFaults) -> None:
     """Add the faults of circumstances that do not fit the device, or that an axis sets too."""
     varied = {axis.get("key") for _, axis in tables(document, "axis")}
     for key in CIRCUMSTANCES:
@@ -230,7 +232,7 @@ def plane_of_study(
     device: Device | None,
     columns: Sequence[Column],
     plane: PlaneGrid | None,
-    faults: Faults,
+    faults: TableFaults,
     spelling: Spelling,
 ) -> PlaneGrid | None:
     """The grid over the workspace, the same for all designs; None where no measure is over it."""
@@ -274,7 +276,7 @@ def plane_of_study(
 
 
 def _task(
-    document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: Faults, bounds: bool
+    document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults, bounds: bool
 ) -> Task | None:
     """The task of the study; None without one, or where anything is wrong with it."""
     if "task" not in document:

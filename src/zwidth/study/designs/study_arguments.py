@@ -13,7 +13,7 @@ from zwidth.device.toml_access import is_number
 from zwidth.measures.definition import Measure, as_argument
 from zwidth.measures.wanted import WANTED_NUMBERS
 from zwidth.model.argument_checks import require, wrong_type
-from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import measure_list
 from zwidth.study.designs.study import KEYS, Study, check_study
 from zwidth.study.designs.study_file import axis_operators
@@ -91,9 +91,9 @@ def study_over(
         **({"sampling": "paired"} if paired else {}),
         **{KEYS.get(name, name): plain_value(value) for name, value in given.items() if value is not None},
     }
-    faults: Faults = []
+    faults: TableFaults = []
     operator_faults: list[Fault] = []
-    absent: Faults = []
+    absent: TableFaults = []
     operators = axis_operators(document, File(), absent, operator_faults)
     study = check_study(
         document, LABEL, device, operators, measures_by_name, faults, plane=plane, spelling=as_argument
@@ -139,9 +139,9 @@ def plain_value(value: Any) -> Any:
     return [plain_value(inner) for inner in value] if isinstance(value, list | tuple | range) else value
 
 
-def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> Faults:
+def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str, Any]) -> TableFaults:
     """What is wrong with a position given by the angles of the driven joints."""
-    faults: Faults = [(("at",), "is an axis as well; remove one of the two")] if "at" in axes else []
+    faults: TableFaults = [(("at",), "is an axis as well; remove one of the two")] if "at" in axes else []
     try:
         device.position(angles)
     except DeviceError as error:

@@ -22,7 +22,7 @@ from zwidth.device.text_file import UnreadableFileError, read_text
 from zwidth.device.toml_access import table, tables
 from zwidth.measures.definition import Measure
 from zwidth.measures.user_measures import load_measures
-from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.study import Study, check_study
 
 STUDIES: Final = BundledFiles("zoo", "study", "a study file", "a study needs a device, measures and an [[axis]]")
@@ -56,8 +56,8 @@ def study_of(
     *,
     bounds: bool = False,
     needs: Sequence[str] | None = None,
-    further: Callable[[Device | None, Faults], None] | None = None,
-    further_of_measures: Callable[[Device | None, Mapping[str, Measure], Faults], None] | None = None,
+    further: Callable[[Device | None, TableFaults], None] | None = None,
+    further_of_measures: Callable[[Device | None, Mapping[str, Measure], TableFaults], None] | None = None,
 ) -> Study:
     """The study that a document describes.
 
@@ -73,8 +73,8 @@ def study_of(
     refuse_newer(document, label)
     if DEVICE_KEYS & document.keys() and not STUDY_KEYS & document.keys():
         raise _device_instead(label, "a device")
-    faults: Faults = []
-    absent: Faults = []  # files that the study names and that are not there
+    faults: TableFaults = []
+    absent: TableFaults = []  # files that the study names and that are not there
     file_faults: list[Fault] = []  # of those that are
     folder = File(label).parent
     device = _device(document, folder, faults, absent, file_faults)
@@ -100,7 +100,7 @@ def _device_instead(label: str, what: str) -> DeviceError:
 
 
 def axis_operators(
-    document: dict[str, Any], folder: File, absent: Faults, file_faults: list[Fault]
+    document: dict[str, Any], folder: File, absent: TableFaults, file_faults: list[Fault]
 ) -> dict[str, Any]:
     """The operators that an axis or the task names, by name: their tables, None for nobody.
 
@@ -124,7 +124,7 @@ def axis_operators(
 
 @contextmanager
 def _faults_kept(
-    key: KeyPath, name: str, folder: File, absent: Faults, file_faults: list[Fault]
+    key: KeyPath, name: str, folder: File, absent: TableFaults, file_faults: list[Fault]
 ) -> Iterator[None]:
     """Keep the faults of a file that is read inside this block: as the study's where it names none that is there,
     else as the file's own."""
@@ -138,7 +138,7 @@ def _faults_kept(
 
 
 def _device(
-    document: dict[str, Any], folder: File, faults: Faults, absent: Faults, file_faults: list[Fault]
+    document: dict[str, Any], folder: File, faults: TableFaults, absent: TableFaults, file_faults: list[Fault]
 ) -> Device | None:
     """The device with the study's operator and changes; None where it cannot be loaded.
 
@@ -174,7 +174,7 @@ def _device(
     return device
 
 
-def _own_measures(document: dict[str, Any], folder: File, faults: Faults) -> dict[str, Measure] | None:
+def _own_measures(document: dict[str, Any], folder: File, faults: TableFaults) -> dict[str, Measure] | None:
     """The measures of the file that the study names, by name; None where it has faults."""
     file = document.get("measures_file")
     if not isinstance(file, str) or not file:

@@ -16,7 +16,7 @@ from zwidth.device.load import in_order
 from zwidth.device.schema.value_types import Section
 from zwidth.device.toml_access import is_number, table
 from zwidth.measures.definition import Better, Measure
-from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.study import Study, as_key, plane_of_study
@@ -131,10 +131,10 @@ def read_study_to_optimise(path: str | os.PathLike[str]) -> Study:
 def study_to_optimise(document: dict[str, Any], label: str = "study") -> Study:
     """The study that a document describes, for an optimiser; see `read_study_to_optimise`."""
 
-    def tolerance_faults(device: Device | None, faults: Faults) -> None:
+    def tolerance_faults(device: Device | None, faults: TableFaults) -> None:
         tolerances_of(document, device, faults)
 
-    def optimise_faults(device: Device | None, user_measures: Mapping[str, Measure], faults: Faults) -> None:
+    def optimise_faults(device: Device | None, user_measures: Mapping[str, Measure], faults: TableFaults) -> None:
         found = _Requests(document, user_measures, faults)
         _plane(document, device, found.columns, faults)
 
@@ -147,7 +147,7 @@ def problem_of(study: Study) -> Problem:
     Raises  DeviceError  with all faults
     """
     given = table(study.document, "optimise")
-    faults: Faults = []
+    faults: TableFaults = []
     task = study.task
     if task is not None and study.wall.force is None and (held := task.demands.get("continuous_force_N")):
         study = replace(study, wall=replace(study.wall, force=held))
@@ -175,7 +175,7 @@ def problem_of(study: Study) -> Problem:
 
 
 def _plane(
-    document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: Faults
+    document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults
 ) -> PlaneGrid | None:
     """The grid over the workspace of statistics; None with a task, or where no column is one."""
     if "task" in document:
@@ -196,7 +196,9 @@ class _Requests:
     objectives, demands  those without a fault
     """
 
-    def __init__(self, document: Mapping[str, Any], user_measures: Mapping[str, Measure], faults: Faults) -> None:
+    def __init__(
+        self, document: Mapping[str, Any], user_measures: Mapping[str, Measure], faults: TableFaults
+    ) -> None:
         self.document, self.user_measures, self.faults = document, user_measures, faults
         self.columns: list[Column] = []
         self.paths: list[KeyPath] = []

@@ -7,7 +7,7 @@ from math import exp, floor, log, log10
 from typing import Final
 
 from zwidth.device.faults import Fault
-from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.tolerances.buildable import FaultsOf, Obstacle, obstacle
 from zwidth.study.tolerances.distribution import Distribution
 
@@ -17,7 +17,7 @@ OTHERWISE: Final = "give low and high that it may have"
 
 def beyond_faults(
     key: str, path: str, value: float | None, width_key: str, law: Distribution, faults_at: FaultsOf
-) -> Faults:
+) -> TableFaults:
     """Faults of a distribution at whose ends, or at one of them, no device can be built.
 
     path       of its number in full
@@ -39,7 +39,7 @@ def beyond_faults(
     if not by_ends:
         advice = _narrower(law, width_key, [one.last for one in found], faults_at) if found else ""
         return [((width_key,), f"{leads}; {_at_end(one, path)}; {advice}") for one in found[:1]]
-    faults: Faults = []
+    faults: TableFaults = []
     for one in found:
         rising = one.end == law.low
         limit = _rounded(one.last, lambda end: not faults_at(end), up=rising)

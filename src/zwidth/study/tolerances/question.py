@@ -10,7 +10,7 @@ from typing import Any, Final
 from zwidth.device.device import Device
 from zwidth.device.toml_access import is_number, table
 from zwidth.memory_limit import check_memory
-from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
 from zwidth.study.designs.study import Study
@@ -111,7 +111,7 @@ def question_of(
     if "draw" in document and not isinstance(document["draw"], dict):
         own["draw"] = document["draw"]  # the schema reports it
 
-    def further(device: Device | None, faults: Faults) -> None:
+    def further(device: Device | None, faults: TableFaults) -> None:
         found.extend(tolerances_of(document, device, faults))
         faults += wall_faults(document)
         faults += draw_faults(draw)
@@ -135,7 +135,7 @@ def question_with(study: Study, tolerances: tuple[Tolerance, ...], draw: Mapping
     return question
 
 
-def wall_faults(document: Mapping[str, Any], names: Mapping[str, str] | None = None) -> Faults:
+def wall_faults(document: Mapping[str, Any], names: Mapping[str, str] | None = None) -> TableFaults:
     """The fault of a wall of which one number is missing.
 
     names  what keys are called where they come from arguments
@@ -148,9 +148,9 @@ def wall_faults(document: Mapping[str, Any], names: Mapping[str, str] | None = N
     return [((there[0],), f"needs {shown} beside it: the probability that this wall is stable")]
 
 
-def draw_faults(draw: Mapping[str, Any]) -> Faults:
+def draw_faults(draw: Mapping[str, Any]) -> TableFaults:
     """Faults of numbers of [draw] that the schema does not see."""
-    faults: Faults = []
+    faults: TableFaults = []
     size = draw.get("index_samples")
     if isinstance(size, int) and 0 < size < LEAST_INDEX_SAMPLES:
         message = f"must be at least {LEAST_INDEX_SAMPLES}, or 0 for no indices, got {size}: intervals of so few"

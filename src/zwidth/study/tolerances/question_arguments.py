@@ -10,7 +10,7 @@ from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath
 from zwidth.measures.definition import Measure, as_argument
 from zwidth.model.argument_checks import require, wrong_type
-from zwidth.study.designs.axis_tables import Faults
+from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.study import check_study
 from zwidth.study.designs.study_arguments import measures_of, plain_value
 from zwidth.study.tolerances.question import ToleranceQuestion, draw_faults, question_with, wall_faults
@@ -57,7 +57,7 @@ def question_over(
         **given,
         **({"draw": drawn} if drawn else {}),
     }
-    faults: Faults = []
+    faults: TableFaults = []
     study = check_study(document, LABEL, device, {}, by_name, faults, spelling=as_argument, needs=("tolerance",))
     found = tolerances_of(document, device, faults)
     faults += wall_faults(document, ARGUMENTS) + draw_faults(drawn)

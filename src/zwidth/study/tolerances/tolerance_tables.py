@@ -13,9 +13,9 @@ from zwidth.device.faults import KeyPath, dotted, nearest, quote
 from zwidth.device.schema import device_file as schema
 from zwidth.device.toml_access import is_number, tables
 from zwidth.study.designs.axis_tables import (
-    Fault,
-    Faults,
     SetNumbers,
+    TableFault,
+    TableFaults,
     key_faults,
     mirrored,
     overlap_faults,
@@ -49,7 +49,7 @@ PERCENT: Final = ("standard_deviation_percent", "plus_minus_percent")
 KIND: Final = "tolerance"
 
 
-def tolerances_of(document: dict[str, Any], device: Device | None, faults: Faults) -> tuple[Tolerance, ...]:
+def tolerances_of(document: dict[str, Any], device: Device | None, faults: TableFaults) -> tuple[Tolerance, ...]:
     """The tolerances of a study that have no fault; the faults of the others are added to `faults`.
 
     document  the study as read. Values of the wrong type are left out here: `study_schema` reports them
@@ -57,7 +57,7 @@ def tolerances_of(document: dict[str, Any], device: Device | None, faults: Fault
     """
     found, taken = [], SetNumbers()
     for n, table in tables(document, KIND):
-        own: Faults = list(_width_faults(table))
+        own: TableFaults = list(_width_faults(table))
         tolerance = _tolerance(table, device, taken, own)
         faults += [((KIND, n, *path), message) for path, message in own]
         if tolerance is not None and not own:
@@ -65,7 +65,7 @@ def tolerances_of(document: dict[str, Any], device: Device | None, faults: Fault
     return tuple(found)
 
 
-def _width_faults(table: dict[str, Any]) -> Iterator[Fault]:
+def _width_faults(table: dict[str, Any]) -> Iterator[TableFault]:
     """Faults of a table whose width is missing, given twice, upside down, or of another kind of distribution."""
     kind = table.get("distribution")
     if kind not in WIDTHS:
@@ -100,7 +100,7 @@ def _listed(ways: Sequence[Sequence[str]]) -> str:
 
 
 def _tolerance(
-    table: dict[str, Any], device: Device | None, taken: SetNumbers, faults: Faults
+    table: dict[str, Any], device: Device | None, taken: SetNumbers, faults: TableFaults
 ) -> Tolerance | None:
     """The tolerance of a table; None where it has faults, which are added, or some that the schema reports."""
     key = table.get("key")
@@ -165,7 +165,7 @@ def _key_fault(document: dict[str, Any], key: str) -> str:
 
 
 def _distribution(
-    table: dict[str, Any], key: str, value: float | None, document: dict[str, Any], faults: Faults
+    table: dict[str, Any], key: str, value: float | None, document: dict[str, Any], faults: TableFaults
 ) -> tuple[Distribution, bool] | None:
     """The distribution of a table without faults of its width, and whether it is relative; faults are added.
 
@@ -206,7 +206,7 @@ def _width_key(table: dict[str, Any]) -> str:
 
 
 def _with_tails(
-    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: Faults
+    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: TableFaults
 ) -> Distribution | None:
     """A normal or lognormal distribution, cut off where the number would not be valid."""
     cut = float(table.get("cut_at_deviations", CUT))
@@ -235,7 +235,7 @@ def _with_tails(
     return made
 
 
-def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: Faults) -> Distribution | None:
+def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: TableFaults) -> Distribution | None:
     """A uniform or triangular distribution."""
     low, high = table.get("low"), table.get("high")
     percent = table.get("plus_minus_percent")
