@@ -94,7 +94,7 @@ class _OpenLoop:
         from scipy.optimize import root
 
         def left(unknown: Floats) -> Floats:
-            W, angle = _parts(unknown, count)
+            W, angle = _harmonic_parts(unknown, count)
             rest = (self._loop_response(angle, count)[0] * self._limited(W) - W) / abs(W[0])
             return np.concatenate([rest.real, rest.imag])
 
@@ -105,7 +105,7 @@ class _OpenLoop:
 
     def vibration(self, solution: Floats, count: int) -> tuple[float, float, float]:
         """Half of peak to peak of the commanded force and of the position, and the angle per sample."""
-        W, angle = _parts(solution, count)
+        W, angle = _harmonic_parts(solution, count)
         position = self._loop_response(angle, count)[1] * self._limited(W)
         force, place = (0.5 * float(np.ptp(self._over_phases(part))) for part in (W, position))
         return force, place, angle
@@ -128,7 +128,7 @@ class _OpenLoop:
         return np.asarray(2.0 / PHASES * np.exp(-1j * np.outer(orders, self.phases)) @ passed)
 
 
-def _parts(unknown: Floats, count: int) -> tuple[Complexes, float]:
+def _harmonic_parts(unknown: Floats, count: int) -> tuple[Complexes, float]:
     """The harmonics, the first one real, and the angle per sample."""
     first = np.exp(unknown[0])
     others = unknown[2 : count + 1] + 1j * unknown[count + 1 :]

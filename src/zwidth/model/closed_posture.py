@@ -14,7 +14,7 @@ from zwidth.model.forward_kinematics import WorkingMemory, move_joints, place_li
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 NOT_CLOSED: Final = -1.0
-ROUNDING: Final = 1e-14  # turn of a joint below which Newton has nothing more to gain [rad]
+JOINT_ROUNDING: Final = 1e-14  # turn of a joint below which Newton has nothing more to gain [rad]
 SURE: Final = 1e-7  # turn whose square is rounding: the next iteration would not move [rad]
 STEP: Final = 0.2  # turn of a driven joint that is taken at once [rad]
 
@@ -84,7 +84,7 @@ def close_at(mech: MechanismArrays, independent: Floats, angles: Floats, work: W
         moved += size
         if not moved < LARGEST_TURN or not condition > 0.0:
             return NOT_CLOSED
-        if size < ROUNDING:
+        if size < JOINT_ROUNDING:
             return condition
         if iteration > 0 and size > CONTRACTION * last:
             # rounding moves it to and fro, or there is no closed posture here

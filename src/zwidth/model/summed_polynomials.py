@@ -21,10 +21,10 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Complexes, Floats
 from zwidth.model.local_polynomials import CHUNK, ORDER, Fits
 
-TERMS: Final = ORDER + 2  # coefficients of a cubic
+SUMMED_TERMS: Final = ORDER + 2  # coefficients of a cubic
 PIECES: Final = 4  # in a window
 NARROWEST_WINDOW: Final = 64  # half of it, in spacings: C takes four values of thirty-two
-BINOMIALS: Final = np.array([[comb(p, q) for p in range(TERMS)] for q in range(TERMS)], dtype=np.float64)
+BINOMIALS: Final = np.array([[comb(p, q) for p in range(SUMMED_TERMS)] for q in range(SUMMED_TERMS)], dtype=np.float64)
 UNEXCITED: Final = 1e-9  # of the largest force at any frequency, below which a window tells nothing
 
 
@@ -39,24 +39,24 @@ class PieceSums:
         self._count = (values - 1) // self._width // 2 * 2
         self._blocks = 0
         # columns u R^p for p = 0 to 3, and y; R is -1 to 1 from the piece's beginning to its end
-        self._triangles: Complexes = np.zeros((self._count, TERMS + 1, TERMS + 1), dtype=np.complex128)
+        self._triangles: Complexes = np.zeros((self._count, SUMMED_TERMS + 1, SUMMED_TERMS + 1), dtype=np.complex128)
         self._power = np.zeros(self._count)
         R = (np.arange(self._width) + 0.5) * 2.0 / self._width - 1.0
-        self._powers = R[:, None] ** np.arange(TERMS)
+        self._powers = R[:, None] ** np.arange(SUMMED_TERMS)
 
     def add(self, U: Complexes, Y: Complexes) -> None:
         """Add the transforms (values,) of what was sent and read in a block."""
         used = slice(1, 1 + self._count * self._width)
         u, y = (values[used].reshape(self._count, self._width) for values in (U, Y))
         self._power += np.sum(np.abs(u) ** 2, axis=1)
-        chunk = max(1, CHUNK // (self._width * (2 * TERMS + 1)))
+        chunk = max(1, CHUNK // (self._width * (2 * SUMMED_TERMS + 1)))
         for first in range(0, self._count, chunk):
             some = slice(first, first + chunk)
-            columns = np.empty((*u[some].shape, 2 * TERMS + 1), dtype=np.complex128)
-            columns[..., :TERMS] = self._powers
-            columns[..., TERMS:-1] = u[some][..., None] * self._powers
+            columns = np.empty((*u[some].shape, 2 * SUMMED_TERMS + 1), dtype=np.complex128)
+            columns[..., :SUMMED_TERMS] = self._powers
+            columns[..., SUMMED_TERMS:-1] = u[some][..., None] * self._powers
             columns[..., -1] = y[some]
-            below = np.asarray(np.linalg.qr(columns, mode="r"))[:, TERMS:, TERMS:]
+            below = np.asarray(np.linalg.qr(columns, mode="r"))[:, SUMMED_TERMS:, SUMMED_TERMS:]
             self._triangles[some] = _reduced([self._triangles[some], below])
         self._blocks += 1
 
@@ -86,11 +86,11 @@ class PieceSums:
         about = [0.5 * (first + j) - tile - 0.25 - 0.5 / width for j in range(PIECES)]
         R = _reduced([pieces[first + j] @ _moved(middle, 0.25) for j, middle in enumerate(about)])
         least = UNEXCITED * np.sqrt(most)
-        coefficients, rows = _solution(R, ORDER + 1, least)
-        cubic, _ = _solution(R, ORDER + 2, least)
+        coefficients, rows = _summed_solution(R, ORDER + 1, least)
+        cubic, _ = _summed_solution(R, ORDER + 2, least)
         together, powers = (np.sum([one[first + j] for j in range(PIECES)], axis=0) for one in (filled, power))
         blocks = self._blocks * together
-        freedom = blocks * (self._width - TERMS) - (ORDER + 1)
+        freedom = blocks * (self._width - SUMMED_TERMS) - (ORDER + 1)
         left = np.sum(np.abs(R[:, ORDER + 1 :, -1]) ** 2, axis=1)
         factor: Complexes = rows @ np.conj(np.swapaxes(rows, 1, 2))
         return Fits(width, coefficients, factor, cubic, left / freedom, powers / (blocks * self._width), freedom)
@@ -104,15 +104,15 @@ def _reduced(stacked: list[Complexes]) -> Complexes:
 def _moved(middle: ArrayLike, half: float) -> Floats:
     """What turns columns u R^p of a piece into u r^p of a window, (n, 5, 5), where r = middle + half R:
     r^p = sum over q of (p over q) middle^(p - q) half^q R^q."""
-    q, p = np.arange(TERMS)[:, None], np.arange(TERMS)
+    q, p = np.arange(SUMMED_TERMS)[:, None], np.arange(SUMMED_TERMS)
     about = np.atleast_1d(np.asarray(middle, dtype=np.float64))[:, None, None]
-    matrix = np.zeros((len(about), TERMS + 1, TERMS + 1))
+    matrix = np.zeros((len(about), SUMMED_TERMS + 1, SUMMED_TERMS + 1))
     matrix[:, -1, -1] = 1.0
     matrix[:, :-1, :-1] = BINOMIALS * about ** np.maximum(p - q, 0) * half**q
     return matrix
 
 
-def _solution(R: Complexes, count: int, least: float) -> tuple[Complexes, Complexes]:
+def _summed_solution(R: Complexes, count: int, least: float) -> tuple[Complexes, Complexes]:
     """So many coefficients of G (n, count), and the inverse (n, count, count) of their equations; where the force
     tells nothing its size is taken as `least`, which leaves a vast error."""
     block, at = R[:, :count, :count].copy(), np.arange(count)

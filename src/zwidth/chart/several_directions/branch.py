@@ -13,7 +13,7 @@ from zwidth.chart.area import straight_integrals
 from zwidth.chart.several_directions.wall_curves import WallCurve
 
 # Largest distance of a chord from its arc, in shares of the stable set's size.
-CHORD = 1e-6
+BRANCH_CHORD = 1e-6
 MOST_PIECES = 64
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 
@@ -46,7 +46,7 @@ class Branch:
         return sign_changes(self.curve, places[inside], component)
 
     def dense_points(self, arc: Arc) -> ArcPoints:
-        """Angles strictly between an arc's ends, from first to last, with K and B: chords within CHORD of the
+        """Angles strictly between an arc's ends, from first to last, with K and B: chords within BRANCH_CHORD of the
         size."""
         places = arc.angles
         middles = 0.5 * (places[1:] + places[:-1])
@@ -57,7 +57,7 @@ class Branch:
         sag = np.max(np.abs(off) / self.size, axis=1)
         inside = self.curve.regular(places)
         sag[~(inside[1:] & inside[:-1])] = 0.0
-        pieces = np.clip(np.ceil(np.sqrt(sag / CHORD)), 1, MOST_PIECES).astype(int)
+        pieces = np.clip(np.ceil(np.sqrt(sag / BRANCH_CHORD)), 1, MOST_PIECES).astype(int)
         steps = [
             np.linspace(a, b, n, endpoint=False) for a, b, n in zip(places[:-1], places[1:], pieces, strict=True)
         ]

@@ -53,7 +53,7 @@ def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: Box) -> Ras
     bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
     grids = [_grid(low, high, CELL_SIDE) for low, high in bounds]
     walls = np.vstack([_grid(box.low, box.high, SIDE), *grids, *(_beside(cell, box) for cell in cells)])
-    radius = _radii(loop, walls)
+    radius = _raster_radii(loop, walls)
     union = shapely.MultiPolygon(polygons)
     inside = shapely.contains_xy(union, *walls.T)
     differs = (inside != (radius < 1.0)) & (np.abs(radius - 1.0) > ON_CIRCLE)
@@ -77,7 +77,7 @@ def try_orders(loop: MultiLoop, samples: Floats) -> Raster:
     low, high = np.log10(np.quantile(size, ORDERS, axis=0))
     x, y = np.meshgrid(*np.logspace(low, high, ORDER_SIDE).T)
     walls = np.vstack([np.column_stack([u * x.ravel(), v * y.ravel()]) for u in (1.0, -1.0) for v in (1.0, -1.0)])
-    stable = _radii(loop, walls) < 1.0 - ON_CIRCLE
+    stable = _raster_radii(loop, walls) < 1.0 - ON_CIRCLE
     return Raster(walls, stable, stable.copy())
 
 
@@ -96,7 +96,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
     at_a = raster.stable[[k for k, _ in pairs]]
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
-        same = (_radii(loop, middle) < 1.0) == at_a
+        same = (_raster_radii(loop, middle) < 1.0) == at_a
         a, b = np.where(same[:, None], middle, a), np.where(same[:, None], b, middle)
     known = shapely.transform(shapely.MultiPolygon(polygons).boundary, lambda points: points / box.size)
     new = (
@@ -133,7 +133,7 @@ def _grid(low: Floats, high: Floats, side: int) -> Floats:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-def _radii(loop: MultiLoop, walls: Floats) -> Floats:
+def _raster_radii(loop: MultiLoop, walls: Floats) -> Floats:
     """Largest |z| (k,) of walls (k, 2) of [K T, B]."""
     K, B = (walls / (loop.period, 1.0)).T
     return np.asarray(np.abs(np.linalg.eigvals(loop.transition_matrix(K, B))).max(axis=-1))

@@ -14,7 +14,7 @@ from zwidth.device.robot_files.read_model import read_bodies
 from zwidth.device.robot_files.robot import Follower, Motor, Robot, RobotJoint
 
 COMPILER: Final = {"fusestatic": "false", "discardvisual": "true", "balanceinertia": "false", "strippath": "true"}
-KINDS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+URDF_JOINTS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 PASSED_OVER: Final = {
     "safety_controller": "is a rule of a controller; it is left out",
     "calibration": "is left out",
@@ -51,8 +51,8 @@ def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
     for joint in root.findall("joint"):
         where = f"joint '{joint.get('name', '')}'"
         kind = joint.get("type", "")
-        if kind not in KINDS:
-            yield Fault(label, where, f"has the type '{kind}'; {suggestion(kind, KINDS, 'types')}")
+        if kind not in URDF_JOINTS:
+            yield Fault(label, where, f"has the type '{kind}'; {suggestion(kind, URDF_JOINTS, 'types')}")
         for end in ("parent", "child"):
             element = joint.find(end)
             link = "" if element is None else element.get("link", "")

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from zwidth.device.faults import fail
 from zwidth.device.text_file import UnreadableFileError, read_text
 
-LARGEST_FILE: Final = 20_000_000  # bytes; a humanoid's has a hundred thousand
+LARGEST_ROBOT_FILE: Final = 20_000_000  # bytes; a humanoid's has a hundred thousand
 OTHERS: Final = {
     "sdf": "is SDF; export it as URDF or MJCF",
     "COLLADA": "is a COLLADA scene; export the robot as URDF or MJCF",
@@ -23,7 +23,7 @@ def read_robot_text(path: str | os.PathLike[str]) -> str:
     """The text of a file. Raises DeviceError where it cannot be read."""
     label = os.fspath(path)
     try:
-        return read_text(path, LARGEST_FILE)
+        return read_text(path, LARGEST_ROBOT_FILE)
     except UnreadableFileError as error:
         raise fail(label, "", f"{error}; give an MJCF or URDF file") from None
 
@@ -64,7 +64,7 @@ def included_files(root: ElementTree.Element, folder: Path, label: str) -> None:
                 continue
             seen.add(name)
             try:
-                text = read_text(folder / name, LARGEST_FILE)
+                text = read_text(folder / name, LARGEST_ROBOT_FILE)
             except UnreadableFileError as error:
                 raise fail(label, f"include '{name}'", str(error)) from None
             if re.search(r"<!(DOCTYPE|ENTITY)", text):

@@ -14,7 +14,7 @@ from zwidth.identify.identification import Check
 
 PERIOD: Final = "loop.sampling_period_s"
 BY_CHANCE: Final = 1e-4  # probability below which a better fit is not by scatter
-SAME: Final = 0.01  # relative difference of the periods below which nothing is said
+SAME_PERIOD: Final = 0.01  # relative difference of the periods below which nothing is said
 OFF: Final = 0.1  # relative difference of the periods that is a fault of the file in any case
 
 
@@ -50,7 +50,7 @@ def check_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
     drop = before - log_likelihood(freed, found)[0]
     chance = float(f.sf(np.expm1(max(drop, 0.0) / count) * freedom, 1, freedom))
     own, better = (float(wider.values(vector)[len(paths)]) for vector in (start, found.vector))
-    if chance > BY_CHANCE or abs(better / own - 1.0) < SAME:
+    if chance > BY_CHANCE or abs(better / own - 1.0) < SAME_PERIOD:
         return []
     text = (
         f"{better:.4g} s explains the points better than the {own:.4g} s of the file, by {drop:.3g} in twice the "

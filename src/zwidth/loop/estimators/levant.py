@@ -12,7 +12,7 @@ from zwidth.loop.estimator import Estimator, NonlinearError
 from zwidth.loop.estimators.parameter_checks import check_period, check_positive
 
 # What the memory holds: the number of readings, the first of them, and the two states.
-COUNT, ORIGIN, POSITION, VELOCITY = 0, 1, 2, 3
+READINGS, FIRST_READING, POSITION, VELOCITY = 0, 1, 2, 3
 MEMORY = 4
 
 

@@ -6,7 +6,7 @@ from math import copysign, sqrt
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled
-from zwidth.loop.estimators.levant import COUNT, ORIGIN, POSITION, VELOCITY
+from zwidth.loop.estimators.levant import READINGS, FIRST_READING, POSITION, VELOCITY
 
 
 @compiled
@@ -19,10 +19,10 @@ def levant_estimate(memory: Floats, parameters: Floats, reading: float, period: 
     period      T [s]
     Returns     z1 [m/s], 0 at the first reading
     """
-    if memory[COUNT] == 0.0:
-        memory[ORIGIN] = reading
-    memory[COUNT] += 1.0
-    position = reading - memory[ORIGIN]
+    if memory[READINGS] == 0.0:
+        memory[FIRST_READING] = reading
+    memory[READINGS] += 1.0
+    position = reading - memory[FIRST_READING]
     brake, turn = period * parameters[0], period * parameters[1]
     ahead = memory[POSITION] + period * memory[VELOCITY] - position
     excess = abs(ahead) - period * turn

@@ -9,17 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.options import Numbers
+from zwidth.show.cli.options import Numbers, ParamType
 from zwidth.show.units import vector
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.loop.wall_matrices import WallMatrices
     from zwidth.show.cli.command import CommandLine
-
-    ParamType = click.ParamType[Any]
-else:
-    ParamType = click.ParamType  # generic in newer releases only
 
 
 class MatrixType(ParamType):

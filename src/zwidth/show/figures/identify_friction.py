@@ -14,7 +14,7 @@ from zwidth.show.units import quantity
 INSET: Final = (0.6, 0.1, 0.38, 0.3)  # of the predicted motion, where friction has no points: backward is below
 MOST_POINTS: Final = 1500  # drawn of the measured friction
 WIDEST: Final = 1.08  # times the largest velocity, to which the fitted lines run
-SHOWN: Final = 600  # samples of the unseen motion
+SHOWN_SAMPLES: Final = 600  # samples of the unseen motion
 
 
 def draw_friction(ax: Axes, identification: JointIdentification) -> None:
@@ -60,7 +60,7 @@ def _draw_motion(ax: Axes, identification: JointIdentification) -> None:
     time, measured, predicted = (np.asarray(identification.curves[name]) for name in ("time_s", *names))
     steps = np.diff(time)
     breaks = np.flatnonzero((steps > 1.5 * np.median(steps)) | (steps <= 0.0))
-    end = min(int(breaks[0]) + 1 if len(breaks) else len(time), SHOWN)
+    end = min(int(breaks[0]) + 1 if len(breaks) else len(time), SHOWN_SAMPLES)
     inset = ax.inset_axes(INSET, zorder=5.0)
     inset.plot(time[:end], measured[:end], color=GREY, linewidth=2.2, label="measured")
     inset.plot(time[:end], predicted[:end], color=BLACK, linewidth=0.8, label="predicted")

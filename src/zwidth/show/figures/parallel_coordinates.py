@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 DARKEST: Final = 0.9  # of the colours' scale: its light end looks like paper
-LETTERS: Final = 17
+AXIS_LETTERS: Final = 17
 INCOMPLETE_COLOUR: Final = "#A8A8A8"
 THIN_LINES_FROM: Final = 150  # designs from which on lines are drawn thinner
 
@@ -187,7 +187,7 @@ def _lines(name: str) -> str:
     lines = [""]
     for word in words:
         joined = lines[-1] + blank + word if lines[-1] else word
-        if len(joined) <= LETTERS or not lines[-1]:
+        if len(joined) <= AXIS_LETTERS or not lines[-1]:
             lines[-1] = joined
         else:
             lines.append(word.strip())

@@ -25,7 +25,7 @@ from zwidth.progress import Progress
 from zwidth.study.robust.measured_family import MeasuredFamily, MeasuredMember
 from zwidth.study.robust.unseen_members import STAGE, Violation
 
-DEPTH: Final = 1e-3  # share of the set's size by which a curve may run inside, since it is polygons
+MEASURED_DEPTH: Final = 1e-3  # share of the set's size by which a curve may run inside, since it is polygons
 LINE_WALLS: Final = 200  # on each line of real roots
 DENSER: Final = 4  # angles on the curve for each of a coarse chord
 
@@ -101,7 +101,7 @@ class RobustWalls:
         if not len(inside):
             return Intrusion(0.0, 0.0)
         away = shapely.distance(self.edge, shapely.points(inside))
-        buildable = inside[(inside[:, 0] > 0.0) & (inside[:, 1] >= 0.0) & (away > DEPTH)]
+        buildable = inside[(inside[:, 0] > 0.0) & (inside[:, 1] >= 0.0) & (away > MEASURED_DEPTH)]
         softer = max((self._above(*wall) for wall in buildable), default=0.0)
         return Intrusion(float(away.max()), softer)
 
@@ -132,7 +132,7 @@ def violation_of_measured(
     """What random members say of the robust walls. Spectral radii are not known of a response: nan."""
     members = list(random_measured_members(family, unseen, [seed, 1]))
     tried = intrusions(family, chart, members, progress)
-    violating = [place for place, one in tried.items() if one.depth > DEPTH]
+    violating = [place for place, one in tried.items() if one.depth > MEASURED_DEPTH]
     if not violating:
         return Violation(len(tried), 0, nan, 0.0, {}, len(members) - len(tried))
     worst = max(violating, key=lambda place: (tried[place].softer, tried[place].depth))

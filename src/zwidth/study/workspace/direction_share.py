@@ -23,7 +23,7 @@ NAME: Final = "share_of_directions"
 SAMPLES: Final = 24  # of a half circle
 HALVINGS: Final = 22  # of 7.5 degrees: 3e-8 rad
 LATITUDES: Final = 16  # of a half sphere
-CHUNK: Final = 2048  # points at once
+POINTS_AT_ONCE: Final = 2048  # points at once
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floa
     share: Floats = np.full(row.shape, np.nan)
     for which, search in direction_searches(requirement.measure, row):
         r = search.basis.shape[2]
-        for first in range(0, len(which), CHUNK):
-            indices = np.arange(first, min(first + CHUNK, len(which)))
+        for first in range(0, len(which), POINTS_AT_ONCE):
+            indices = np.arange(first, min(first + POINTS_AT_ONCE, len(which)))
             share[which[indices]] = _SHARES[r](requirement, search, indices)
     return np.asarray(share.reshape(point.shape))
 
