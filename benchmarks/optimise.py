@@ -27,9 +27,9 @@ from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
 from zwidth.study import Axis, Judge, Sampling, Study, hypervolume, problem_of, settle, study_of, values_at
 from zwidth.study import run as run_job
-from zwidth.study.optimise.evaluation import Judgement
-from zwidth.study.optimise.optimise import optimise
-from zwidth.study.optimise.problem import Problem
+from zwidth.study.optimisation.evaluation import Judgement
+from zwidth.study.optimisation.optimise import optimise
+from zwidth.study.optimisation.problem import Problem
 
 BUDGET, SEEDS, WORKERS = 4000, 3, 2
 WANTED = 60.0  # s for 4000 designs

@@ -18,8 +18,7 @@ from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table
 from benchmarks._touch_node import run_in_node
 from zwidth.contact import OUTPUTS, TouchNumbers, touch_periods
-from zwidth.contact.touch_numbers import touch_numbers
-from zwidth.contact.touch_step import TWO_SIDED
+from zwidth.contact.touch_step import TWO_SIDED, touch_numbers
 from zwidth.device.load import load
 
 STIFFNESS, DAMPING, START, PUSH = 2000.0, 5.0, -1e-3, 1.0

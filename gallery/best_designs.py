@@ -15,7 +15,7 @@ import numpy as np
 
 from gallery import optimal_mass
 from zwidth.study import study_of
-from zwidth.study.optimise.optimise import optimise
+from zwidth.study.optimisation.optimise import optimise
 
 
 def like(link: str) -> list[object]:

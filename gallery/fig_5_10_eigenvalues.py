@@ -19,7 +19,7 @@ from gallery.fig_3_7_bilateral_wall import chart, loop
 from gallery.shared_loops import published, write_page
 from zwidth.chart import eigenvalues, spectral_radius
 from zwidth.measures import wall_paths
-from zwidth.measures.eigenvalue_paths import Crossing
+from zwidth.measures.root_paths import Crossing
 
 K = 4000.0  # N/m
 LOWEST, HIGHEST = -2.0, 35.0  # N s/m

@@ -47,8 +47,7 @@ stiffness_ratio = optimised.stiffness_max / two_mass.stiffness_max
 def draw(figure) -> None:
     """Both charts beside each other, with the points."""
     from zwidth.show import VERMILION
-    from zwidth.show.figures.decay import draw_level
-    from zwidth.show.figures.stability import frame
+    from zwidth.show.figures.stability import draw_level, frame
 
     axes = figure.subplots(1, 2, sharey=True)
     for ax, (model, found) in zip(axes, charts.items(), strict=True):

@@ -15,7 +15,7 @@ from zwidth.device import Device
 from zwidth.device.load import load
 from zwidth.loop import OperatingPoint
 from zwidth.measures import MeasureValues, find_measure
-from zwidth.measures.evaluate import evaluate
+from zwidth.measures.evaluation import evaluate
 
 device = load("five-bar")
 LINKS = device.mechanism.links.names

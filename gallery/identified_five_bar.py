@@ -98,8 +98,7 @@ def chart() -> StabilityChart:
 
 def draw(figure: Any) -> None:
     """Deflections of both drives, and the boundary with the fitted chart."""
-    from zwidth.show.figures.identify_boundary import draw_boundary
-    from zwidth.show.figures.identify_stiffness import draw_stiffness
+    from zwidth.show.figures.identify import draw_boundary, draw_stiffness
 
     upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.1))
     both = stiffnesses()

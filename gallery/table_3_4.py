@@ -21,7 +21,7 @@ import numpy as np
 
 from zwidth.device.load import load
 from zwidth.model import natural_frequencies, plant_effective_parameters
-from zwidth.model.effective_parameters import EffectiveParameters
+from zwidth.model.effective_mass import EffectiveParameters
 from zwidth.model.reduction import effective_parameters
 
 DEVICE = "five-bar"

@@ -24,12 +24,12 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from tests.model.joints_apart import FOURTH, Joints, travel, travel_rates
-from zwidth.contact.mechanism.acceleration import accelerate, configure
 from zwidth.contact.mechanism.motion_kernel import ready
+from zwidth.contact.mechanism.stepping import accelerate, configure
 from zwidth.contact.mechanism.system import memory_of, system_of
 from zwidth.loop import Butterworth
 from zwidth.model import BALL_Z, GivenDamping, attach, pack, reduce_mechanism
-from zwidth.model.effective_parameters import screw
+from zwidth.model.effective_mass import screw
 
 STEP = 5e-5  # of a joint, for differences [rad], [m]
 

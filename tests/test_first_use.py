@@ -20,7 +20,7 @@ from zwidth import compiled as compiled_module
 from zwidth.compile_events import compiling, listening
 from zwidth.compiled import can_be_taken_apart
 from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling
-from zwidth.show.cli.process import time_text
+from zwidth.show.cli.progress import time_text
 from zwidth.threads import in_chunks
 
 KERNELS = '''

@@ -9,7 +9,7 @@
     slower = device.with_({"loop.sampling_period_s": 0.002})
 
 What most scripts need is here; the rest is in the packages `chart`, `conditions`, `contact`, `device`,
-`guarantees`, `loop`, `measures`, `model` and `study`. Names are imported when they are first used.
+`guarantees`, `identify`, `loop`, `measures`, `model`, `show` and `study`. Names are imported when first used.
 """
 
 from pathlib import Path

@@ -3,9 +3,11 @@ from . import conditions as conditions
 from . import contact as contact
 from . import device as device
 from . import guarantees as guarantees
+from . import identify as identify
 from . import loop as loop
 from . import measures as measures
 from . import model as model
+from . import show as show
 from . import study as study
 from .chart.chart import StabilityChart as StabilityChart
 from .chart.chart import largest_stiffness as largest_stiffness
@@ -26,7 +28,7 @@ from .loop.controller import Controller as Controller
 from .loop.controller import FirstOrder as FirstOrder
 from .loop.loop import Loop as Loop
 from .loop.operating_point import OperatingPoint as OperatingPoint
-from .loop.point_errors import OperatingPointError as OperatingPointError
+from .loop.point_text import OperatingPointError as OperatingPointError
 from .measures.catalogue import find_measure as find_measure
 from .measures.definition import Measure as Measure
 from .measures.definition import MeasureError as MeasureError
@@ -36,10 +38,10 @@ from .model.operator import Operator as Operator
 from .model.operator import OperatorError as OperatorError
 from .model.plant import Plant as Plant
 from .model.posture import PostureError as PostureError
+from .model.raw_sweep import sweep_response as sweep_response
 from .model.reduction import ModelError as ModelError
 from .model.response import Response as Response
 from .model.response import ResponseError as ResponseError
-from .model.sweep_response import sweep_response as sweep_response
 from .show.app.workbench import Workbench as Workbench
 from .study.designs.study_file import read_study as read_study
 from .study.designs.sweep import run_study as run_study

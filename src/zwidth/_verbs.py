@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from zwidth.contact.environments.environment import Environment
     from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
     from zwidth.contact.mechanism.motion import MechanismMotion
+    from zwidth.contact.mechanism.simulate_mechanism import SurfaceRendering
     from zwidth.contact.mechanism.surfaces import Surface
-    from zwidth.contact.mechanism.walls import SurfaceRendering
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
     from zwidth.guarantees.guarantees import Guarantees
@@ -38,12 +38,11 @@ if TYPE_CHECKING:
     from zwidth.model.load import Load
     from zwidth.progress import Progress
     from zwidth.result import Result
-    from zwidth.study.boundary.experiment_plan import Plan
-    from zwidth.study.boundary.measured_boundary import Experiment
-    from zwidth.study.load.bending import Bending
-    from zwidth.study.load.load_path import LoadPath
+    from zwidth.study.bending import Bending
+    from zwidth.study.boundary.measured_boundary import Experiment, Plan
+    from zwidth.study.load_path import LoadPath
+    from zwidth.study.model_validity import Validity
     from zwidth.study.sensitivity.result import Sensitivities
-    from zwidth.study.validity import Validity
 
 
 def device_with(device: Device, settings: Settings) -> Device:
@@ -73,13 +72,13 @@ def device_sensitivities(device: Device, point: OperatingPoint, progress: Progre
 def device_load_path(
     device: Device, push: float, count: int, point: OperatingPoint | None, progress: Progress | None
 ) -> LoadPath:
-    from zwidth.study.load.load_path import load_path
+    from zwidth.study.load_path import load_path
 
     return load_path(device, push, count, point, progress)
 
 
 def device_bending(device: Device, point: OperatingPoint | None) -> Bending | None:
-    from zwidth.study.load.bending import bending
+    from zwidth.study.bending import bending
 
     return bending(device, point)
 
@@ -162,7 +161,7 @@ def guarantees(
 
 
 def felt(point: OperatingPoint, stiffness: float, damping: float) -> FeltWall:
-    from zwidth.measures.felt_wall import felt_wall
+    from zwidth.measures.felt import felt_wall
 
     return felt_wall(point, stiffness, damping)
 
@@ -170,7 +169,7 @@ def felt(point: OperatingPoint, stiffness: float, damping: float) -> FeltWall:
 def simulate(
     point: OperatingPoint, stiffness: float | None, damping: float | None, **more: Any
 ) -> ContactSimulation:
-    from zwidth.contact.simulate_contact import simulate_contact
+    from zwidth.contact.point_contact import simulate_contact
 
     return simulate_contact(point, stiffness, damping, **more)
 
@@ -191,7 +190,7 @@ def limit_cycles(
     simulate: bool,
     progress: Any,
 ) -> LimitCyclePrediction:
-    from zwidth.contact.predict_limit_cycles import predict_limit_cycles
+    from zwidth.contact.wall_limit_cycles import predict_limit_cycles
 
     return predict_limit_cycles(point, stiffness, damping, offset=offset, simulate=simulate, progress=progress)
 
@@ -205,7 +204,7 @@ def measure_boundary(
 
 
 def validity(point: OperatingPoint, tolerance: float) -> Validity:
-    from zwidth.study.validity import validity
+    from zwidth.study.model_validity import validity
 
     return validity(point, tolerance)
 
@@ -221,13 +220,13 @@ def measure(
     measure: str | Measure,
     wanted: Mapping[str, Any],
 ) -> MeasureValues:
-    from zwidth.measures.evaluate import measure_at
+    from zwidth.measures.evaluation import measure_at
 
     return measure_at(point, measure, **wanted)
 
 
 def environment_named(source: str) -> Environment:
-    from zwidth.contact.environments.load import load_environment
+    from zwidth.contact.environments.catalogue import load_environment
 
     return load_environment(source)
 

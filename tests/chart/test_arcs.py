@@ -9,12 +9,10 @@ from scipy.optimize import brentq
 
 from tests.systems import published, random_loop
 from zwidth.chart import Box, TracedEdge, Tracer, trace_curves
-from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs
-from zwidth.chart.area import quadrant_area
+from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs, cut_at_holes
+from zwidth.chart.area import find_peak, largest_damping, quadrant_area, stiffest_index
 from zwidth.chart.loop_edge import trace_edge
-from zwidth.chart.peak import find_peak, largest_damping, stiffest_index
-from zwidth.chart.rings import cut_at_holes
-from zwidth.chart.several_directions.branch import Branch
+from zwidth.chart.several_directions.polygon_arcs import Branch
 from zwidth.loop import MultiLoop
 from zwidth.model import MultiPlant
 

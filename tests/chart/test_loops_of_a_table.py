@@ -10,7 +10,7 @@ from zwidth.chart import Tracer, softening, spectral_radii, spectral_radius, uns
 from zwidth.chart.robust.instability import softenings, unstable_walls
 from zwidth.chart.table_radii import radii_and_leverages
 from zwidth.loop import CHAINED, table_of_loops
-from zwidth.loop.table_states import state_spaces
+from zwidth.loop.realisation import state_spaces
 
 
 def loops_without_chains(seed, count):

@@ -24,7 +24,7 @@ from tests.systems import FEATURES, random_loop
 from zwidth import load
 from zwidth.chart import ChartError, TracedEdge, stability_chart
 from zwidth.chart.arcs import PAIR
-from zwidth.chart.edge_judgement import walls_off_circle
+from zwidth.chart.loop_edge import walls_off_circle
 from zwidth.loop import Controller, Loop, UnmovedError
 from zwidth.model import Plant
 

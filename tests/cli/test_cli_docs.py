@@ -153,7 +153,7 @@ def test_the_keys_that_come_out_are_those_explained(folder, quick):
 
 
 def test_every_exit_code_is_explained():
-    from zwidth.show.cli import process
+    from zwidth.show.cli import progress
 
-    codes = {process.DONE, process.NO_ANSWER, process.BAD_INPUT, process.INTERNAL, process.INTERRUPTED}
+    codes = {progress.DONE, progress.NO_ANSWER, progress.BAD_INPUT, progress.INTERNAL, progress.INTERRUPTED}
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)} == codes

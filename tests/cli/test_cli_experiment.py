@@ -16,7 +16,7 @@ from tests.cli.command_runner import TWO_MASS, document_of, refusal_lines, run_c
 from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
 from zwidth.contact import StableExtent
-from zwidth.show.cli.experiment_page import point_rows, sentences, warning
+from zwidth.show.cli.experiment import point_rows, sentences, warning
 from zwidth.study import Experiment, MeasuredPoint, Plan
 
 FEW = ("--stiffnesses", 2, "--tips", 1)

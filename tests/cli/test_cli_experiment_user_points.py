@@ -14,7 +14,7 @@ from tests.systems import published
 from zwidth.chart import stability_chart
 from zwidth.contact import StableExtent
 from zwidth.show import ErrorBarPoint, amount, draw_experiment, figure
-from zwidth.show.cli.experiment_page import sentences
+from zwidth.show.cli.experiment import sentences
 from zwidth.study import Experiment, Plan, PointsError, compare_points, read_points
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m,edge,verdict\n"

@@ -45,7 +45,7 @@ def test_tables_are_written_as_data_too(here, monkeypatch):
     K = np.array(document["stiffness_max_N_per_m"], dtype=float)
     np.testing.assert_array_equal(K.ravel(), table.rectangles[:, 0])
     # the other files are of the same table
-    computing = import_module("zwidth.study.safe_walls.safe_walls")
+    computing = import_module("zwidth.study.wall_tables.safe_walls")
     monkeypatch.setattr(computing, "compute_table", lambda *_, **__: table)
     run_command("export", MECHANISM, *SMALL, "--output", "walls.csv")
     rows = list(csv.DictReader((here / "walls.csv").read_text().splitlines()))

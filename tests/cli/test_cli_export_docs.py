@@ -10,7 +10,7 @@ from tests.cli.command_runner import run_command
 from zwidth.device.load import load
 from zwidth.show import header_text
 from zwidth.study import safe_walls
-from zwidth.study.safe_walls import cell_walls, grid, limits
+from zwidth.study.wall_tables import cell_walls, grid
 
 PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
 
@@ -49,7 +49,7 @@ def test_sizes_and_samples_are_those_of_the_page():
         assert abs(size - said) < 0.15 * said
     assert f"{cell_walls.ROUND} a round" in PAGE
     assert cell_walls.POSTURES == 3
-    assert limits.LEAST == 0.002
+    assert cell_walls.LEAST == 0.002
     assert cell_walls.QUIET == 4
     assert "9 to 34 directions" in PAGE
     assert 2 * cell_walls.DIRECTIONS[2][0] == 34

@@ -12,7 +12,7 @@ from tests import systems
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from tests.measured_cases import measured_response
 from zwidth.chart import stability_chart
-from zwidth.chart.measured import fit_check
+from zwidth.chart.measured import chart as measured_chart
 from zwidth.loop import Butterworth
 from zwidth.model import ResponseError
 
@@ -312,7 +312,7 @@ def test_a_contact_is_simulated_by_a_fitted_plant_that_says_its_error(device):
 def test_a_plant_with_other_walls_than_the_response_stands_for_nothing(device, monkeypatch, verb):
     point = zwidth.load(device).at()
     wall = (800.0, 2.5) if verb == "simulate" else ()
-    monkeypatch.setattr(fit_check, "FURTHEST", 1.0)
+    monkeypatch.setattr(measured_chart, "FURTHEST", 1.0)
     with pytest.raises(ResponseError, match=r"but its largest stiffness is .* N/m, by the response itself .* N/m"):
         getattr(point, verb)(*wall)
 

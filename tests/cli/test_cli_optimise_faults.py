@@ -31,8 +31,8 @@ front = 4
     [
         pytest.param("zwidth.study.jobs.store:Store.begin", 2, marks=pytest.mark.slow),  # a store without a batch
         pytest.param("zwidth.study.jobs.store:Store.write_batch", 3, marks=pytest.mark.slow),
-        ("zwidth.study.optimise.polish:gradients", 1),
-        ("zwidth.study.optimise.recheck:simulate_contact", 1),  # after all that is kept
+        ("zwidth.study.optimisation.polish:gradients", 1),
+        ("zwidth.study.optimisation.optimisation:simulate_contact", 1),  # after all that is kept
     ],
 )
 def test_a_killed_run_goes_on_and_ends_with_the_same_numbers(tmp_path, monkeypatch, place, calls):

@@ -12,9 +12,9 @@ import pytest
 import zwidth as package
 from tests.cli.command_runner import document_of, run_command
 from zwidth.contact import SOURCES, limit_cycles
-from zwidth.contact.motion_verdict import Behaviour
+from zwidth.contact.time_response import Behaviour
 from zwidth.show import SimulateCommand
-from zwidth.show.cli.simulation_page import BEHAVIOUR_VERDICTS
+from zwidth.show.cli.simulate import BEHAVIOUR_VERDICTS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")
 

@@ -8,7 +8,7 @@ import pytest
 import zwidth
 from tests.cli.command_runner import MECHANISM, document_of, refusal_lines, run_command
 from zwidth.measures import WantedWall
-from zwidth.measures.wanted import WANTED_NUMBERS, WantedWalls
+from zwidth.measures.definition import WANTED_NUMBERS, WantedWalls
 from zwidth.study import StudyFile
 
 FEW = ("--cells", "3,2", "--x", "-0.05,0.05", "--y", "0.2,0.25")

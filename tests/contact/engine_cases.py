@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from systems import mass, two_mass
 
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Controller, Loop
 from zwidth.model import Friction, Nonlinear
 

@@ -28,7 +28,7 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.environments import wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,
@@ -45,7 +45,7 @@ from zwidth.loop import (
     velocity_of,
 )
 from zwidth.model import Counter, GivenDamping, Nonlinear, reduce_mechanism, solve_posture
-from zwidth.model.drive_nonlinearity import nonlinear_of_drives
+from zwidth.model.mechanism import nonlinear_of_drives
 
 PERIOD = 1e-3
 FREE = wall.values(stiffness=0.0)

@@ -14,7 +14,7 @@ from systems import FEATURES, random_loop
 
 from zwidth.contact import Hand, Reflex, Run, simulate_batch
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import BackwardDifference, Foaw, LeastSquaresSlope, Levant, Loop, SavitzkyGolay, velocity_of
 from zwidth.memory_limit import TooLarge
 from zwidth.model import Counter, LaggedDamper, Nonlinear, Operator
@@ -162,7 +162,7 @@ sys.path.insert(0, sys.argv[1])
 import numpy as np
 from contact.test_engine_computer import mixed_runs
 from zwidth.contact.environments import one_sided_wall
-from zwidth.contact.simulate import simulate_batch
+from zwidth.contact.loop_simulation import simulate_batch
 runs, durations = mixed_runs()
 found = simulate_batch(runs, one_sided_wall, duration=durations, substeps=8)
 np.save(sys.argv[2], np.concatenate([one.reading for one in found]))

@@ -18,7 +18,7 @@ from systems import random_loop
 
 from zwidth.contact import SOURCES, Hand, Run, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Loop
 from zwidth.model import Counter, Friction, Nonlinear
 

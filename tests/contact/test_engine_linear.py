@@ -8,7 +8,7 @@ from systems import FEATURES, random_loop
 
 from zwidth.contact import Run, judge_response, simulate_batch
 from zwidth.contact.environments import wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import (
     AlphaBeta,
     Butterworth,

@@ -4,8 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from zwidth.contact.exponential import exponential, multiply
-from zwidth.contact.vibration_kernel import held_response
+from zwidth.contact.vibration_kernel import exponential, held_response, multiply
 
 
 def random_plant_matrix(rng, n):

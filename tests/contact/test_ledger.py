@@ -10,7 +10,7 @@ from systems import FEATURES, random_loop
 
 from zwidth.contact import SOURCES, Hand, PassivityController, Run, Tremor, simulate_batch
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Foaw, Levant, Loop
 from zwidth.model import Brake, Counter, Nonlinear, Spring
 

@@ -10,8 +10,8 @@ from tests.contact.mechanism_cases import with_friction
 from tests.model.model_cases import five_bar
 from zwidth.contact import ENVIRONMENTS, ContactArgumentError
 from zwidth.contact.environments import wall
-from zwidth.contact.environments.pressed_wall import pressed_wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.environments.walls import pressed_wall
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Butterworth, Controller, FeedbackError, OperatingPoint
 from zwidth.model import Load, ModalDamping, solve_posture
 

@@ -28,7 +28,7 @@ from zwidth.contact import (
     depth_and_normal,
 )
 from zwidth.contact.environments import environment
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Butterworth, Foaw, Levant, Loop
 from zwidth.model import ModalDamping, reduce_mechanism, solve_posture
 

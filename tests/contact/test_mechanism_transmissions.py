@@ -10,7 +10,7 @@ import pytest
 
 from zwidth.contact import MotionError
 from zwidth.device import from_document
-from zwidth.device.new_device import new_device
+from zwidth.device.new_file import new_device
 
 ARM = {
     "name": "Arm",

@@ -9,7 +9,7 @@ from contact.engine_cases import EventSolver, ReflexSpring, friction_of, one_mas
 
 from zwidth.contact import Hand, Reach, Reflex, Tremor
 from zwidth.contact.environments import wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Loop
 from zwidth.model import Nonlinear, Operator, attach
 

@@ -23,9 +23,9 @@ from zwidth.contact import (
     Tremor,
     environment,
 )
-from zwidth.contact.environments.slot import slot
-from zwidth.contact.run_length import bound_of_run, lengthened, needed_substeps, run_length
-from zwidth.contact.simulate_contact import simulate_contact
+from zwidth.contact.contact_simulation import bound_of_run, lengthened, needed_substeps, run_length
+from zwidth.contact.environments.walls import slot
+from zwidth.contact.point_contact import simulate_contact
 from zwidth.loop import Controller, Loop, OperatingPoint
 from zwidth.memory_limit import TooLarge
 from zwidth.model import Friction, Nonlinear

@@ -13,7 +13,7 @@ import pytest
 
 import zwidth
 from zwidth.contact import touch_obstacle
-from zwidth.contact.touch_numbers import touch_numbers
+from zwidth.contact.touch_step import touch_numbers
 from zwidth.device import from_document
 from zwidth.loop import OperatingPoint
 

@@ -8,9 +8,8 @@ from contact.touch_cases import in_python, random_loop, random_touch, same_bits
 
 from zwidth.contact import OUTPUTS, Hand, normal, touch, touch_obstacle
 from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.simulate import simulate
-from zwidth.contact.touch_numbers import touch_numbers
-from zwidth.contact.touch_step import FREE, ONE_SIDED
+from zwidth.contact.loop_simulation import simulate
+from zwidth.contact.touch_step import FREE, ONE_SIDED, touch_numbers
 from zwidth.loop import Controller, FirstOrder, Loop
 from zwidth.model import Operator, Plant
 

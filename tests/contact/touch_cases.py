@@ -3,7 +3,7 @@
 import numpy as np
 
 from zwidth.contact import OUTPUTS, touch_periods
-from zwidth.contact.touch_numbers import touch_numbers
+from zwidth.contact.touch_step import touch_numbers
 from zwidth.loop import Butterworth, Controller, FirstOrder, LeastSquaresSlope, Loop
 from zwidth.model import Counter, Friction, Nonlinear, Operator, Plant
 

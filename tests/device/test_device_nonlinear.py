@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, faults, with_changes
-from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
+from zwidth.conditions.traits import ground_friction, reading_step
 from zwidth.device import address, from_document
 from zwidth.device.load import load
 from zwidth.loop import Kalman

@@ -11,7 +11,7 @@ import pytest
 
 import zwidth
 from zwidth.device import Device, DeviceError, DeviceNumber, bundled, device_numbers, from_document
-from zwidth.device.number_range import typical_size
+from zwidth.device.numbers import typical_size
 
 NAMES = [name for name, *_ in bundled()]
 MASS = "plant.mass_kg.0.1"

@@ -10,7 +10,7 @@ import pytest
 from tests.device.device_cases import ARM_FILE, REMOVED, faults, with_changes
 from zwidth.device import DeviceError, from_document
 from zwidth.device.design_batch import design_batch
-from zwidth.device.new_device import new_device
+from zwidth.device.new_file import new_device
 from zwidth.model import OK, BeyondLimit
 from zwidth.model.posture import BEYOND_LIMIT
 

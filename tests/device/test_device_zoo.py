@@ -14,7 +14,7 @@ from zwidth.device import DeviceError, address, build_mechanism, bundled, bundle
 from zwidth.device.load import load
 from zwidth.device.read import read
 from zwidth.model import pack
-from zwidth.model.joint_space import joint_mass_matrix
+from zwidth.model.inertia import joint_mass_matrix
 
 
 @pytest.mark.parametrize("name", bundled_names())

@@ -9,9 +9,9 @@ import pytest
 
 from zwidth import __version__
 from zwidth.device import DeviceError, address, from_document
-from zwidth.device.format_version import STORE_VERSION
 from zwidth.device.load import load, schema
 from zwidth.device.operator_choice import operator_table
+from zwidth.device.text_file import STORE_VERSION
 from zwidth.study import CellValues, Journal, JournalError, Store, StoreError, StudyFile, fingerprint, read_study
 
 DEVICE = 'name = "m"\n{}\n[plant]\nmass_kg = 0.1\n{}\n[loop]\nsampling_period_s = 0.001\n'

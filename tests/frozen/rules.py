@@ -116,7 +116,7 @@ RULES: tuple[Rule, ...] = (
             ("experiment", "points", 2e-4, "edges are bisected to 1e-4 of the stable range, tips to 1e-5"),
             ("limit-cycles", "limit_cycles.simulated", 1e-2, "read off a run near the cycle"),
             ("limit-cycles", "otherwise", 1e-2, "read off a run"),
-            ("limit-cycles", "limit_cycles", 1e-7, "harmonics are balanced to 1e-8 (contact/harmonics.py)"),
+            ("limit-cycles", "limit_cycles", 1e-7, "harmonics are balanced to 1e-8 (contact/harmonic_balance.py)"),
             (
                 "guarantees",
                 "coupling",

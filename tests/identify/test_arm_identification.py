@@ -12,7 +12,7 @@ from tests.identify.arm_truth import chain_results, five_bar_results, held, link
 from zwidth.device import DeviceError, from_document
 from zwidth.identify import Parameters, base_parameters, check_sampling, identify_arm, record_of
 from zwidth.identify.arm import COLUMNS
-from zwidth.identify.arm.channels import channels_of
+from zwidth.identify.arm.checks import channels_of
 from zwidth.identify.arm.smoothing import choose_band
 from zwidth.identify.arm.stretches import TorqueTiming, smoothed
 
@@ -110,7 +110,7 @@ def test_the_links_for_the_file_make_the_same_base_parameters_and_can_exist(chai
 def test_the_unseen_part_is_predicted_and_drawn(result):
     from matplotlib.figure import Figure
 
-    from zwidth.show.figures.identify_arm import draw_arm
+    from zwidth.show.figures.identify import draw_arm
 
     assert result.validation > 0.99
     assert {"time_s", "measured_torque_Nm.motor-1", "predicted_torque_Nm.motor-2"} <= set(result.table())

@@ -13,8 +13,7 @@ from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
 from zwidth.device.load import load
 from zwidth.identify import Estimate, IdentificationError, identify_arm, read_record
 from zwidth.identify.arm import COLUMNS, ArmIdentification
-from zwidth.identify.arm.channels import Channels
-from zwidth.identify.arm.checks import Survey, sign_check, velocity_check
+from zwidth.identify.arm.checks import Channels, Survey, sign_check, velocity_check
 from zwidth.identify.arm.smoothing import Kernel
 
 PENDULUM = """name = "pendulum"

@@ -8,9 +8,7 @@ import pytest
 from tests.identify.boundary_cases import measured, random_device, record
 from zwidth.device import address
 from zwidth.identify import BoundaryModel, BoundaryParameters, fit_boundary, read_points
-from zwidth.identify.boundary.checks import check_magnitudes
-from zwidth.identify.boundary.explained import check_explained
-from zwidth.identify.boundary.period import PERIOD, check_period
+from zwidth.identify.boundary.checks import PERIOD, check_explained, check_magnitudes, check_period
 
 DELAY = "loop.delay_samples"
 FEWEST = 12  # points on the boundary, of which a device is taken

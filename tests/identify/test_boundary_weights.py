@@ -9,9 +9,8 @@ import pytest
 
 from tests.identify.boundary_cases import measured, random_device, record
 from zwidth.identify import BoundaryModel, fit_boundary, fit_least_squares, read_points
-from zwidth.identify.boundary.model import Deviations
+from zwidth.identify.boundary.model import Deviations, relative_scatter
 from zwidth.identify.boundary.points import TIP
-from zwidth.identify.boundary.weights import relative_scatter
 
 COUNTS = {"lower": 10, "upper": 10, "tip": 4}
 

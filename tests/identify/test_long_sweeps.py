@@ -50,7 +50,7 @@ def test_the_response_is_the_same_however_the_record_is_cut(bench):
 
 
 def test_a_sweep_that_is_read_in_blocks_has_the_stiffness_within_its_interval(monkeypatch, device, bench):
-    monkeypatch.setattr(import_module("zwidth.model.sweep_response"), "BLOCK", 1 << 14)
+    monkeypatch.setattr(import_module("zwidth.model.raw_sweep"), "BLOCK", 1 << 14)
     steps = []
     found = identify(device, "response", bench, progress=lambda stage, done, of: steps.append((stage, done, of)))
     (one,) = found.estimates

@@ -11,8 +11,8 @@ import xarray as xr
 
 from zwidth.device import DeviceError
 from zwidth.identify import Columns, read_record, record_of
-from zwidth.identify.records import table_copy
-from zwidth.identify.records.averaged_rows import averaged_rows
+from zwidth.identify.records import record as record_module
+from zwidth.identify.records.record import averaged_rows
 
 WANTED = Columns(("time_s", ("force_N", "torque_Nm")), optional=("position_m",), text=("joint",))
 
@@ -137,7 +137,7 @@ LONG = "time_s,force_N,joint\n" + "".join(
 
 @pytest.mark.parametrize("in_memory", [0, 10**6])
 def test_a_file_is_read_as_text_once(tmp_path, monkeypatch, in_memory):
-    monkeypatch.setattr(table_copy, "IN_MEMORY", in_memory)
+    monkeypatch.setattr(record_module, "IN_MEMORY", in_memory)
     path = written(tmp_path, LONG)
     record = read_record(path, WANTED)
     before = record.columns()
@@ -166,7 +166,7 @@ def test_what_cannot_be_kept_is_read_again(tmp_path, monkeypatch, name, value):
         def write(self, data: object) -> int:
             raise OSError("no space left on device")
 
-    monkeypatch.setattr(table_copy, name, value or FullDisk)
+    monkeypatch.setattr(record_module, name, value or FullDisk)
     record = read_record(written(tmp_path, LONG), WANTED)
     first, second = record.columns(), record.columns()
     for column, values in first.items():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from zwidth.identify.modes.spectra import averaged_spectra, merged, segment_length
+from zwidth.identify.modes.overview import averaged_spectra, merged, segment_length
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,7 @@ import zwidth
 from tests.identify.spring_bench import bench_record, bent_angles, random_bench, triangle
 from zwidth.device import DeviceError
 from zwidth.identify import IdentificationError
-from zwidth.identify.stiffness.spring_fit import fit_spring
-from zwidth.identify.stiffness.strokes import resolution_of, strokes_of, turning_points
+from zwidth.identify.stiffness.spring_fit import fit_spring, resolution_of, strokes_of, turning_points
 
 DRIVE = "mechanism.drives.motor-right"
 STEP = 2.0 * np.pi / 8192
@@ -357,7 +356,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 
 def test_a_drive_of_a_leg_is_the_same_under_the_names_of_its_copies():
-    from zwidth.identify.drives import drive_named, drives_of
+    from zwidth.identify.stiffness.identify import drive_named, drives_of
 
     delta = zwidth.load("stamper-delta")
     (drive,) = drives_of(delta)

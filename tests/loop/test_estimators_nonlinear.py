@@ -21,8 +21,7 @@ from zwidth.loop import (
     velocity_of,
 )
 from zwidth.loop.estimator import NonlinearError
-from zwidth.loop.estimators.foaw_kernel import foaw_estimate
-from zwidth.loop.estimators.levant_kernel import levant_estimate
+from zwidth.loop.estimators.kernels import foaw_estimate, levant_estimate
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
 FITS = ("end-fit", "best-fit")

@@ -27,8 +27,8 @@ from zwidth.loop import (
     feedforward_response,
 )
 from zwidth.loop.closed_plant import ForceSensorError
+from zwidth.loop.loop import unobserved_instability
 from zwidth.loop.pole_zero_form import PoleZeroForm
-from zwidth.loop.unobserved_instability import unobserved_instability
 from zwidth.model import MultiPlant, Operator, attach
 
 T = 0.001

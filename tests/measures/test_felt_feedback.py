@@ -10,7 +10,7 @@ from systems import mass, two_mass
 
 from zwidth.contact import Hand, Tremor
 from zwidth.contact.environments import wall
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import (
     Butterworth,
     Controller,
@@ -23,7 +23,7 @@ from zwidth.loop import (
     OperatingPoint,
 )
 from zwidth.measures import MeasureError, felt_impedance, free_motion_mass, static_stiffness
-from zwidth.measures.felt_chart import felt_chart
+from zwidth.measures.felt import felt_chart
 from zwidth.measures.handle_impedance import free_impedance
 
 T = 0.001

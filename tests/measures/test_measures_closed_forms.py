@@ -22,7 +22,7 @@ from zwidth.measures import (
     optimal_mass,
     structural_distortion,
 )
-from zwidth.measures.evaluate import evaluate
+from zwidth.measures.evaluation import evaluate
 from zwidth.model import Operator
 
 CLOSED = ("stiffness_max_closed_form", "damping_max_closed_form", "stable_area_closed_form")

@@ -10,7 +10,7 @@ from tests.systems import mass, published, random_loop, reference_transition_mat
 from zwidth.chart import stability_chart
 from zwidth.loop import Controller, Loop
 from zwidth.measures import loop_paths, wall_paths
-from zwidth.measures.eigenvalue_paths import LONG, SHORT, PathError, eigenvalue_paths
+from zwidth.measures.root_paths import LONG, SHORT, PathError, eigenvalue_paths
 
 FEATURES = ("lag", "electrical", "estimator")
 

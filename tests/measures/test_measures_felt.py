@@ -30,9 +30,9 @@ from zwidth.measures import (
     static_stiffness,
     static_stiffness_limit,
 )
-from zwidth.measures.felt_chart import felt_chart
+from zwidth.measures.felt import felt_chart
 from zwidth.model import LaggedDamper, Plant
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 
 class SectionFilter:

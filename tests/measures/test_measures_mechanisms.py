@@ -22,9 +22,9 @@ from tests.model.model_cases import KINDS, five_bar, some_postures
 from zwidth.device import from_document
 from zwidth.device.load import load
 from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, MeasureError, dexterity, find_measure
-from zwidth.measures.evaluate import evaluate
+from zwidth.measures.evaluation import evaluate
 from zwidth.model import GivenDamping, reduce_directions
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 # Those that are about a wanted wall or force have tests of their own.
 TESTED_MEASURES = [

@@ -18,7 +18,7 @@ from zwidth.measures import (
     global_isotropy_index,
     isotropy,
 )
-from zwidth.measures.overall import overall
+from zwidth.measures.workspace_statistics import overall
 
 NAN = float("nan")
 

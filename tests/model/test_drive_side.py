@@ -32,7 +32,7 @@ from zwidth.model import (
     undamped_modes,
 )
 from zwidth.model.drive_side import drive_side
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 AT = 2j * np.pi * np.array([3.0, 30.0, 300.0])
 

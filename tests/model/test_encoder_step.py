@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.model.encoder_step import encoder_step
+from zwidth.model.raw_sweep import encoder_step
 
 
 def motion(rng, step):

@@ -26,7 +26,7 @@ from tests.model.bent_chains import with_bodies
 from tests.model.framed_devices import framed
 from zwidth.device import from_document
 from zwidth.model import assumed_modes, finite_elements, natural_frequencies, undamped_modes
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 CONVERGING = ("assumed-modes", "finite-elements")
 

@@ -18,7 +18,7 @@ from zwidth.model import (
     reduce_mechanism,
     solve_posture,
 )
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 MODELS = ("full", "two-mass", "motor-mass", "rigid")
 DAMPINGS = (ModalDamping(0.05), ProportionalDamping(0.7, 1e-4), GivenDamping())

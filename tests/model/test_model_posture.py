@@ -23,7 +23,7 @@ from model_cases import (
 from scipy import ndimage
 
 from zwidth.model import OK, OUT_OF_REACH, Mechanism, OutOfReach, Singular, inertia_terms, pack, solve_posture
-from zwidth.model.mobility import check_mobility, drives_fit
+from zwidth.model.handle_position import check_mobility, drives_fit
 from zwidth.model.posture import SINGULAR, LoopOpen, _references
 
 

@@ -20,7 +20,7 @@ from zwidth.model import (
     reduce_plant,
     solve_posture,
 )
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 FIVE_PERCENT = ModalDamping(0.05)
 AVERAGE = (0.40, 0.65)

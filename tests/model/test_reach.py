@@ -8,7 +8,7 @@ from model_cases import KINDS, five_bar
 
 from zwidth.model import OK, OUT_OF_REACH, OutOfReach, pack, posture_batch, solve_posture
 from zwidth.model.posture import UNSOLVED
-from zwidth.model.reach_shells import outside_shells, shells
+from zwidth.model.posture_batch import outside_shells, shells
 from zwidth.model.roadmap import roadmap
 
 

@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 
 from zwidth.loop import Controller, Loop
 from zwidth.model import Plant, undamped_modes
-from zwidth.model.idle_motions import separated_modes
+from zwidth.model.first_order_form import separated_modes
 from zwidth.model.modes import real_modes
 
 PERIOD = 1e-3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from zwidth.model import ResponseError, sweep_response_of_blocks
-from zwidth.model.sweep_response import block_length, sweep_response
+from zwidth.model.raw_sweep import block_length, sweep_response
 
 PERIOD = 1e-3
 SAMPLES = 1 << 17
@@ -81,7 +81,7 @@ def test_a_block_without_force_changes_nothing_but_the_noise():
 
 
 def test_long_records_are_cut(monkeypatch):
-    monkeypatch.setattr(import_module("zwidth.model.sweep_response"), "BLOCK", 1 << 14)
+    monkeypatch.setattr(import_module("zwidth.model.raw_sweep"), "BLOCK", 1 << 14)
     force, position, _ = damped_mass(0.3, 0.5, 7, 1e-3)
     assert block_length(len(force)) == 1 << 14
     assert block_length((1 << 15) - 1) == (1 << 15) - 1

@@ -12,7 +12,7 @@ from tests.device.device_cases import ARM_FILE
 from zwidth.contact import MotionError
 from zwidth.device import from_document
 from zwidth.model import OK, RatioTable, modes_in_general, natural_frequencies
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.model.effective_mass import effective_parameters
 
 MEASURES = ("stiffness_max", "damping_max", "motor_side_mass", "rigid_mass", "stiffness", "peak_force")
 GRID = np.stack(np.meshgrid(np.linspace(0.05, 0.35, 5), np.linspace(-0.15, 0.3, 4)), axis=-1)

@@ -12,7 +12,7 @@ from identify.virtual_joint import records_of
 import zwidth
 from zwidth.identify import identify_friction
 from zwidth.show import figure
-from zwidth.show.figures.identify_friction import draw_friction
+from zwidth.show.figures.identify import draw_friction
 
 
 @pytest.fixture(scope="module")

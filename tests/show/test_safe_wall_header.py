@@ -13,7 +13,7 @@ import pytest
 from zwidth.device.load import load
 from zwidth.loop import BackwardDifference, Butterworth, FirstOrder, ForceSensor, WindowedDifference
 from zwidth.show import HEADER_NAME, OutputError, header_text
-from zwidth.show.safe_walls.header import sketch_obstacle, sketch_text, write_sketch
+from zwidth.show.safe_walls_header import sketch_obstacle, sketch_text, write_sketch
 from zwidth.study import safe_walls
 
 STRICT = ("-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow", "-Wundef", "-O1")

@@ -11,8 +11,7 @@ from tests.model.model_cases import KINDS
 from tests.model.random_mechanisms import random_mechanisms
 from zwidth.device import from_document
 from zwidth.model import ORIENTATION, pack, rotation_matrix, solve_posture
-from zwidth.show.mechanism_scene import mechanism_scene
-from zwidth.show.scene_rates import mode_strokes
+from zwidth.show.mechanism_scene import mechanism_scene, mode_strokes
 
 STEP = 1e-5  # m, or rad; of central differences
 RELATIVE = 1e-7  # what these leave, of the largest rate

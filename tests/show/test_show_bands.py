@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from zwidth.show import figure
-from zwidth.show.figures.colour_bands import COLOURS, bands_of, colour_bar, levels_of
+from zwidth.show.figures.style import COLOURS, bands_of, colour_bar, levels_of
 
 
 def bar_of(values, unit=""):

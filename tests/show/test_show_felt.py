@@ -13,7 +13,7 @@ from zwidth.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop
 from zwidth.measures import commanded_impedance, felt_impedance, free_motion_impedance
-from zwidth.measures.felt_chart import felt_chart
+from zwidth.measures.felt import felt_chart
 from zwidth.show import figure
 from zwidth.show.figures.felt import draw_felt_chart, draw_impedance
 from zwidth.show.figures.sensitivity import draw_sensitivities

@@ -15,7 +15,7 @@ from matplotlib.patches import Polygon
 
 from tests.systems import mass
 from zwidth.chart import spectral_radius, stability_chart
-from zwidth.chart.rings import simple_rings
+from zwidth.chart.arcs import simple_rings
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop
 from zwidth.model import Plant
@@ -30,13 +30,10 @@ from zwidth.show import (
     label,
     save,
 )
-from zwidth.show.figures.decay import round_radii, tenfold_time
-from zwidth.show.figures.frequency import corners
-from zwidth.show.figures.mechanism import draw_mechanism
-from zwidth.show.figures.plant import draw_chain
-from zwidth.show.figures.stability import edges_of
+from zwidth.show.figures.mechanism_motion import draw_chain, draw_mechanism
+from zwidth.show.figures.stability import corners, edges_of, round_radii, tenfold_time
 from zwidth.show.figures.style import fitted_columns, inline_svg, number_logarithmic
-from zwidth.show.mass_chain import as_chain
+from zwidth.show.mechanism_scene import as_chain
 
 
 def loop_of(name, changes=()):

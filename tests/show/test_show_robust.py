@@ -9,7 +9,7 @@ from tests.systems import mass
 from zwidth.chart import robust_chart
 from zwidth.loop import Controller, Loop
 from zwidth.show import figure, save
-from zwidth.show.figures.robust import NAMED, draw_robust
+from zwidth.show.figures.stability import NAMED, draw_robust
 
 
 def texts(ax):

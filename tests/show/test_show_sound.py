@@ -13,7 +13,7 @@ import pytest
 from tests.cli.command_runner import document_of, run_command
 from tests.systems import published
 from zwidth.contact import ENVIRONMENTS
-from zwidth.contact.simulate import simulate
+from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import Controller, Loop
 from zwidth.model import Plant
 from zwidth.show import OutputError

@@ -9,8 +9,7 @@ from matplotlib.collections import LineCollection, QuadMesh
 
 from zwidth.measures import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS
 from zwidth.show import save
-from zwidth.show.figures.parallel_coordinates import _lines
-from zwidth.show.figures.study import study_figure
+from zwidth.show.figures.study import _lines, study_figure
 
 LENGTHS, PERIODS, NAMES = np.linspace(0.1, 0.2, 5), np.geomspace(1e-4, 1e-2, 4), ["out", "in", "left"]
 KEYS = {"length_m": ("length_m", LENGTHS, "m", "linear"), "period_s": ("period_s", PERIODS, "s", "log")}

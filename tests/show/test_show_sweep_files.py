@@ -8,9 +8,8 @@ import xarray as xr
 
 from tests.study.study_cases import TWO_MASS, axis, study
 from zwidth.memory_limit import TooLarge
-from zwidth.show import OutputError, csv_text, json_text, sweep_files
-from zwidth.show.dataset import write_zarr
-from zwidth.show.sweep_files import write_sweep_csv, write_sweep_zarr
+from zwidth.show import OutputError, csv_text, dataset, json_text
+from zwidth.show.dataset import write_sweep_csv, write_sweep_zarr, write_zarr
 from zwidth.study import Sweep, run_study
 from zwidth.study.designs import sweep_data
 from zwidth.study.jobs import executor
@@ -39,7 +38,7 @@ def of_pairs() -> Sweep:
 @pytest.mark.parametrize("chunk", [4, 1 << 16])
 @pytest.mark.parametrize("make", [of_grid, of_hypercube, of_pairs])
 def test_a_folder_holds_the_dataset(tmp_path, make, chunk, monkeypatch):
-    monkeypatch.setattr(sweep_files, "CHUNK", chunk)
+    monkeypatch.setattr(dataset, "CHUNK", chunk)
     found = make()
     write_sweep_zarr(tmp_path / "pieces.zarr", found)
     write_zarr(tmp_path / "whole.zarr", found.dataset())

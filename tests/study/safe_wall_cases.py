@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from zwidth.chart.point_radii import radii_at_points
+from zwidth.chart.table_radii import radii_at_points
 from zwidth.device import from_document
-from zwidth.device.new_device import new_device
+from zwidth.device.new_file import new_device
 from zwidth.measures import OK
 
 

@@ -17,7 +17,7 @@ from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, s
 from zwidth.measures import FAILED, OUT_OF_TIME
 from zwidth.study import CannotStart, RecoveredWarning, Store, open_executor, pack_job, run
 from zwidth.study.jobs import cluster as clusters
-from zwidth.study.jobs import cluster_worker
+from zwidth.study.jobs import workers
 from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
@@ -156,20 +156,20 @@ def test_dask_is_silent_here_and_its_levels_are_given_back(tmp_path: Path):
 
 
 def test_processes_of_a_run_that_was_killed_end_when_another_comes(monkeypatch):
-    monkeypatch.setattr(cluster_worker, "FORGOTTEN", 0.0)
+    monkeypatch.setattr(workers, "FORGOTTEN", 0.0)
     packed = pack_job(ProcessNumbersJob(2))
     assert packed is not None
-    expected = cluster_worker.versions()
-    (gone,) = {*cluster_worker.compute_on_worker(packed, 0, 1, "first", None, expected).cells.values[:, 0]}
+    expected = workers.versions()
+    (gone,) = {*workers.compute_on_worker(packed, 0, 1, "first", None, expected).cells.values[:, 0]}
     os.kill(int(gone), 0)
-    cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
+    workers.compute_on_worker(packed, 0, 1, "second", None, expected)
     with pytest.raises(ProcessLookupError):
         os.kill(int(gone), 0)
-    cluster_worker.end_processes("second")
+    workers.end_processes("second")
     with pytest.raises(CannotStart, match="the run was ended"):
-        cluster_worker.compute_on_worker(packed, 0, 1, "second", None, expected)
+        workers.compute_on_worker(packed, 0, 1, "second", None, expected)
     with pytest.raises(CannotStart, match=r"a worker that joined the cluster has zwidth \S+ instead of 7"):
-        cluster_worker.compute_on_worker(packed, 0, 1, "third", None, expected | {"zwidth": "7"})
+        workers.compute_on_worker(packed, 0, 1, "third", None, expected | {"zwidth": "7"})
 
 
 def test_a_scheduler_that_falls_silent_ends_the_run(monkeypatch):

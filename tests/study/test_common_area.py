@@ -9,7 +9,7 @@ from zwidth.device.load import load
 from zwidth.measures import Measure
 from zwidth.study import common_area, parse_requirement, plane_of, workspace_map
 from zwidth.study.workspace.common_area import nonnegative_region
-from zwidth.study.workspace.reach_outline import KEY, reach_outline
+from zwidth.study.workspace.map import KEY, reach_outline
 
 MIDDLE = (0.02, 0.2)
 

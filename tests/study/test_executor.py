@@ -23,9 +23,9 @@ from tests.study.executor_cases import (
 from zwidth.measures import FAILED, MISSING, NO_VALUE, MeasureError, Note
 from zwidth.memory_limit import TooLarge
 from zwidth.study import Store, pack_job, run
-from zwidth.study.jobs import batch_size as batches
-from zwidth.study.jobs.batch_size import batch_size
-from zwidth.study.jobs.notes import MORE, merge_notes
+from zwidth.study.jobs import executor
+from zwidth.study.jobs.executor import batch_size
+from zwidth.study.jobs.job import MORE, merge_notes
 from zwidth.study.jobs.workers import cores
 
 NO_PATIENCE = -1.0  # patience that is over at once
@@ -54,7 +54,7 @@ def test_a_batch_takes_a_quarter_of_a_second_whatever_the_first_cells_load(secon
             now[0] += 0.005 + seconds * (last - first) + loads.pop(last - first, 0.0)
             return super().compute(first, last)
 
-    monkeypatch.setattr(batches, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(executor, "perf_counter", lambda: now[0])
     job = Job(250_000)
     found = batch_size(job.compute, job.count, 1)
     assert found == pytest.approx(expected, rel=0.2)

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from zwidth.study import Axis, Sampling
-from zwidth.study.designs.latin_hypercube import FEW, share, shares
+from zwidth.study.designs.sampling import FEW, share, shares
 
 SIZES = (1, 2, 3, 5, 64, 1000, FEW, FEW + 1, 10_007, 300_000)
 BELIEVABLE = 1e-4  # of a test of randomness with a fixed seed

@@ -19,7 +19,7 @@ from zwidth.study import (
     study_to_optimise,
     values_at,
 )
-from zwidth.study.optimise.optimise import optimise
+from zwidth.study.optimisation.optimise import optimise
 
 TWO_MASS = "published-two-mass"
 LINKS = [

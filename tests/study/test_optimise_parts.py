@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from zwidth.study import Axis, gradients, hypervolume, neighbours, settle, share_of, values_at
-from zwidth.study.optimise.evaluation import margins
-from zwidth.study.optimise.front import knee, spread_out, undominated
-from zwidth.study.optimise.variables import continuous, value_at
+from zwidth.study.optimisation.evaluation import margins
+from zwidth.study.optimisation.optimisation import knee, spread_out, undominated
+from zwidth.study.optimisation.search import continuous, value_at
 
 AXES = (
     Axis("linear", (), (2.0, 6.0)),

@@ -6,9 +6,9 @@ import pytest
 from tests.study.study_cases import axis, study_document
 from zwidth.device import OPERATORS, DeviceError, bundled_names
 from zwidth.show import percent
-from zwidth.show.report.optimisation_text import sentences
+from zwidth.show.report.optimisation import sentences
 from zwidth.study import Judge, member_changes, problem_of, run, study_of, values_at
-from zwidth.study.optimise.optimise import optimise
+from zwidth.study.optimisation.optimise import optimise
 
 MASS = {"key": "plant.mass_kg", "distribution": "uniform", "plus_minus_percent": 5}
 PERIOD = {"key": "loop.sampling_period_s", "distribution": "uniform", "plus_minus": 1e-5}

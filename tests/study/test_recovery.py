@@ -16,9 +16,8 @@ from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
 from zwidth.measures import FAILED, OUT_OF_TIME, MeasureError
 from zwidth.study import CannotStart, RecoveredWarning, Store, open_executor, pack_job, run
-from zwidth.study.jobs import recovery
-from zwidth.study.jobs.recovery import OutOfTime, WorkerLost, compute_range
-from zwidth.study.jobs.workers import WorkerProcess
+from zwidth.study.jobs import workers
+from zwidth.study.jobs.workers import OutOfTime, WorkerLost, WorkerProcess, compute_range
 
 NO_PATIENCE = -1.0
 TRUE_CELLS = RootsJob(40).compute(0, 40)
@@ -274,6 +273,6 @@ def alive(process: str) -> bool:
 
 def test_pieces_cover_a_range():
     for first, last in ((0, 1), (3, 5), (0, 8), (5, 100)):
-        pieces = recovery._cut(first, last)
+        pieces = workers._cut(first, last)
         assert [n for piece in pieces for n in range(*piece)] == list(range(first, last))
-        assert len(pieces) <= recovery.PIECES
+        assert len(pieces) <= workers.PIECES

@@ -12,10 +12,9 @@ from tests.study.safe_wall_cases import largest_radii, random_device, search_tab
 from zwidth.device.load import load
 from zwidth.measures import NO_VALUE, OK, OUT_OF_REACH, UNDECIDED
 from zwidth.study import PlaneError, SafeWallsError, Store, run, safe_walls
-from zwidth.study.safe_walls.cell_walls import cell_walls
-from zwidth.study.safe_walls.job import SafeWallsJob
-from zwidth.study.safe_walls.safe_walls import compute_table, safe_walls_job
-from zwidth.study.safe_walls.table import rounded
+from zwidth.study.wall_tables.cell_walls import cell_walls
+from zwidth.study.wall_tables.safe_walls import SafeWallsJob, compute_table, safe_walls_job
+from zwidth.study.wall_tables.table import rounded
 
 MECHANISM, TWO_MASS, MEASURED_HAND = "five-bar", "published-two-mass", "thesis-arm"
 WALLS = 2500  # tried in each cell that has any

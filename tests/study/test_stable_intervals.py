@@ -9,9 +9,16 @@ from tests.systems import random_loop
 from zwidth.chart import spectral_radius, stability_chart
 from zwidth.device import from_document
 from zwidth.device.load import load
-from zwidth.study.safe_walls.edge_chords import MOST_CHORDS, EdgeChords, _fill_all, edges_of_points
-from zwidth.study.safe_walls.grid import Sectors, cells_of
-from zwidth.study.safe_walls.stable_intervals import GAPS, common_interval, stable_intervals
+from zwidth.study.wall_tables.edge_chords import (
+    GAPS,
+    MOST_CHORDS,
+    EdgeChords,
+    _fill_all,
+    common_interval,
+    edges_of_points,
+    stable_intervals,
+)
+from zwidth.study.wall_tables.grid import Sectors, cells_of
 
 
 def chords_of(rings):

@@ -20,8 +20,7 @@ from tests.study.executor_cases import NotedJob, RootsJob, same_cells
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.study import FolderLock, Store, StoreError, run
 from zwidth.study.jobs import executor
-from zwidth.study.jobs.store import StoredCells
-from zwidth.study.jobs.store_lock import owner_of
+from zwidth.study.jobs.store import StoredCells, owner_of
 
 HOLDING = """
 import sys, time

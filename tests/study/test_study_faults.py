@@ -17,7 +17,7 @@ from tests.study.study_cases import (
     study_document,
 )
 from zwidth.device import DeviceError
-from zwidth.device.new_device import new_device
+from zwidth.device.new_file import new_device
 from zwidth.memory_limit import TooLarge
 from zwidth.study import read_study, study_of
 

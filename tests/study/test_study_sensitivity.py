@@ -16,7 +16,7 @@ from zwidth.device.load import device_of_point, load
 from zwidth.loop import Loop
 from zwidth.model import Plant
 from zwidth.study import optimum, sensitivities
-from zwidth.study.sensitivity.derivative import central_derivative, one_sided_derivative
+from zwidth.study.sensitivity.changed_devices import central_derivative, one_sided_derivative
 from zwidth.study.sensitivity.optimum import second_peak_stiffness
 
 LATE = "loop.delay_samples=1"

@@ -23,8 +23,8 @@ from zwidth.device import Device
 from zwidth.device.load import load
 from zwidth.loop import OperatingPoint
 from zwidth.measures import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, MeasureError, WantedWall
-from zwidth.measures.evaluate import evaluate
-from zwidth.model.effective_parameters import effective_parameters
+from zwidth.measures.evaluation import evaluate
+from zwidth.model.effective_mass import effective_parameters
 from zwidth.study import (
     Store,
     Sweep,

@@ -10,9 +10,8 @@ from zwidth.chart.verdict import NAMES
 from zwidth.measures import OK, UNDECIDED
 from zwidth.show import band_path
 from zwidth.study import Axis, Coverage, Sampling, SweepJob, study_over, sweep_job
-from zwidth.study.tolerances.band import Band, refined_dampings
-from zwidth.study.tolerances.edge_job import MOST_INTERVALS, stable_intervals
-from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
+from zwidth.study.tolerances.band import MOST_INTERVALS, Band, refined_dampings, stable_intervals
+from zwidth.study.tolerances.question import WALL_IS_STABLE
 
 NONE = (0.0, 0.0)
 # three devices on three lines, two intervals each

@@ -18,8 +18,8 @@ from zwidth.study import (
     run,
     sweep_job,
 )
-from zwidth.study.tolerances.indices import indices_of, sampled_shares
 from zwidth.study.tolerances.intervals import Interval
+from zwidth.study.tolerances.outcomes import indices_of, sampled_shares
 from zwidth.study.tolerances.question import LEAST_INDEX_SAMPLES
 from zwidth.study.tolerances.tolerance_study import _measured, _tightened
 

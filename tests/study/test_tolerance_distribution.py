@@ -11,11 +11,11 @@ from zwidth.study.tolerances.distribution import (
     CUT,
     Distribution,
     Limits,
+    Tolerance,
     lognormal,
     normal,
     spread_of_variation,
 )
-from zwidth.study.tolerances.draws import DRAWN, UNSEEN
 from zwidth.study.tolerances.intervals import (
     difference_interval,
     draws_needed,
@@ -23,7 +23,7 @@ from zwidth.study.tolerances.intervals import (
     quantile_ranks,
     share_interval,
 )
-from zwidth.study.tolerances.tolerance import Tolerance
+from zwidth.study.tolerances.tolerance_study import DRAWN, UNSEEN
 
 SHARES = np.linspace(0.001, 0.999, 97)
 NONE = Limits()

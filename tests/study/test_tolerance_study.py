@@ -13,9 +13,8 @@ from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.show import band_path
 from zwidth.study import EdgeJob, JobSeries, count_bounds, run, run_tolerances, shares_of, tolerance
-from zwidth.study.tolerances.draws import UNSEEN
-from zwidth.study.tolerances.tighten import tightened
-from zwidth.study.tolerances.tolerance_study import answer
+from zwidth.study.tolerances.result import tightened
+from zwidth.study.tolerances.tolerance_study import UNSEEN, answer
 
 MASSES = {"plant.mass_kg": uniform(20.0)}
 BOTH = {"plant.mass_kg": uniform(20.0), "loop.sampling_period_s": uniform(5.0)}

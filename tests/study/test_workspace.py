@@ -24,11 +24,11 @@ from zwidth.measures import (
     NoValueError,
     WantedWall,
 )
-from zwidth.measures.evaluate import evaluate_safely
+from zwidth.measures.evaluation import evaluate_safely
 from zwidth.model import PostureError
 from zwidth.study import PlaneError, Store, map_job, over_the_workspace, plane_of, workspace_map
+from zwidth.study.designs.column import positions
 from zwidth.study.workspace.map import MapJob, as_dataset
-from zwidth.study.workspace.workspace_summary import positions
 
 SINGLE_POINT_MEASURE = Measure(
     "each", "Asked one by one", "N", "lower", "", lambda place: 10.0 * float(place.effective.rigid_mass), each=True

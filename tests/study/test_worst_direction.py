@@ -11,9 +11,8 @@ from zwidth.loop import OperatingPoint
 from zwidth.measures import MEASURES, NO_VALUE, OK, Measure, MeasureError, NoValueError
 from zwidth.model import solve_posture
 from zwidth.study import extreme_over_directions, parse_requirement
-from zwidth.study.designs.requirement import Requirement
-from zwidth.study.workspace.direction_share import share_measure, share_of_directions
-from zwidth.study.workspace.extreme_direction import sphere
+from zwidth.study.designs.column import Requirement
+from zwidth.study.workspace.extreme_direction import share_measure, share_of_directions, sphere
 
 KINDS = {"planar": random_five_bar, "arm": spatial_arm, "loop": spatial_loop}
 

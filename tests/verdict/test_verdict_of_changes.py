@@ -284,8 +284,7 @@ def test_kernels_of_a_table_and_of_a_module_that_a_function_imports_count_as_exe
 
 
 def test_the_function_of_an_environment_counts_where_its_parameters_are_asked_for():
-    from zwidth.contact.environments.friction_patch import friction_patch
-    from zwidth.contact.environments.texture import texture
+    from zwidth.contact.environments.surface_patterns import friction_patch, texture
 
     record, seen = ExecutionRecord(), set()
     record.swap(seen)
@@ -296,7 +295,7 @@ def test_the_function_of_an_environment_counts_where_its_parameters_are_asked_fo
     finally:
         sys.settrace(before)
     found = record.functions(seen)
-    assert "src/zwidth/contact/environments/friction_patch.py:friction_patch" in found
+    assert "src/zwidth/contact/environments/surface_patterns.py:friction_patch" in found
     assert not any(texture.function.__name__ in name for name in found)
 
 

@@ -1,3 +1,4 @@
+from .area import Peak as Peak
 from .chart import StabilityChart as StabilityChart
 from .chart import boundary_points as boundary_points
 from .chart import largest_stiffness as largest_stiffness
@@ -10,16 +11,15 @@ from .edge_by_eigenvalues import closed_rings as closed_rings
 from .edge_crossings import EdgeChords as EdgeChords
 from .edge_crossings import exact_edge as exact_edge
 from .hurwitz import work_array as work_array
-from .hysteretic import hysteretic_chart as hysteretic_chart
+from .hysteretic_response import hysteretic_chart as hysteretic_chart
 from .measured.chart import MeasuredChart as MeasuredChart
 from .measured.chart import measured_chart as measured_chart
+from .measured.doubt import MeasuredVerdicts as MeasuredVerdicts
 from .measured.loop import MeasuredLoop as MeasuredLoop
-from .measured.verdict import MeasuredVerdicts as MeasuredVerdicts
 from .nyquist import terms_along as terms_along
-from .peak import Peak as Peak
 from .point_chart import chart_at as chart_at
 from .point_chart import check_at as check_at
-from .point_numbers import numbers_of_points as numbers_of_points
+from .point_chart import numbers_of_points as numbers_of_points
 from .polar import ByDirection as ByDirection
 from .polar import circle as circle
 from .polar import largest_stiffness_around as largest_stiffness_around
@@ -28,10 +28,10 @@ from .robust.chart import RobustChart as RobustChart
 from .robust.chart import robust_chart as robust_chart
 from .robust.instability import softening as softening
 from .robust.instability import unstable as unstable
-from .several_directions.box import Box as Box
 from .several_directions.chart import MultiChart as MultiChart
 from .several_directions.chart import multi_chart as multi_chart
 from .several_directions.curve_set import trace_curves as trace_curves
+from .several_directions.wall_curves import Box as Box
 from .table_radii import spectral_radii as spectral_radii
 from .traced_edge import TracedEdge as TracedEdge
 from .tracer import Tracer as Tracer

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
+from zwidth.chart.arcs import Window, window_of
 from zwidth.chart.decay import FastestDecay
-from zwidth.chart.rings import Window, window_of
 from zwidth.chart.verdict import WallVerdicts
 from zwidth.result import Result
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.chart.arcs import PAIR
-from zwidth.chart.area import curve_integral, end_value, straight_integral
+from zwidth.chart.area import curve_integral, end_value, is_stiffer, straight_integral
 from zwidth.chart.circle_sampling import NEAR_END
 from zwidth.chart.corner import fill_corners
 from zwidth.chart.curve import NO_LINE, OF_B, OF_K, OF_SLOPE, undamped_stiffness, zero_between
@@ -36,7 +36,6 @@ from zwidth.chart.edge_samples import (
     flag_all,
 )
 from zwidth.chart.hurwitz import is_stable
-from zwidth.chart.peak import is_stiffer
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes

@@ -16,10 +16,9 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart_batch import DECAY, memory_of, read_first
-from zwidth.chart.decay_search import REACHES, solve_double_root_alone
+from zwidth.chart.decay_search import REACHES, descend_alone, scatter_values, solve_double_root_alone
 from zwidth.chart.edge_by_eigenvalues import decided_trace
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SIMPLEX_SIZES, edge_memory
-from zwidth.chart.radius_search import descend_alone, scatter_values
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.loop import Loop
 

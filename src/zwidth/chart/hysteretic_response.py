@@ -10,24 +10,64 @@ damping instead, plus the difference of the two, which falls off like k^-4. Alia
 natural frequency are summed at each angle. The sum of all others is analytic in theta to two lengths beyond either
 end of [0, pi], and so a polynomial in theta. G is taken in modal coordinates, where a rigid motion is exactly
 free: in the plant's own, rounding of the stiffest spring would hold it.
+
+The chart of a plant with hysteretic damping, K (1 + i eta): exact where the loop vibrates steadily.
+
+A loss factor has no motion in time (it would begin before its cause), so there is no transition matrix. But the
+boundary of the stable set needs only the steady response to the held force at one frequency, which
+`chart.hysteretic_response` gives. It is sampled until what is interpolated between its angles is right too. From
+there on it is treated as a measured response, and cells are counted by Nyquist's criterion.
+
+As the loss tends to 0 the chart tends to that of the undamped plant, in proportion to it. How small it must be for
+that is another matter: a wall that drives a mode by less than its loss brakes it is stable, and is not without the
+loss, so that a mode that the wall hardly moves can limit the undamped chart alone.
+
+The edge of a plant with a loss factor, where that of its viscous equivalent is known: for fits.
+
+The chart with a loss factor takes seconds, most of them to count the cells. The viscous plant that loses as much
+in each mode at its own frequency has nearly the same chart, with the same arcs at nearly the same angles; there
+the walls of the hysteretic plant are computed exactly, from its sampled response. Arcs meet at other angles than
+the viscous ones do: these are computed, too (`hysteretic_corners`). Where that does not succeed the two edges are
+not made of the same arcs, and the edge is that of the whole chart.
+
+Where the arcs of an edge meet when its curve of walls is replaced by a slightly different one.
+
+Two pieces of one curve meet where it passes itself, at the angles a and b of two pairs of roots with
+
+    K(a) = K(b),   B(a) = B(b)
+
+and a piece meets a line of real roots, K + B w = h at z = 1 or z = -1, where K(a) + B(a) w = h. Both are found by
+Newton's method from the angles of the curve that was replaced.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
+import shapely
 from numpy.polynomial import Chebyshev
 
-from zwidth.arrays import Complexes, Floats, Ints
+from zwidth.arrays import Complexes, Flags, Floats, Ints
+from zwidth.chart.arcs import MINUS, PAIR, PLUS, ArcPoints, Arcs
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.edge_crossings import EdgeChords, WallCurve
+from zwidth.chart.measured.chart import MeasuredChart, measured_chart
+from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.nyquist import terms_along
+from zwidth.chart.traced_edge import TracedEdge
+from zwidth.chart.tracer import Tracer
 from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import table_of_loops
+from zwidth.loop.sections import HysteresisError
+from zwidth.model.argument_checks import require
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant
+from zwidth.model.response import Response, ResponseError, integrators_of
 
 # Pairs of aliases summed, and how many for each that the highest natural frequency lies above: what is left out
 # falls off with the third power.
@@ -169,3 +209,354 @@ def _response_difference(loop: Loop, lossy: ModalPlant, damped: ModalPlant, thet
     late = np.exp(-s * loop.fractional_delay * loop.period)
     hold = late * -np.expm1(-1j * thetas)[:, None] / (s * lag)
     return np.asarray(np.sum((lossy.response(w) - damped.response(w)) * hold, axis=1) / loop.period)
+
+
+STEP = 0.1  # first angles, in shares of the distance to the nearest singularity of the viscous plant
+INTERPOLATION_ERROR = 1e-9  # relative error of P that interpolation may leave
+FINEST = 1e-7  # least step between two angles, as a share of the angle; least distance of an angle from pi, in pi
+TOO_SMALL = "too small for this loop to be charted; set it to 0, give a larger one, or give damping instead"
+MOST_SAMPLES = 100_000  # angles
+LEAST_LOSS_FACTOR = 1e-5  # of the stiffness: with less the response turns too fast to be followed along the circle
+
+
+def hysteretic_chart(loop: Loop) -> MeasuredChart:
+    """The stable walls of a loop whose plant has a loss factor (`Plant.hysteresis`).
+
+    Returns  MeasuredChart; what it calls measured is computed here, to 1e-9, at as many frequencies as it takes
+    Raises   HysteresisError  where the loss factor is below 1e-5, or too small for this loop to be charted
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> spring = np.array([[4000.0]])
+    >>> plant = Plant(one[None], 0.0 * spring, spring, one, one, hysteresis=0.05 * spring)
+    >>> hysteretic_chart(Loop(plant, Controller(0.001))).stiffness_max > 0.0
+    True
+    """
+    require("loop", loop, Loop)
+    if loop.plant.hysteresis is None:
+        raise HysteresisError("the plant has no loss factor; stability_chart charts it")
+    if loop.has_fixed_feedback:
+        raise HysteresisError(
+            f"a loss factor cannot be charted with {loop.controller.feedback_names[0]}; describe the damping by "
+            "damping_Ns_per_m instead"
+        )
+    if np.max(np.abs(loop.plant.hysteresis)) < LEAST_LOSS_FACTOR * (1.0 - 1e-9) * np.max(
+        np.abs(loop.plant.stiffness)
+    ):
+        raise HysteresisError(f"the loss factor is below {LEAST_LOSS_FACTOR:.0e}, {TOO_SMALL}")
+    # delay, lag and filter are in the response already, and must not be applied twice
+    remaining_controller = replace(loop.controller, delay=0.0, actuator_time_constant=0.0, force_filter=None)
+    try:
+        chart = measured_chart(_response(loop), remaining_controller)
+    except ResponseError:
+        raise HysteresisError(f"the loss factor is {TOO_SMALL}") from None
+    if chart.open:
+        raise HysteresisError(f"the loss factor is {TOO_SMALL}")
+    return chart
+
+
+def _response(loop: Loop) -> Response:
+    """P on the circle as a response, close enough to be interpolated."""
+    sampled = SampledResponse.of(loop)
+    squared, _ = undamped_modes(loop.plant.mass, loop.plant.stiffness)
+    braked = loop.plant.damping.any() or loop.plant.lagged_dampers
+    thetas = Tracer(sampled.reference).sample_angles(STEP)
+    thetas = np.append(thetas[thetas < np.pi * (1.0 - FINEST)], np.pi)
+    response = Response(
+        frequency=thetas / (2.0 * np.pi * loop.period),
+        value=sampled(thetas),
+        integrators=2 if np.any(squared == 0.0) and not braked else None,
+        note="computed from the loss factor",
+    )
+    thetas, P = _refine_angles(sampled, thetas, response.value, integrators_of(response, loop.period))
+    return replace(response, frequency=thetas / (2.0 * np.pi * loop.period), value=P)
+
+
+def _refine_angles(
+    sampled: SampledResponse, thetas: Floats, P: Complexes, integrators: int
+) -> tuple[Floats, Complexes]:
+    """The angles and P (n,) there, refined until P is interpolated to INTERPOLATION_ERROR in every middle."""
+    unsure = np.ones(len(thetas) - 1, dtype=bool)
+    while unsure.any() and len(thetas) < MOST_SAMPLES:
+        middle = 0.5 * (thetas[:-1] + thetas[1:])[unsure]
+        exact = sampled(middle)
+        curve = interpolate_response(thetas, P, integrators, closed=True)
+        allowed = INTERPOLATION_ERROR + sampled.rounding(middle) / np.abs(exact)
+        missed = np.abs(exact * curve.inverse(middle) - 1.0) > allowed
+        wide = np.diff(thetas)[unsure] > FINEST * middle
+        new = np.flatnonzero(unsure)[missed & wide] + 1
+        thetas = np.insert(thetas, new, middle[missed & wide])
+        P = np.insert(P, new, exact[missed & wide])
+        # the halves of each step that was too wide
+        unsure = np.zeros(len(thetas) - 1, dtype=bool)
+        at = new + np.arange(len(new))
+        unsure[at - 1] = unsure[at] = True
+    return thetas, P
+
+
+THINNED: Final = 8  # chords of the viscous edge that make one here
+LENGTHENED: Final = 6  # chords on the piece by which an arc is longer than the viscous one
+TURN_ROUNDS: Final = 2  # in which the angles of turns are improved
+NEAR_ONE: Final = 1e-9  # angle at which the steady force is taken
+
+
+@dataclass(frozen=True)
+class HystereticCurve:
+    """Walls of a loop with a loss factor that have a pair of roots on the circle."""
+
+    loop: Loop
+    sampled: SampledResponse
+
+    def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
+        """K and B (k,) at angles (k,) in (0, pi): B = Im h / Im w, K = Re h - B Re w with h = -1/P."""
+        h = -1.0 / self.sampled(thetas)
+        w = self.loop.velocity_response(np.exp(1j * thetas))
+        B = h.imag / w.imag
+        return np.asarray(h.real - B * w.real), np.asarray(B)
+
+    def real_root_lines(self) -> dict[int, tuple[float, float]]:
+        """h [N/m] and w [1/s] of the lines K + B w = h of walls with a root at z = 1 and at z = -1."""
+        h = (-1.0 / self.sampled(np.array([NEAR_ONE, np.pi]))).real
+        w = self.loop.velocity_response(np.array([1.0, -1.0])).real
+        return {PLUS: (float(h[0]), float(w[0])), MINUS: (float(h[1]), float(w[1]))}
+
+
+def hysteretic_edge(loop: Loop) -> EdgeChords:
+    """The edge of a loop whose plant has a loss factor, by the arcs of its viscous equivalent.
+
+    Raises  ChartError       where the viscous edge cannot be closed
+            HysteresisError  where the arcs differ from those, and the loop cannot be charted
+    """
+    sampled = SampledResponse.of(loop)
+    curve = HystereticCurve(loop, sampled)
+    viscous = stability_chart(sampled.reference, decay=False).edge.traced
+    if not len(viscous.arcs):
+        return _edge_of_chart(loop)
+    size = np.maximum(np.ptp(np.vstack(viscous.outlines), axis=0), 1e-300)
+    moved = moved_arcs(viscous.arcs, curve, curve.real_root_lines(), size)
+    edge = None if moved is None else _edge_of_arcs(curve, viscous, moved)
+    return _edge_of_chart(loop) if edge is None else edge
+
+
+def _edge_of_chart(loop: Loop) -> EdgeChords:
+    """The edge of the whole chart: the sides of its cells, which lie on it to a share of 1e-5 of its size."""
+    from scipy.spatial import cKDTree
+
+    chart = hysteretic_chart(loop)
+    sides = Arcs.chords(chart.regions)
+    if not len(sides):
+        return EdgeChords(np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2)))
+    K0, K1, B0, B1 = chart.box
+    size = np.array([K1 - K0, B1 - B0])
+    known = np.isfinite(chart.edge.walls).all(axis=1)
+    tree = cKDTree(chart.edge.walls[known] / size)
+    frequencies = chart.edge.angles[known] / (2.0 * np.pi * loop.period)
+    ends = [frequencies[tree.query(walls / size)[1]] for walls in (sides.first, sides.last)]
+    return EdgeChords(sides.first, sides.last, np.column_stack(ends))
+
+
+def _edge_of_arcs(curve: HystereticCurve, viscous: TracedEdge, moved: MovedArcs) -> EdgeChords | None:
+    """Chords along the arcs between their moved ends; None where a ring of them crosses itself."""
+    arcs = viscous.arcs
+    inner = [
+        _angles_between(points, moved.start[k], moved.end[k]) if arcs.kind[k] == PAIR else np.empty(0)
+        for k, points in enumerate(viscous.arc_points)
+    ]
+    for _ in range(TURN_ROUNDS):
+        walks = _walks(curve, inner, moved)
+        inner = [_with_turns(*walk) if len(walk[0]) > 2 else walk[0][1:-1] for walk in walks]
+    walks = _walks(curve, inner, moved)
+    for ring in arcs.rings:
+        outline = np.vstack([walks[k][1][:-1] for k in ring])
+        if len(outline) > 3 and not shapely.Polygon(outline).is_valid:
+            return None
+    first = np.vstack([walls[:-1] for _, walls in walks])
+    last = np.vstack([walls[1:] for _, walls in walks])
+    pairs = np.vstack([np.column_stack([thetas[:-1], thetas[1:]]) for thetas, _ in walks])
+    return EdgeChords(first, last, pairs / (2.0 * np.pi * curve.loop.period), curve)
+
+
+def _angles_between(points: ArcPoints, start: float, end: float) -> Floats:
+    """Angles strictly between an arc's moved ends: the viscous arc's, thinned but for turns of K and of B, and
+    some where the arc is longer."""
+    thetas, K, B = points
+    way = np.sign(np.diff([K, B], axis=1))
+    kept = np.arange(len(thetas)) % THINNED == 0
+    kept[1:-1] |= np.any(way[:, 1:] != way[:, :-1], axis=0)
+    kept[[0, -1]] = False
+    shares = np.arange(LENGTHENED) / LENGTHENED
+    longer = [old + (new - old) * shares for old, new in ((thetas[0], start), (thetas[-1], end))]
+    low, high = min(start, end), max(start, end)
+    angles = np.unique(np.concatenate([thetas[kept], *longer]))
+    margin = 1e-9 * (high - low)
+    angles = angles[(angles > low + margin) & (angles < high - margin)]
+    return angles if end > start else angles[::-1]
+
+
+def _walks(curve: HystereticCurve, inner: list[Floats], moved: MovedArcs) -> list[tuple[Floats, Floats]]:
+    """Angles (k,) and walls (k, 2) along each arc, its moved ends included."""
+    K, B = curve.walls(np.concatenate(inner)) if sum(map(len, inner)) else (np.empty(0), np.empty(0))
+    parts = np.split(np.column_stack([K, B]), np.cumsum([len(thetas) for thetas in inner])[:-1])
+    return [
+        (
+            np.concatenate([[moved.start[k]], thetas, [moved.end[k]]]),
+            np.vstack([moved.first[k], walls, moved.last[k]]),
+        )
+        for k, (thetas, walls) in enumerate(zip(inner, parts, strict=True))
+    ]
+
+
+def _with_turns(thetas: Floats, walls: Floats) -> Floats:
+    """The inner angles of an arc, with those at which K or B turns by the parabola through three neighbours."""
+    turns = []
+    for values in walls.T:
+        step = np.diff(values)
+        at = np.flatnonzero(step[1:] * step[:-1] < 0.0) + 1
+        before, after = thetas[at] - thetas[at - 1], thetas[at + 1] - thetas[at]
+        slope_before, slope_after = step[at - 1] / before, step[at] / after
+        # half way between the neighbours' middles the slope of the parabola falls from one to the other
+        share = slope_before / (slope_before - slope_after)
+        turns.append(thetas[at] - 0.5 * before + share * 0.5 * (before + after))
+    rising = thetas[-1] > thetas[0]
+    angles = np.unique(np.concatenate([thetas[1:-1], *turns]))
+    gaps = np.append(True, np.diff(angles) > 1e-9 * np.ptp(thetas))
+    angles = angles[gaps]
+    return np.asarray(angles if rising else angles[::-1])
+
+
+MOST_STEPS: Final = 40  # of Newton's method
+SLOPE_STEP: Final = 1e-6  # of an angle for derivatives, as a share of its distance to the nearer end of (0, pi)
+LONGEST_STEP: Final = 0.2  # the same of one step of Newton's method
+SAME_WALL: Final = 1e-10  # distance of two walls that are one, as a share of the edge's size
+SAME_ANGLE: Final = 1e-9  # angles of two arcs between which the curve goes on
+FARTHEST: Final = 0.1  # by which a corner may move, of the edge's size: farther off there is another crossing
+NEAREST: Final = 1e-6  # angles nearer than this to 0 or pi are those ends themselves
+
+
+@dataclass(frozen=True)
+class MovedArcs:
+    """Arcs with their ends on another curve.
+
+    first, last  (n, 2)  walls [N/m, N s/m]
+    start, end   (n,)    angles
+    """
+
+    first: Floats
+    last: Floats
+    start: Floats
+    end: Floats
+
+
+def moved_arcs(
+    arcs: Arcs, curve: WallCurve, lines: dict[int, tuple[float, float]], size: Floats
+) -> MovedArcs | None:
+    """Arcs of pairs of roots and of real roots with their corners on a curve near the one they were traced on.
+
+    lines    h and w of the lines of real roots, by `arcs.PLUS` and `arcs.MINUS`
+    size     (2,) of the edge [N/m, N s/m]
+    Returns  None where a corner is not found near the former one, or an arc would run backwards: the edges differ
+             in their arcs then
+    """
+    if not np.isin(arcs.kind, (PAIR, PLUS, MINUS)).all():
+        return None
+    following = arcs.next_arc
+    start, end, corner = arcs.start.copy(), arcs.end.copy(), arcs.last.copy()
+    before, after = arcs.kind == PAIR, arcs.kind[following] == PAIR
+    between = _inner(end), _inner(arcs.start[following])
+    smooth = before & after & (np.abs(end - arcs.start[following]) < SAME_ANGLE)
+
+    both = np.flatnonzero(before & after & between[0] & between[1] & ~smooth)
+    a, b, found = _self_crossings(curve, end[both], arcs.start[following[both]], size)
+    end[both], start[following[both]] = a, b
+    corner[both] = np.column_stack(curve.walls(a)) if len(both) else corner[both]
+
+    for ahead, ends, other in ((True, end, arcs.kind[following]), (False, start, arcs.kind)):
+        own = before if ahead else after
+        place = np.arange(len(arcs)) if ahead else following
+        for kind, (h, w) in lines.items():
+            some = np.flatnonzero(own & between[0 if ahead else 1] & (other == kind))
+            angle, met = _line_crossings(curve, ends[place[some]], h, w, size)
+            ends[place[some]], found = angle, found & met
+            corner[some] = np.column_stack(curve.walls(angle)) if len(some) else corner[some]
+
+    on = np.flatnonzero(smooth & between[0])
+    corner[on] = np.column_stack(curve.walls(end[on])) if len(on) else corner[on]
+    # at z = 1 the curve ends where it did, as steady forces are the same; at z = -1 it ends on the moved line
+    last = np.flatnonzero((before & (end > np.pi - NEAREST)) | (after & (arcs.start[following] > np.pi - NEAREST)))
+    corner[last] = np.column_stack(curve.walls(np.full(len(last), np.pi - NEAREST))) if len(last) else corner[last]
+    crossed = np.flatnonzero(~before & ~after & (arcs.kind != arcs.kind[following]))
+    if len(crossed):
+        (h0, w0), (h1, w1) = lines[PLUS], lines[MINUS]
+        B = (h1 - h0) / (w1 - w0)
+        corner[crossed] = h0 - B * w0, B
+
+    ahead = np.sign(arcs.end - arcs.start) == np.sign(end - start)
+    far = not np.all(np.abs(corner - arcs.last) < FARTHEST * size)  # true of nan, too
+    if not found or far or not np.all(ahead[before]):
+        return None
+    first = np.empty_like(corner)
+    first[following] = corner
+    return MovedArcs(first, corner, start, end)
+
+
+def _inner(angles: Floats) -> Flags:
+    """Which angles lie within (0, pi) and not at its ends."""
+    return (angles > NEAREST) & (angles < np.pi - NEAREST)
+
+
+def _room(angles: Floats) -> Floats:
+    """Distance of angles to the nearer end of (0, pi)."""
+    return np.minimum(angles, np.pi - angles)
+
+
+def _slopes(curve: WallCurve, angles: Floats) -> tuple[Floats, Floats]:
+    """Walls (k, 2) at angles (k,), and their derivatives by the angle (k, 2), by central differences."""
+    step = SLOPE_STEP * _room(angles)
+    K, B = curve.walls(np.concatenate([angles, angles + step, angles - step]))
+    walls = np.column_stack([K, B]).reshape(3, -1, 2)
+    return walls[0], (walls[1] - walls[2]) / (2.0 * step[:, None])
+
+
+def _self_crossings(curve: WallCurve, a: Floats, b: Floats, size: Floats) -> tuple[Floats, Floats, bool]:
+    """Angles (k,), (k,) near a and b at which a curve has the same wall, and whether all are found.
+
+    size  (2,) of the edge [N/m, N s/m]
+    """
+    k = len(a)
+    if not k:
+        return a, b, True
+    for _ in range(MOST_STEPS):
+        walls, slopes = _slopes(curve, np.concatenate([a, b]))
+        gap = (walls[:k] - walls[k:]) / size
+        if np.max(np.abs(gap)) < SAME_WALL:
+            return a, b, True
+        (da, ea), (db, eb) = (slopes[:k] / size).T, (slopes[k:] / size).T
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            det = db * ea - da * eb
+            step_a = (eb * gap[:, 0] - db * gap[:, 1]) / det
+            step_b = (ea * gap[:, 0] - da * gap[:, 1]) / det
+            longest = np.maximum(np.abs(step_a) / _room(a), np.abs(step_b) / _room(b))
+            share = np.minimum(1.0, LONGEST_STEP / longest)
+        if not np.isfinite(longest).all():
+            break
+        a, b = a + share * step_a, b + share * step_b
+    return a, b, False
+
+
+def _line_crossings(curve: WallCurve, a: Floats, h: float, w: float, size: Floats) -> tuple[Floats, bool]:
+    """Angles (k,) near a at which a curve crosses the line K + B w = h, and whether all are found."""
+    if not len(a):
+        return a, True
+    scale = size[0] + size[1] * abs(w)
+    for _ in range(MOST_STEPS):
+        walls, slopes = _slopes(curve, a)
+        gap = (walls[:, 0] + walls[:, 1] * w - h) / scale
+        if np.max(np.abs(gap)) < SAME_WALL:
+            return a, True
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = -gap * scale / (slopes[:, 0] + slopes[:, 1] * w)
+        if not np.isfinite(step).all():
+            break
+        a = a + np.clip(step, -LONGEST_STEP * _room(a), LONGEST_STEP * _room(a))
+    return a, False

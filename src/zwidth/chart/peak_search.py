@@ -17,13 +17,13 @@ from typing import Final
 
 import numpy as np
 
+from zwidth.chart.area import is_stiffer
 from zwidth.chart.corner import fill_corner, solve_crossing
 from zwidth.chart.curve import NO_LINE, OF_B, OF_LINE, OF_SLOPE, Line, undamped_stiffness, zero_between
 from zwidth.chart.curve_refinement import STRAY
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.edge_samples import LONGEST, SHARE, edge_flag, fill_curve, flag_quadrant
 from zwidth.chart.hurwitz import edges_on_line, quotient_flag
-from zwidth.chart.peak import is_stiffer
 from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_inline, compiled_lean

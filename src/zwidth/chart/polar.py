@@ -15,10 +15,10 @@ from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import FOUND
 from zwidth.chart.edge_memory import NO_WALL as NONE_FOUND
-from zwidth.chart.point_numbers import numbers_of_points
+from zwidth.chart.point_chart import numbers_of_points
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import check_several_directions
+from zwidth.loop.point_text import check_several_directions
 from zwidth.loop.sections import UnmovedError
 from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.load import LoadError

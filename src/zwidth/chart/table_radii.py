@@ -1,4 +1,7 @@
-"""Spectral radii of walls for loops of a table."""
+"""Spectral radii of walls for loops of a table.
+
+Spectral radii of walls at many operating points together, from their loops.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,11 @@ import numpy as np
 from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.verdict import BATCH_SIZE
 from zwidth.loop.loop_table import LoopTable
-from zwidth.loop.realisation import StateSpace
-from zwidth.loop.table_states import state_spaces
-from zwidth.loop.unheld_positions import AT_ONE, set_aside
+from zwidth.loop.multi_loop import AT_ONE, set_aside
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_loops import pieces_of_points, table_of_points
+from zwidth.loop.realisation import StateSpace, state_spaces
+from zwidth.model.coupled_pairs import AGREEMENT
 
 BESIDE: Final = 1e-3  # how much smaller a root may be that could be the largest instead
 
@@ -115,3 +120,34 @@ def _leverages(z: Complexes, states: StateSpace) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = np.prod(np.abs(z[:, :, None] - poles[:, None, :]) / apart, axis=-1)
     return np.asarray(np.where(largest, moved, 0.0).max(axis=-1))
+
+
+ERROR: Final = 1e-9  # largest error of a radius, relative to 1
+
+
+def radii_at_points(point: OperatingPoint, wall_stiffness: Floats, wall_damping: Floats) -> Floats:
+    """Largest |z| (...) of a wall K, B (...) at each point.
+
+    Returns  nan where a point is to be looked at alone, as `verdict.spectral_radius` of its loop: its loop is not
+             of the form that kernels take, or dampers couple its modes, which a batch knows to AGREEMENT only, and
+             the largest root moves too much with them
+    """
+    K, B = wall_stiffness.ravel(), wall_damping.ravel()
+    radii = np.full(K.size, np.nan)
+    for at, piece in pieces_of_points(point):
+        radii[at] = _radii_of_loops(piece, K[at], B[at])
+    return radii.reshape(wall_stiffness.shape)
+
+
+def _radii_of_loops(point: OperatingPoint, K: Floats, B: Floats) -> Floats:
+    """`radii_at_points` for flat walls (N,): first of loops that are known to rounding, then of coupled ones."""
+    radii = np.full(len(K), np.nan)
+    exact = table_of_points(point, coupled=False)
+    if exact is not None:
+        radii = spectral_radii(exact, np.arange(len(K)), K, B)
+    rest = np.flatnonzero(np.isnan(radii))
+    table = table_of_points(point) if len(rest) else None
+    if table is not None:
+        found, leverage = radii_and_leverages(table, rest, K[rest], B[rest])
+        radii[rest] = np.where(leverage * AGREEMENT <= ERROR, found, np.nan)
+    return radii

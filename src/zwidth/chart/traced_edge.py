@@ -12,11 +12,9 @@ import numpy as np
 import shapely
 
 from zwidth.arrays import Floats
-from zwidth.chart.arcs import ArcPoints, Arcs, Curves, sample_arcs
-from zwidth.chart.area import quadrant_area
+from zwidth.chart.arcs import ArcPoints, Arcs, Curves, outline, sample_arcs, simple_rings
+from zwidth.chart.area import Peak, find_peak, largest_damping, quadrant_area
 from zwidth.chart.chart_base import BoundaryArc
-from zwidth.chart.peak import Peak, find_peak, largest_damping
-from zwidth.chart.rings import outline, simple_rings
 
 
 class PeakFields(TypedDict):

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, UNDELAYED, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, UNDELAYED, Bound, ConditionCase
 
 
 def stiffness_limit(

@@ -26,9 +26,9 @@ from zwidth.conditions.assumptions import (
     RESISTIVE,
     RIGID,
     UNDELAYED,
+    Bound,
     ConditionCase,
 )
-from zwidth.conditions.bound import Bound
 from zwidth.loop.controller import FirstOrder
 
 

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.verdict import spectral_radius
-from zwidth.conditions.bound import Bound
-from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
+from zwidth.conditions.assumptions import Bound
 from zwidth.conditions.registry import compare
+from zwidth.conditions.traits import ground_friction, reading_step
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require
 from zwidth.result import Result
@@ -132,7 +132,7 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
     """
     require("point", point, OperatingPoint)
     if point.response is not None:
-        from zwidth.chart.measured.fit_check import modelled_point
+        from zwidth.chart.measured.chart import modelled_point
 
         point = modelled_point(point)
     if damping is not None:

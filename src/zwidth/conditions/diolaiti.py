@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats
 from zwidth.conditions.abbott_okamura import pure_spring_limit
-from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE_DELAY, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE_DELAY, Bound, ConditionCase
 
 
 def dimensionless_friction(

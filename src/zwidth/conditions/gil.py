@@ -8,8 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, LIGHT, LIGHT_WALL, PLAIN, RESISTIVE, RIGID, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import (
+    COLLOCATED,
+    LIGHT,
+    LIGHT_WALL,
+    PLAIN,
+    RESISTIVE,
+    RIGID,
+    Bound,
+    ConditionCase,
+)
 
 
 def stiffness_limit(

@@ -16,9 +16,9 @@ from zwidth.conditions.assumptions import (
     PLAIN,
     RESISTIVE,
     SLOW,
+    Bound,
     ConditionCase,
 )
-from zwidth.conditions.bound import Bound
 
 
 def stiffness_limit(

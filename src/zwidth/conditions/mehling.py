@@ -9,8 +9,15 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.conditions import colgate_schenkel
-from zwidth.conditions.assumptions import COLLOCATED, NYQUIST_BELOW_CORNER, PLAIN, RIGID, UNDELAYED, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import (
+    COLLOCATED,
+    NYQUIST_BELOW_CORNER,
+    PLAIN,
+    RIGID,
+    UNDELAYED,
+    Bound,
+    ConditionCase,
+)
 
 
 def effective_damping(

@@ -25,8 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, ONE_MODE, PLAIN, RESISTIVE, UNDELAYED, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, ONE_MODE, PLAIN, RESISTIVE, UNDELAYED, Bound, ConditionCase
 from zwidth.loop.hold import denominator, step_response
 
 

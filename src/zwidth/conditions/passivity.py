@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE_DELAY, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE_DELAY, Bound, ConditionCase
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop

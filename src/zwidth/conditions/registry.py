@@ -21,8 +21,7 @@ from zwidth.conditions import (
     thesis_unit_delay,
     thesis_whole_delay,
 )
-from zwidth.conditions.assumptions import case_of
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import Bound, case_of
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 

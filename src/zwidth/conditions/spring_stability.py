@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RESISTIVE, RIGID, UNDELAYED, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RESISTIVE, RIGID, UNDELAYED, Bound, ConditionCase
 from zwidth.conditions.one_mode import OneMode, one_mode
 
 

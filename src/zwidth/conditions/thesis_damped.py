@@ -31,9 +31,9 @@ from zwidth.conditions.assumptions import (
     RESISTIVE,
     RIGID,
     UNDELAYED,
+    Bound,
     ConditionCase,
 )
-from zwidth.conditions.bound import Bound
 
 
 class HeldForceResponse(NamedTuple):

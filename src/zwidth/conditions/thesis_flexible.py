@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, PLAIN, SPRUNG, UNDAMPED, UNDELAYED, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, SPRUNG, UNDAMPED, UNDELAYED, Bound, ConditionCase
 
 
 def _cosine_and_bend(mass: Floats, stiffness: Floats, period: Floats) -> tuple[Floats, Floats]:

@@ -20,9 +20,9 @@ from zwidth.conditions.assumptions import (
     SPRUNG,
     UNDAMPED,
     UNDELAYED,
+    Bound,
     ConditionCase,
 )
-from zwidth.conditions.bound import Bound
 
 
 def stiffness_limit(

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, UNDELAYED, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, UNDELAYED, Bound, ConditionCase
 
 
 def stiffness_limit(wall_damping: ArrayLike, mass: ArrayLike, sampling_period: ArrayLike) -> Floats:

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, UNIT_DELAY, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, UNIT_DELAY, Bound, ConditionCase
 
 LARGEST_D = 2.0 * (np.sqrt(2.0) - 1.0)
 # At the tip of (4.32) dp/dd = 0 leaves the cubic d^3 - 22 d^2 + 28 d - 8 = 0; its middle root by

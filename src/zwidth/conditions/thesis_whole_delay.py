@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, WHOLE_DELAY, ConditionCase
-from zwidth.conditions.bound import Bound
+from zwidth.conditions.assumptions import COLLOCATED, PLAIN, RIGID, UNDAMPED, WHOLE_DELAY, Bound, ConditionCase
 
 # Nodes of the area's integral; without delay, where its end is closest to the pole at t = pi, 12 leave 1e-13.
 GAUSS = 16

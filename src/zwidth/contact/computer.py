@@ -3,6 +3,12 @@
 Each kernel works on one signal. The simulation of one rendered direction reads one coordinate and sends one
 command; that of a whole mechanism reads the three coordinates of the handle, in which it filters the force, too,
 and sends one command to each motor.
+
+Random numbers that depend on nothing but where they are used: a batch comes out the same on any cores.
+
+The arrays that the engine works on: devices, and the members of a batch; `computer` has those of the computers.
+
+Leading axis D: devices of the batch, padded to one size with zeros; a member names its device by index.
 """
 
 from __future__ import annotations
@@ -11,16 +17,15 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_inline
-from zwidth.contact.noise import normal
 from zwidth.loop.controller import Controller
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.foaw import Foaw
-from zwidth.loop.estimators.foaw_kernel import foaw_estimate
+from zwidth.loop.estimators.kernels import foaw_estimate, levant_estimate
 from zwidth.loop.estimators.levant import Levant
-from zwidth.loop.estimators.levant_kernel import levant_estimate
 from zwidth.loop.filters import force_filter, low_pass_factors, velocity_estimator
 
 LINEAR: Final = 0
@@ -272,3 +277,124 @@ def send_force(computer: Computer, signals: Signals, c: int, force: float) -> fl
 def arrived_command(computer: Computer, signals: Signals, c: int, part: int) -> float:
     """The command that motor c has in part 0 and 1 of an interval; in part 0 it is one sample older."""
     return float(signals.queue[c, computer.delay + 1 - part])
+
+
+@compiled
+def scrambled(x: np.uint64) -> np.uint64:
+    """SplitMix64's finaliser: neighbouring numbers go far apart (Steele, Lea and Flood 2014)."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+@compiled
+def uniform(seed: np.uint64, sample: int, channel: int, draw: int) -> float:
+    """Uniform in (0, 1)."""
+    key = scrambled(seed + np.uint64(0x9E3779B97F4A7C15))
+    key = scrambled(key ^ (np.uint64(sample) * np.uint64(0x9E3779B97F4A7C15)))
+    key = scrambled(key + np.uint64(2 * channel + draw + 1) * np.uint64(0xD1B54A32D192ED03))
+    return (float(key >> np.uint64(11)) + 0.5) * 2.0**-53
+
+
+@compiled
+def normal(seed: np.uint64, sample: int, channel: int) -> float:
+    """Standard normal, by Box and Muller."""
+    radius = np.sqrt(-2.0 * np.log(uniform(seed, sample, channel, 0)))
+    return float(radius * np.cos(2.0 * np.pi * uniform(seed, sample, channel, 1)))
+
+
+# Columns of a trace.
+READING, TRUTH, VELOCITY, FORCE, HANDLE = range(5)
+TRACES = 5
+# Entries of the energy ledger, in this order: what each has put in since the start [J].
+HAND, WALL, HOLD, ESTIMATE, QUANTISER, CONTROLLER, ACTUATOR, FRICTION, BRAKES, SPRINGS, STRUCTURE, STORED = range(
+    12
+)
+ENTRIES = 12
+# Entries of `PlantArrays.local`.
+NOTHING_LOCAL, SAMPLE, LATER = range(3)
+
+
+class PlantArrays(NamedTuple):
+    """D plants between samples. An interval has P parts, at whose beginning a command may begin to act.
+
+    transition  (D, P, R, N)    what N states become, and then, for each element, place and speed of its motion
+    inputs      (D, P, F, R)    what a unit of a held force adds to all R: command, hand, elements
+    substeps    (D, P)          how many in each part; 0 for a part that is none
+    length      (D, P)          of a substep [s]
+    new         (D, P)          1 once the new command acts, 0 as long as the one before it does
+    local       (D, P)          what the local loop does at a part's beginning: NOTHING_LOCAL, take a SAMPLE, or,
+                                as its delay ends between two of them, let the new command act (LATER)
+    loss, work  (D, P, M, M)    quadratic forms of the ledger, M = N + F; size 0 without one
+    energy      (D, N, N)
+    size        (D,)            coordinates n: velocities stand n places after them
+    kind        (D, E)          of each element;   numbers (D, E, 6)
+    along       (D, E, n)       motion each works on
+    reading     (D, E, n)       what the computer reads for a sampled force
+    sensor      (D, n)          what is read, as it is
+    handle      (D, n)          where the hand is;   push (D, n)  where its push acts
+    channel     (D, C, n)       motions that are counted;   step, weight, noise (D, C)
+    encoder     (D, C)          numbers of the encoders, by which they draw their noise
+    """
+
+    transition: Floats
+    inputs: Floats
+    substeps: Ints
+    length: Floats
+    new: Ints
+    local: Ints
+    loss: Floats
+    work: Floats
+    energy: Floats
+    size: Ints
+    kind: Ints
+    numbers: Floats
+    along: Floats
+    reading: Floats
+    sensor: Floats
+    handle: Floats
+    push: Floats
+    channel: Floats
+    step: Floats
+    weight: Floats
+    noise: Floats
+    encoder: Ints
+
+
+class RunArrays(NamedTuple):
+    """m runs.
+
+    device      (m,)     index
+    start       (m, R)   states at time 0, place and speed of each element's motion
+    wall        (m,)     where the wall is [m]
+    values      (m, P)   of the environment
+    push        (m, 9)   the hand's (see `hand`);   reflex (m, 7)
+    observer    (m, Q)   the passivity controller's; nan in the first: none
+    seed        (m,)
+    bound       (m,)     reading from the wall at which a run stops [m]
+    """
+
+    device: Ints
+    start: Floats
+    wall: Floats
+    values: Floats
+    push: Floats
+    reflex: Floats
+    observer: Floats
+    seed: NDArray[np.uint64]
+    bound: Floats
+
+
+class Records(NamedTuple):
+    """Records of m runs of S samples; arrays of size 0 where they are not wanted.
+
+    samples  (m,)           how many were run
+    traces   (m, S, 5)      reading, truth, velocity, force, handle at each sample
+    handle   (m, S, n)      handle after each substep
+    ledger   (m, S, 12)     energies at each sample
+    """
+
+    samples: Ints
+    traces: Floats
+    handle: Floats
+    ledger: Floats

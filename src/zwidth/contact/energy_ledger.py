@@ -24,8 +24,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.contact.elements import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING
-from zwidth.contact.engine_arrays import (
+from zwidth.contact.computer import (
     ACTUATOR,
     BRAKES,
     CONTROLLER,
@@ -42,6 +41,7 @@ from zwidth.contact.engine_arrays import (
     PlantArrays,
 )
 from zwidth.contact.hand import BRAKE
+from zwidth.contact.plant_step import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING
 
 (
     LAST_TRUTH,

@@ -14,21 +14,6 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_inline
 from zwidth.contact.computer import (
-    Computer,
-    Computers,
-    Signals,
-    arrived_command,
-    clip,
-    computer_at,
-    estimate_velocity,
-    filter_force,
-    send,
-    send_force,
-    signals_of,
-)
-from zwidth.contact.elements import SAMPLED, VARYING
-from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_substep, new_ledger
-from zwidth.contact.engine_arrays import (
     FORCE,
     HANDLE,
     LATER,
@@ -36,10 +21,23 @@ from zwidth.contact.engine_arrays import (
     SAMPLE,
     TRUTH,
     VELOCITY,
+    Computer,
+    Computers,
     PlantArrays,
     Records,
     RunArrays,
+    Signals,
+    arrived_command,
+    clip,
+    computer_at,
+    estimate_velocity,
+    filter_force,
+    normal,
+    send,
+    send_force,
+    signals_of,
 )
+from zwidth.contact.energy_ledger import Ledger, energy_of, enter_sample, enter_substep, new_ledger
 from zwidth.contact.environments import MEMORY, environment_at
 from zwidth.contact.fixed_feedback import (
     FeedbackArrays,
@@ -50,10 +48,11 @@ from zwidth.contact.fixed_feedback import (
     with_feedback,
 )
 from zwidth.contact.hand import hand_force, sample_brakes_and_reflexes, step_brakes_and_reflexes
-from zwidth.contact.noise import normal
 from zwidth.contact.passivity_controller import PASSIVITY_MEMORY as PASSIVITY
 from zwidth.contact.passivity_controller import passivity_force
 from zwidth.contact.plant_step import (
+    SAMPLED,
+    VARYING,
     PlantState,
     dot,
     keep_swapped,

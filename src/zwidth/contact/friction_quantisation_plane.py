@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.conditions.diolaiti import dimensionless_friction
-from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
-from zwidth.conditions.traits import traits
+from zwidth.conditions.traits import ground_friction, reading_step, traits
 from zwidth.loop.loop import Loop
 from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 

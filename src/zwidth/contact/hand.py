@@ -10,8 +10,8 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled_lean
-from zwidth.contact.elements import VARYING
-from zwidth.contact.engine_arrays import PlantArrays
+from zwidth.contact.computer import PlantArrays
+from zwidth.contact.plant_step import VARYING
 from zwidth.model.operator import Operator
 
 # What stands in the first number of an element that varies.

@@ -3,20 +3,29 @@ elements that answer to them.
 
 These kernels index element by element and count no references: a substep of a few states costs less than counting
 would.
+
+Nonlinear elements on one motion of the plant: the mean force of each over a substep.
+
+Over a substep the motion q = along . x goes from q0 at velocity v0 to q1 at v1, if nothing of it acts. A unit of
+force held over the substep adds `shift` to q1 and `mobility` to v1. A force f held over the substep does the work
+f (q1 - q0), exactly.
+
+Dry friction over one substep: the mean force that a motion's velocities ask for.
+
+Without this friction the motion would go from velocity v0 to w over the substep; a unit of force held over the
+substep adds `mobility` to the velocity at its end. What is returned acts on the motion, so it opposes it.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import exp
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_inline, compiled_lean
-from zwidth.contact.computer import round_to_step
-from zwidth.contact.elements import BRISTLES, COULOMB, bristles_bend, element_force
-from zwidth.contact.engine_arrays import PlantArrays
-from zwidth.contact.friction import coulomb_force
+from zwidth.contact.computer import PlantArrays, round_to_step
 
 SWEEPS = 60  # of elements that work on one another, over one substep
 SETTLED = 1e-14  # relative change of their forces that is none
@@ -250,3 +259,219 @@ def _bend(devices: PlantArrays, d: int, part: int, e: int, state: PlantState) ->
     _, speed = _ahead(devices, d, part, e, state)
     mobility, h = devices.inputs[d, part, 2 + e, at + 1], devices.length[d, part]
     bristles_bend(devices.numbers, state.memory, d, e, state.states[at + 1], speed, mobility, h)
+
+
+NOTHING: Final = -1
+COULOMB: Final = 0
+BRISTLES: Final = 1
+SPRING: Final = 2
+VARYING: Final = 3
+SAMPLED: Final = 4  # a force of the computer beside the wall's, which stands in the memory
+
+
+@compiled_inline
+def element_force(
+    kind: int,
+    numbers: Floats,
+    memory: Floats,
+    d: int,
+    e: int,
+    q0: float,
+    v0: float,
+    q1: float,
+    v1: float,
+    shift: float,
+    mobility: float,
+    h: float,
+) -> float:
+    """Mean force of element e over a substep of length h [s], with its numbers (D, E, 6) and memory (E, 4)."""
+    if kind == COULOMB:
+        return coulomb_force(numbers[d, e, 0], v0, v1, mobility)
+    if kind == BRISTLES:
+        law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
+        return bristle_force(memory[e, 0], law, v0, v1, mobility, h)[0]
+    if kind == SPRING:
+        law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
+        return bent_spring_force(law, numbers[d, e, 5], q0, q1, shift)
+    if kind == SAMPLED:
+        return float(memory[e, 0])
+    if kind == VARYING:
+        return varying_force(memory[e, 0], memory[e, 1], memory[e, 2], q0, q1, shift, h)
+    return 0.0
+
+
+@compiled_lean
+def bristles_bend(
+    numbers: Floats, memory: Floats, d: int, e: int, v0: float, v1: float, mobility: float, h: float
+) -> None:
+    """Let the bristles of element e bend as the substep ends; its force itself remembers nothing."""
+    law = (numbers[d, e, 0], numbers[d, e, 1], numbers[d, e, 2], numbers[d, e, 3], numbers[d, e, 4])
+    memory[e, 0] = bristle_force(memory[e, 0], law, v0, v1, mobility, h)[1]
+
+
+@compiled_lean
+def bent_spring_force(
+    law: tuple[float, float, float, float, float], kink: float, q0: float, q1: float, shift: float
+) -> float:
+    """-(V(q1) - V(q0))/(q1 - q0) with q1 moved by the force itself: the spring gives back what it took.
+
+        V(q) = U(a + q) - F q - k q^2/2,    U(d) = cubic d^4/4 + excess min(d - kink, 0)^2/2
+
+    law  cubic, excess, the offset a at which it is bent already, and U's slope F and its tangent k there, which
+         are in the equilibrium and in the linear plant
+
+    By Newton's method on f = F(q1 + shift f), the difference quotient written out so that q1 = q0 is no case.
+    """
+    cubic, excess, offset, held, tangent = law
+    f = 0.0
+    for _ in range(25):
+        end = q1 + shift * f
+        mean, slope = _quotient(cubic, excess, kink, offset + q0, offset + end)
+        mean, slope = mean - held - 0.5 * tangent * (q0 + end), slope - 0.5 * tangent
+        step = (f + mean) / (1.0 + shift * slope)
+        f -= step
+        if abs(step) <= 1e-15 * (abs(f) + abs(mean)):
+            break
+    return f
+
+
+@compiled_lean
+def _quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) -> tuple[float, float]:
+    """(V(q1) - V(q0))/(q1 - q0), and about its slope in q1."""
+    mean = 0.25 * cubic * (q1 * q1 + q0 * q0) * (q1 + q0)
+    slope = 0.25 * cubic * (3.0 * q1 * q1 + 2.0 * q1 * q0 + q0 * q0)
+    q0, q1 = q0 - kink, q1 - kink
+    if q0 <= 0.0 and q1 <= 0.0:
+        return mean + 0.5 * excess * (q0 + q1), slope + 0.5 * excess
+    if q0 < 0.0 or q1 < 0.0:
+        back = min(q0, q1)
+        share = back / abs(q1 - q0)
+        mean += 0.5 * excess * back * abs(share)
+        slope += 0.5 * excess * share * share if q1 < 0.0 else 0.0
+    return mean, slope
+
+
+@compiled_lean
+def varying_force(
+    stiffness: float, damping: float, rest: float, q0: float, q1: float, shift: float, h: float
+) -> float:
+    """A spring and a damper whose numbers change from sample to sample:  -(k (q_mean - rest) + b (q1 - q0)/h).
+
+    Implicit, so that no number is too large for the substep; the damper never gives energy.
+    """
+    pull = stiffness * (0.5 * (q0 + q1) - rest) + damping * (q1 - q0) / h
+    return -pull / (1.0 + shift * (0.5 * stiffness + damping / h))
+
+
+@compiled_inline
+def coulomb_force(level: float, v0: float, w: float, mobility: float) -> float:
+    """Coulomb friction with sticking, as the impulse that the substep's velocities ask for.
+
+    As long as the motion slides, the force is -C sign(v). Where that would turn it round, it stops within the
+    substep; what pushes it then either cannot overcome C, and it ends the substep at rest, or drags it on the
+    other way for the rest of the substep. The velocity at the end is then right to second order in the substep.
+    """
+    brake = level * mobility
+    side = 1.0
+    if v0 < 0.0 or (v0 == 0.0 and w < 0.0):
+        side, v0, w = -1.0, -v0, -w
+    if w - brake >= 0.0:
+        return -side * level
+    push = w - v0  # what it gains over a whole substep, nearly evenly
+    if push >= -brake:
+        return -side * w / mobility
+    slid = v0 / (v0 - w + brake)
+    return side * ((push + brake) * (1.0 - slid) - w) / mobility
+
+
+@compiled_lean
+def stribeck(coulomb: float, breakaway: float, stribeck_velocity: float, v: float) -> float:
+    """g(v) = C + (F_s - C) exp(-(v/v_s)^2), the level towards which the bristles bend at a steady velocity."""
+    if breakaway <= coulomb:
+        return coulomb
+    ratio = v / stribeck_velocity
+    return coulomb + (breakaway - coulomb) * exp(-ratio * ratio)
+
+
+@compiled_lean
+def bristles_after(z: float, level: float, stiffness: float, v: float, h: float) -> tuple[float, float]:
+    """Deflection after h at constant velocity, and its mean:  z' = v - sigma_0 |v| z / g  in closed form."""
+    rate = stiffness * abs(v) / level * h
+    if rate < 1e-8:
+        return z + v * h, z + 0.5 * v * h
+    full = level / stiffness if v > 0.0 else -level / stiffness
+    fade = exp(-rate)
+    return full + (z - full) * fade, full + (z - full) * (1.0 - fade) / rate
+
+
+@compiled_lean
+def bristle_force(
+    z: float,
+    numbers: tuple[float, float, float, float, float],
+    v0: float,
+    w: float,
+    mobility: float,
+    h: float,
+) -> tuple[float, float]:
+    """Force of the Dahl and LuGre models over the substep, and the bristles' deflection after it.
+
+    numbers  C, F_s, v_s, sigma_0, sigma_1; Dahl's model is the one with F_s = C and sigma_1 = 0
+
+    The force f and the mean velocity u = (v0 + w + mobility f)/2 follow from each other. Solved for u by false
+    position (Illinois), between velocities at which the friction would be none and twice its most.
+    """
+    coulomb, breakaway, slow, stiffness, damping = numbers
+    most = max(coulomb, breakaway)
+    if most <= 0.0:
+        return 0.0, 0.0
+    free = 0.5 * (v0 + w)
+
+    low, high = free, free
+    low_gap = high_gap = _gap(z, numbers, free, free, mobility, h)
+    # the friction changes the velocity by no more than mobility times its largest force: the root is bracketed by
+    # steps of that size
+    reach = mobility * most
+    for _ in range(60):
+        if low_gap <= 0.0 <= high_gap:
+            break
+        if high_gap < 0.0:
+            high = high + reach
+            high_gap = _gap(z, numbers, free, high, mobility, h)
+        else:
+            low = low - reach
+            low_gap = _gap(z, numbers, free, low, mobility, h)
+        reach *= 2.0
+    u, last = free, 0
+    for _ in range(100):
+        if high_gap == low_gap or high - low <= 1e-15 * (abs(high) + abs(low)):
+            break
+        u = high - high_gap * (high - low) / (high_gap - low_gap)
+        gap = _gap(z, numbers, free, u, mobility, h)
+        if abs(gap) <= 1e-14 * (abs(free) + mobility * most):
+            break
+        # Illinois: the value at an end that stays twice is halved, else false position creeps from one side
+        if gap > 0.0:
+            high, high_gap = u, gap
+            low_gap *= 0.5 if last == 1 else 1.0
+            last = 1
+        else:
+            low, low_gap = u, gap
+            high_gap *= 0.5 if last == -1 else 1.0
+            last = -1
+    after, mean = bristles_after(z, stribeck(coulomb, breakaway, slow, u), stiffness, u, h)
+    return -(stiffness * mean + damping * (after - z) / h), after
+
+
+@compiled_lean
+def _gap(
+    z: float,
+    numbers: tuple[float, float, float, float, float],
+    free: float,
+    u: float,
+    mobility: float,
+    h: float,
+) -> float:
+    """By how much the mean velocity u differs from what the friction at u leaves of the free one."""
+    coulomb, breakaway, slow, stiffness, damping = numbers
+    after, mean = bristles_after(z, stribeck(coulomb, breakaway, slow, u), stiffness, u, h)
+    return u - free + 0.5 * mobility * (stiffness * mean + damping * (after - z) / h)

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.contact.linear_substep import LinearDynamics, dynamics
+from zwidth.contact.engine_inputs import LinearDynamics, dynamics
 from zwidth.contact.vibration_kernel import (
     FORCE,
     VELOCITIES,
@@ -24,9 +24,9 @@ from zwidth.contact.vibration_kernel import (
     transition,
     vibrations,
 )
-from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
+from zwidth.loop.realisation import FilterStates, filter_states
 from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.nonlinear import Counter, Nonlinear
 

@@ -22,12 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.contact.environments.one_sided_wall import one_sided_wall
-from zwidth.contact.environments.wall import wall
+from zwidth.contact.environments.walls import one_sided_wall, wall
 from zwidth.contact.hand import Hand
-from zwidth.contact.motion_verdict import STEADY, Behaviour, Judgement, judge_response
-from zwidth.contact.simulate import SUBSTEPS, Run, simulate_batch
-from zwidth.contact.time_response import TimeResponse
+from zwidth.contact.loop_simulation import SUBSTEPS, Run, simulate_batch
+from zwidth.contact.time_response import STEADY, Behaviour, Judgement, TimeResponse, judge_response
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.loop import Loop

@@ -1,15 +1,32 @@
-"""A run in time, and what it says: see `motion_verdict` for how it is judged."""
+"""A run in time, and what it says: see `motion_verdict` for how it is judged.
+
+Verdict on a simulated motion: it decays, grows, is a limit cycle, bounces, or leaves the wall.
+
+The second half of the run is judged, by its third and its last quarter. Growth is measured on the differences from
+sample to sample, which do not depend on where the device comes to rest: with d_j = y_{j+1} - y_j,
+
+    growth = ln( rms(d, last quarter) / rms(d, third quarter) ) / (samples between them)     per sample
+
+Each motion rho^j gives ln rho, in the end that of the slowest decay or the fastest growth: the logarithm of the
+spectral radius. The quarters are weighted by a Hann window, so that a started period does not count. The
+verdict holds for this start only: without a hand the wall may hold a small motion and lose a large one.
+
+A steady push moves a device on a wall without stiffness on and on, with the velocity that the damping leaves: the
+position that nobody holds is no vibration. There the changes of d are judged in its place, which that velocity
+has none of.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from zwidth.arrays import Floats
-from zwidth.contact.engine_arrays import FORCE, HANDLE, READING, TRUTH, VELOCITY, Records
+from zwidth.arrays import Flags, Floats
+from zwidth.contact.computer import FORCE, HANDLE, READING, TRUTH, VELOCITY, Records
+from zwidth.model.argument_checks import require
 from zwidth.result import Result
 
 # The ledger's entries, in the engine's order; the last is what the plant has stored.
@@ -161,3 +178,164 @@ class TimeResponse(Result):
 def as_key(source: str) -> str:
     """The name of one of SOURCES as part of a key."""
     return source.replace(" ", "_")
+
+
+Behaviour = Literal[
+    "converged", "decaying", "drifting", "growing", "limit cycle", "bouncing", "lost contact", "undecided"
+]
+
+QUIET: Final = 1e-9  # share of the largest motion of a run that counts as none
+LINEAR_TREND: Final = (
+    1e-3  # change of the logarithm between quarters that decides, where nothing but growth can be
+)
+TREND: Final = 0.2  # the same where a limit cycle may be: 20 % between quarters
+STEADY: Final = 0.05  # below it, the motion goes round
+DIGITS: Final = 1e-14  # share of a position that its rounding may be, in the changes of its differences
+FEWEST: Final = 16  # samples
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Verdict on a run.
+
+    behaviour     converged: at rest inside; decaying; drifting: on and on under a push; growing; limit cycle:
+                  keeps its size without losing contact;
+                  bouncing: in and out without an end; lost contact: out, and not back; undecided
+    stable        True for converged, decaying and drifting, None for undecided
+    growth        of the motion per sample, ln rho; nan where nothing moves
+    amplitude     half of peak to peak of the handle in the last quarter [m]
+    frequency     dominant in the second half [Hz]; nan where nothing moves
+    contact       share of the second half with a force
+    """
+
+    behaviour: Behaviour
+    growth: float
+    amplitude: float
+    frequency: float
+    contact: float
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the motion decays inside the wall."""
+        if self.behaviour == "undecided":
+            return None
+        return self.behaviour in ("converged", "decaying", "drifting")
+
+
+def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement:
+    """Judge a run; one with fewer than 16 samples is undecided, unless it has left its bounds.
+
+    drifts  whether a steady push moves the device where no stiffness holds a position: leaving the bounds is no
+            growth then
+
+    A motion below half the encoder's step that the encoder does not see is at rest; so is one that noise alone
+    keeps up, below half a step and three standard deviations. One that the encoder sees goes round, however small.
+
+    >>> from zwidth.contact.environments import wall
+    >>> from zwidth.contact.loop_simulation import simulate
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.loop.loop import Loop
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> loop = Loop(Plant(0.1 * one[:, None], *np.zeros((2, 1, 1)), one, one), Controller(0.001))
+    >>> values = wall.values(stiffness=1000.0, damping=0.4)    # B < K T/2
+    >>> judge_response(simulate(loop, wall, values, duration=2.0, start_position=1e-3)).behaviour
+    'growing'
+    """
+    require("response", response, TimeResponse)
+    S = len(response.time)
+    touching = response.force != 0.0
+    if S < FEWEST:
+        judged: Behaviour = "growing" if response.given_up and not drifts else "undecided"
+        return Judgement(
+            judged, float("nan"), _half_peak_to_peak(response.handle), float("nan"), float(touching.mean())
+        )
+    third, last, half = slice(S // 2, S // 4 * 3), slice(S // 4 * 3, S), slice(S // 2, S)
+    d = np.diff(response.truth, n=2 if drifts else 1)
+    size = float(np.abs(d[np.isfinite(d)]).max(initial=0.0))
+    before, after = _rms(d[S // 2 : S // 4 * 3]), _rms(d[S // 4 * 3 :])
+    floor = max(QUIET * size, 1e-300)
+    if drifts:  # far away the changes of d are rounding of the position
+        floor = max(floor, DIGITS * float(np.abs(response.truth[np.isfinite(response.truth)]).max(initial=0.0)))
+    moving = after > floor or (response.given_up and not drifts)
+    growth = float(np.log(after / before)) if moving and before > 0.0 else float("nan")
+    contact = float(touching[half].mean())
+    judged = _behaviour(response, touching, third, last, growth, moving, drifts)
+    per_sample = growth / (S // 4) if moving else float("nan")
+    tone = dominant_frequency(response.truth[half], response.period) if moving else float("nan")
+    return Judgement(judged, per_sample, _half_peak_to_peak(response.handle[last]), tone, contact)
+
+
+def _behaviour(
+    response: TimeResponse,
+    touching: Flags,
+    third: slice,
+    last: slice,
+    growth: float,
+    moving: bool,
+    drifts: bool,
+) -> Behaviour:
+    if (response.given_up and not drifts) or not np.all(np.isfinite(response.truth)):
+        return "growing"
+    inside = float(touching[last].mean())
+    if response.surface and inside == 0.0 and not touching[third].any():
+        return "lost contact" if touching.any() or not response.held else "undecided"
+    if inside < 1.0 and response.surface:
+        return "bouncing" if growth > -TREND else "undecided"
+    if drifts and not moving:
+        return "drifting"
+    if not moving or _at_rest(response, last):
+        return "converged"
+    trend = LINEAR_TREND if response.linear else TREND
+    if growth < -trend:
+        return "drifting" if drifts else "decaying"
+    if growth > trend:
+        return "growing"
+    return "limit cycle" if abs(growth) < STEADY and not response.linear and not drifts else "undecided"
+
+
+def _at_rest(response: TimeResponse, last: slice) -> bool:
+    """Whether the remaining motion is smaller than what the encoders resolve."""
+    swing = _half_peak_to_peak(response.truth[last])
+    if response.noise > 0.0:
+        return swing < 0.5 * response.quantum + 3.0 * response.noise
+    return swing < 0.5 * response.quantum and np.ptp(response.reading[last]) == 0.0
+
+
+def _rms(signal: Floats) -> float:
+    """Root mean square under a Hann window."""
+    weight, size = np.hanning(len(signal) + 2)[1:-1], float(np.abs(signal).max(initial=0.0))
+    if not 0.0 < size < np.inf:
+        return size
+    return size * float(np.sqrt(np.sum(weight * (signal / size) ** 2) / np.sum(weight)))
+
+
+def _half_peak_to_peak(signal: Floats) -> float:
+    """Half of peak to peak."""
+    return float(np.ptp(signal) / 2.0) if len(signal) else float("nan")
+
+
+def dominant_frequency(signal: Floats, period: float) -> float:
+    """Frequency with the most of a signal's motion [Hz], from 0 to 1/(2T); nan for one that does not move.
+
+    The peak of the spectrum of a Hann-windowed signal less its straight line, between bins by a parabola through
+    the logarithms. For a steady tone it is right to about a hundredth of 1/(length).
+
+    >>> round(dominant_frequency(np.sin(2 * np.pi * 50.0 * np.arange(800) * 0.001), 0.001), 3)
+    50.0
+    """
+    k = len(signal)
+    if k < FEWEST or not np.all(np.isfinite(signal)):
+        return float("nan")
+    j = np.arange(k) - (k - 1) / 2.0
+    straight = signal.mean() + j * (j @ signal) / (j @ j)
+    rest = (signal - straight) * np.hanning(k)
+    size = float(np.abs(rest).max())
+    if not size > 0.0:
+        return float("nan")
+    spectrum = np.abs(np.fft.rfft(rest / size, 4 * k))
+    at = int(np.argmax(spectrum[1:-1])) + 1
+    a, b, c = np.log(np.maximum(spectrum[at - 1 : at + 2], 1e-300))
+    bend = a - 2.0 * b + c
+    shift = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
+    return float((at + np.clip(shift, -0.5, 0.5)) / (4 * k * period))

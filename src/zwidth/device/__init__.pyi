@@ -1,8 +1,8 @@
+from .address import edited_text as edited_text
 from .device import Device as Device
-from .edit_file import edited_text as edited_text
 from .faults import DeviceError as DeviceError
 from .load import from_document as from_document
-from .new_device import new_device as new_device
+from .new_file import new_device as new_device
 from .numbers import DeviceNumber as DeviceNumber
 from .numbers import device_numbers as device_numbers
 from .plausibility import implausible as implausible

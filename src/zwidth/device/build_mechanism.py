@@ -1,4 +1,7 @@
-"""From the checked [mechanism] to its arrays: legs spread, joints taken apart into single coordinates."""
+"""From the checked [mechanism] to its arrays: legs spread, joints taken apart into single coordinates.
+
+From the checked [beam] of links to the links that bend.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
-from zwidth.device import build_nonlinear
-from zwidth.device.arm_consistency import HELD
-from zwidth.device.build import in_space, roll_pitch_yaw
-from zwidth.device.build_beams import own_body, with_beams
-from zwidth.device.build_nonlinear import value_or
+from zwidth.device.build import drive_nonlinearity, in_space, per_drive, roll_pitch_yaw, value_or
+from zwidth.device.consistency import HELD
 from zwidth.device.legs import Member, members, of_copies
-from zwidth.device.schema.arm import ArmSection
+from zwidth.device.schema.beam import BeamSection, MaterialSection, RectangleShape, RodShape, TubeShape
 from zwidth.device.schema.mechanism import (
     AssemblySection,
     DriveSection,
@@ -26,8 +26,22 @@ from zwidth.device.schema.mechanism import (
     MechanismSection,
     ReferenceSection,
 )
+from zwidth.device.schema.operator import ArmSection
 from zwidth.model.arm import Arm
+from zwidth.model.beam_bodies import flexible_link
+from zwidth.model.beam_section import (
+    BeamProperties,
+    Material,
+    Section,
+    beam_properties,
+    rectangle,
+    rectangular_tube,
+    round_rod,
+    tube,
+    typical_material,
+)
 from zwidth.model.design_axes import join_designs, stack_numbers
+from zwidth.model.flexible_body import FlexibleLink
 from zwidth.model.mechanism import (
     AXIS,
     BALL_X,
@@ -353,7 +367,7 @@ def _drives(
     index = tree.last
 
     def column(key: str, omitted: float) -> Floats:
-        return build_nonlinear.per_drive(drives, key, omitted)
+        return per_drive(drives, key, omitted)
 
     windings = [_winding(drive) for drive in drives]
     return Drives(
@@ -370,7 +384,7 @@ def _drives(
         winding_resistance=column("winding_resistance_ohm", math.nan),
         winding_damping=stack_numbers([damping for damping, _ in windings]),
         winding_time_constant=stack_numbers([lag for _, lag in windings]),
-        nonlinearity=build_nonlinear.drive_nonlinearity(drives, section.friction),
+        nonlinearity=drive_nonlinearity(drives, section.friction),
         coupling=_coupling(drives, index),
         motor_link=_motor_links(drives, index),
         motor_axis=_motor_axes(drives),
@@ -421,3 +435,74 @@ def _winding(drive: DriveSection) -> tuple[float, float]:
     inside, constant, inductance = (value_or(one, 0.0) for one in keys)
     R = inside + drive.damping_resistance_ohm
     return constant**2 / R, inductance / R
+
+
+MODES, ELEMENTS = 2, 8  # where none are given
+
+
+def with_beams(mechanism: Mechanism, links: dict[int, LinkSection], axes: dict[int, Floats]) -> Mechanism:
+    """A mechanism with the links that bend.
+
+    links  by the index of their body, those with a [beam];   axes  about which alone the inertia of some is known
+    Raises BeamError  for a beam that its link cannot be
+    """
+    flexible = [_flexible(mechanism, index, link, axes.get(index)) for index, link in links.items()]
+    return replace(mechanism, flexible=tuple(flexible))
+
+
+def _flexible(mechanism: Mechanism, index: int, link: LinkSection, axis: Floats | None) -> FlexibleLink:
+    section = link.beam
+    assert section is not None
+    return flexible_link(
+        mechanism,
+        index,
+        properties_of(section, link.length_m),
+        section.method,
+        MODES if section.modes is None else section.modes,
+        ELEMENTS if section.elements is None else section.elements,
+        section.damping_time_s,
+        axis,
+    )
+
+
+def own_body(section: BeamSection, length: float) -> tuple[float, Floats, Floats]:
+    """Mass, centre of mass (3,) and inertia (3, 3) of a link that is its beam alone."""
+    beam = properties_of(section, length)
+    m = beam.mass_per_length * length
+    inertia = np.diag([beam.torsional_inertia_per_length * length, m * length**2 / 12.0, m * length**2 / 12.0])
+    return m, np.array([length / 2.0, 0.0, 0.0]), inertia
+
+
+def properties_of(section: BeamSection, length: float) -> BeamProperties:
+    """The beam of a [beam], `length` long [m]."""
+    if section.section is not None:
+        return beam_properties(length, _section(section), _material(section))
+    bending = np.broadcast_to(np.asarray(section.bending_stiffness_Nm2, dtype=np.float64), (2,))
+    rest = (
+        section.torsion_stiffness_Nm2,
+        section.axial_stiffness_N,
+        section.mass_per_length_kg_per_m,
+        section.torsional_inertia_per_length_kg_m,
+    )
+    return BeamProperties(length, *(float(number) for number in (*bending, *rest) if number is not None))
+
+
+def _section(beam: BeamSection) -> Section:
+    match beam.section:
+        case RodShape() as rod:
+            return round_rod(rod.diameter_m)
+        case TubeShape() as round_tube:
+            return tube(round_tube.outer_diameter_m, round_tube.wall_m)
+        case RectangleShape() as solid:
+            return rectangle(solid.width_m, solid.height_m)
+        case box:
+            assert box is not None
+            return rectangular_tube(box.width_m, box.height_m, box.wall_m)
+
+
+def _material(beam: BeamSection) -> Material:
+    if isinstance(beam.material, MaterialSection):
+        own = beam.material
+        return Material(own.youngs_modulus_Pa, own.shear_modulus_Pa, own.density_kg_per_m3)
+    assert beam.material is not None
+    return typical_material(beam.material)

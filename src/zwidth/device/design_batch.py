@@ -16,14 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
-from zwidth.device.compiled_mechanism_check import masses_moved
-from zwidth.device.design_checks import certainly_valid
+from zwidth.device.address import table
+from zwidth.device.design_checks import certainly_valid, masses_moved
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.legs import members
 from zwidth.device.load import build_device, check
 from zwidth.device.schema.value_types import Section
-from zwidth.device.toml_access import table
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import PROJECTION_TOLERANCE
 from zwidth.model.design_axes import change_designs, design_shape

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
     from zwidth.progress import Progress
-    from zwidth.study.load.bending import Bending
-    from zwidth.study.load.load_path import LoadPath
+    from zwidth.study.bending import Bending
+    from zwidth.study.load_path import LoadPath
     from zwidth.study.sensitivity.result import Sensitivities
 
 
@@ -444,7 +444,7 @@ class Device:
         """The postures (...) that the device has under its load, rendering directions (..., 1, 3 or 6)."""
         if self.load is None or directions.shape[-2] != 1:
             return posture
-        from zwidth.model.effective_parameters import screw
+        from zwidth.model.effective_mass import screw
         from zwidth.model.loaded_posture import loaded_postures
 
         assert self.mechanism is not None

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Final
 
 KeyPath = tuple[str | int, ...]
+KeyMessages = Iterator[tuple[KeyPath, str]]
 
 LONGEST_QUOTE: Final = 60
 

@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Floats
+from zwidth.device.address import is_number, table, tables
 from zwidth.device.faults import KeyPath
 from zwidth.device.schema.value_types import Section
-from zwidth.device.toml_access import is_number, table, tables
 
 GROUPS: Final = ("links", "loops", "drives")
 

@@ -11,23 +11,22 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from zwidth.arrays import Floats
-from zwidth.device import address, build, unsupported
+from zwidth.device import address, build
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
-from zwidth.device.format_version import refuse_newer, without_version
 from zwidth.device.legs import members
-from zwidth.device.load_choice import document_under, load_of_table
-from zwidth.device.operator_choice import NOBODY, document_held_by
+from zwidth.device.operator_choice import NOBODY, document_held_by, document_under, load_of_table
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.posture_arguments import screws
 from zwidth.device.read import bundled, read
-from zwidth.device.schema.arm import ArmSection
 from zwidth.device.schema.device_file import DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
-from zwidth.device.validation_messages import validation_messages
+from zwidth.device.schema.operator import ArmSection
+from zwidth.device.text_file import refuse_newer, without_version
+from zwidth.device.validation_messages import refuse_unsupported, validation_messages
 from zwidth.model.argument_checks import wrong_type
-from zwidth.model.flexible_link import BeamError
+from zwidth.model.flexible_body import BeamError
 from zwidth.model.load import Load
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.operator import Operator
@@ -158,7 +157,7 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
         raise fail(
             label, "", f"is a study of designs, not a device; sweep it, or give the device that it names{named}"
         )
-    cleaned, faults = unsupported.refuse(document)
+    cleaned, faults = refuse_unsupported(document)
     checked: DeviceFile | None = None
     try:
         checked = DeviceFile.model_validate(cleaned)
@@ -171,7 +170,7 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
 
 
 def _assembled(device: Device) -> bool:
-    from zwidth.device.compiled_mechanism_check import assembles
+    from zwidth.device.design_checks import assembles
 
     assert device.mechanism is not None
     return assembles(device.mechanism, device.reference_assembly)

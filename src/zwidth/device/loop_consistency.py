@@ -1,20 +1,214 @@
-"""What two keys of the computer and of the motors' windings must agree on."""
+"""What two keys of the computer and of the motors' windings must agree on.
+
+What the keys of force sensor, feedforward and local loop must agree on, with each other and with the device.
+
+What the keys of [load] must agree on, with each other and with the device.
+
+Transmissions whose ratio changes with the joint: what their table, their joint and other keys must agree on.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from math import inf
 from typing import Any, Final
 
-from zwidth.device.faults import KeyPath, plural
-from zwidth.device.ratio_consistency import largest_ratio
+from zwidth.device.address import is_number, row_count, table, tables
+from zwidth.device.faults import KeyMessages, KeyPath, plural, quote
 from zwidth.device.schema.loop import LONGEST_DELAY
 from zwidth.device.schema.magnitudes import STRONGEST_DAMPING
 from zwidth.device.schema.value_types import LARGEST
-from zwidth.device.toml_access import is_number, row_count, table, tables
-from zwidth.loop.estimators import Kalman
+from zwidth.loop.estimators import METHODS, Kalman
+from zwidth.loop.fixed_feedback import MOST_FAST_SAMPLES
 
-KeyMessages = Iterator[tuple[KeyPath, str]]
+# Joint of a drive -> the key of the table's coordinates, the key of the link's limits, the unit.
+OF_JOINT: Final = {"revolute": ("joint_rad", "limits_rad", "rad"), "prismatic": ("joint_m", "limits_m", "m")}
+KEYS: Final = {"joint_rad", "joint_m", "ratio"}
+FULL_TURN: Final = 2.0 * math.pi * (1.0 + 1e-9)
+
+
+def ratio_inconsistencies(mechanism: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of every disagreement about a ratio table, in a mechanism with its legs spread."""
+    links = {link["name"]: link for _, link in tables(mechanism, "links") if isinstance(link.get("name"), str)}
+    for index, drive in tables(mechanism, "drives"):
+        if "ratio_table" not in drive:
+            continue
+        place: KeyPath = ("mechanism", "drives", index, "ratio_table")
+        if "transmission_ratio" in drive:
+            yield place, "stands beside transmission_ratio; only one of the two is allowed: remove the other"
+        if table(drive, "coupling"):
+            yield (
+                place,
+                "cannot be had together with coupling: a motor that turns with several joints needs a constant "
+                "ratio; give transmission_ratio, or remove coupling",
+            )
+        joint = drive.get("joint")
+        link = links.get(joint) if isinstance(joint, str) else None
+        if isinstance(drive["ratio_table"], dict) and link is not None and link.get("joint") in OF_JOINT:
+            yield from _table(place, drive["ratio_table"], link)
+
+
+def _table(place: KeyPath, given: dict[str, Any], link: dict[str, Any]) -> KeyMessages:
+    """Coordinates of the joint's kind, a ratio at each of them, no limits of the joint beyond them."""
+    joint = link["joint"]
+    key, limits_key, unit = OF_JOINT[joint]  # no names in the sentences: the copies of a leg have the same fault
+    for other, *_ in OF_JOINT.values():
+        if other != key and other in given:
+            yield (*place, other), f"is not for the joint of this drive, which is {joint}; give {key}"
+            return
+    if key not in given:
+        if given.keys() <= KEYS:  # or else one of them is misspelt
+            yield (*place, key), "is missing; give the coordinates of the drive's joint at which the ratios are"
+        return
+    coordinates, ratios = given[key], given.get("ratio")
+    if not isinstance(coordinates, list) or not isinstance(ratios, list):
+        return
+    if len(coordinates) != len(ratios):
+        yield (
+            (*place, "ratio"),
+            f"has {plural(len(ratios), 'number')}, but {key} has {len(coordinates)}; give a ratio at each of them",
+        )
+    if len(coordinates) < 2 or not all(map(is_number, coordinates)):
+        return
+    low, high = coordinates[0], coordinates[-1]
+    if unit == "rad" and high - low > FULL_TURN:
+        yield (
+            (*place, key),
+            f"goes from {low:.10g} to {high:.10g} rad, more than a full turn; a turn more or less is the same "
+            "posture: give one turn, 6.2831853 rad, or less",
+        )
+    limits = link.get(limits_key)
+    if not (isinstance(limits, list) and len(limits) == 2 and all(map(is_number, limits)) and low < high):
+        return
+    if limits[0] < low or limits[1] > high:
+        yield (
+            (*place, key),
+            f"goes from {low:.10g} to {high:.10g} {unit}, but {limits_key} of the joint are [{limits[0]:.10g}, "
+            f"{limits[1]:.10g}]; extend the table over them, or narrow the limits",
+        )
+
+
+def largest_ratio(drive: dict[str, Any]) -> Any:
+    """The ratio of a drive in a file, of a table its largest; None where it gives none, or what is no number."""
+    ratios = table(drive, "ratio_table").get("ratio")
+    if isinstance(ratios, list):
+        return max(filter(is_number, ratios), default=None)
+    return drive.get("transmission_ratio")
+
+
+FORCES: Final = ("force_N", "push_N", "moment_Nm")
+
+
+def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of every disagreement."""
+    if "load" not in document:
+        return
+    load = table(document, "load")
+    if "mechanism" not in document:
+        yield ("load",), "needs a [mechanism], whose forces turn as it moves; leave it out"
+    given = [key for key in FORCES if load.get(key) is not None]
+    if len(given) > 1:
+        yield ("load", given[1]), f"stands beside {given[0]}; only one of them is allowed: remove one"
+    for key in given:
+        if not _is_zero(load[key]):
+            continue
+        yield (
+            ("load", key),
+            "is 0, which leaves a one-sided wall at the edge of contact, where nothing is linear; remove it for "
+            "the chart of the two-sided wall, or give the force with which the hand leans on the wall",
+        )
+    if load.get("settle") is True and "force_N" not in load:
+        yield ("load", "settle"), "needs force_N, under which the device slides to where it is in balance"
+    radius = load.get("surface_radius_m")
+    if is_number(radius) and radius in (0, -inf):
+        yield ("load", "surface_radius_m"), f"must not be {radius:g}; remove it for a plane"
+    elif load.get("settle") is True and is_number(radius) and radius != inf:
+        yield (
+            ("load", "surface_radius_m"),
+            "stands beside settle, which slides the handle along a plane; remove one of the two",
+        )
+
+
+def _is_zero(force: Any) -> bool:
+    """Whether a number is 0, or all of a list are."""
+    numbers = force if isinstance(force, list) and force else [force]
+    return all(is_number(number) and number == 0 for number in numbers)
+
+
+SECTIONS: Final = ("force_sensor", "feedforward", "local")
+LINEAR: Final = ", ".join(name for name in METHODS if name not in ("foaw", "levant"))
+INERTIAS: Final = ("inertia_kg", "inertia_share")
+
+
+def feedback_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of every disagreement about what is commanded beside the wall's force."""
+    loop = table(document, "loop")
+    T = sampling_period(loop)
+    for section in SECTIONS:
+        if section in loop:
+            yield from _wrong_device(document, ("loop", section))
+    sensor, ahead, local = (table(loop, section) for section in SECTIONS)
+    yield from cutoff_fault(("loop", "force_sensor", "filter"), table(sensor, "filter"), T)
+    if isinstance(loop.get("feedforward"), dict):
+        yield from _feedforward(ahead)
+    yield from cutoff_fault(("loop", "feedforward", "acceleration_filter"), table(ahead, "acceleration_filter"), T)
+    yield from _estimate(("loop", "feedforward", "velocity"), ahead, loop, T)
+    times = local.get("rate_multiple")
+    whole = times if type(times) is int and 1 <= times <= MOST_FAST_SAMPLES else math.nan
+    yield from _estimate(("loop", "local", "velocity"), local, loop, T / whole)
+
+
+def _wrong_device(document: dict[str, Any], place: KeyPath) -> KeyMessages:
+    """A device from whose description the feedback cannot be computed."""
+    plant = table(document, "plant")
+    if "response" in document:
+        yield (
+            place,
+            "needs a model of the device, and a [response] is none; measure the response with it switched on, and "
+            "remove this",
+        )
+    if plant.get("loss_factor"):
+        yield place, "cannot stand beside plant.loss_factor, which has no motion in time; give damping_Ns_per_m"
+    size = row_count(plant.get("mass_kg"))
+    if place[-1] == "force_sensor" and size is not None and size > 1 and "handle" not in plant:
+        yield place, f"needs a handle, where the sensor sits; give plant.handle, {size} numbers, or remove this"
+
+
+def _feedforward(ahead: dict[str, Any]) -> KeyMessages:
+    """One inertia, with a filter of its acceleration; a dead band for dry friction; and anything at all."""
+    place: KeyPath = ("loop", "feedforward")
+    given = [key for key in INERTIAS if ahead.get(key) is not None]
+    if len(given) == 2:
+        yield (*place, "inertia_share"), "stands beside inertia_kg; only one of them is allowed: remove the other"
+    cancels = [key for key in given if is_number(ahead[key]) and ahead[key] > 0]
+    if cancels and "acceleration_filter" not in ahead:
+        yield (
+            (*place, "acceleration_filter"),
+            f"is missing; {cancels[0]} needs one, for readings differenced twice are mostly noise: give "
+            '{ type = "butterworth", order = 2, cutoff_Hz = 50.0 }, say, or for none '
+            '{ type = "first-order", time_constant_s = 0.0 }',
+        )
+    if "acceleration_filter" in ahead and not given:
+        yield (*place, "acceleration_filter"), "is used only with an inertia; give inertia_kg, or remove this"
+    if "deadband_m_per_s" in ahead and "coulomb_N" not in ahead:
+        yield (*place, "deadband_m_per_s"), "is used only with coulomb_N; give that, or remove this"
+    if not given and not {"damping_Ns_per_m", "coulomb_N"} & ahead.keys():
+        yield (
+            place,
+            "cancels nothing; give inertia_kg, inertia_share, damping_Ns_per_m or coulomb_N, or remove this",
+        )
+
+
+def _estimate(place: KeyPath, section: dict[str, Any], loop: dict[str, Any], T: float) -> KeyMessages:
+    """A linear velocity estimate that fits its own sampling period [s]."""
+    velocity = table(section, "velocity")
+    yield from cutoff_fault((*place, "filter"), table(velocity, "filter"), T)
+    method = velocity.get("method")
+    if method in ("foaw", "levant"):
+        yield (*place, "method"), f"must be linear, got {quote(method)}, which is not; give one of {LINEAR}"
+        return
+    yield from estimate_faults(place, velocity, table(loop, "encoder"), T)
+
 
 # Lags in sampling periods. A shorter one changes no wall by what a chart resolves, a longer one is an integrator;
 # beyond either rounding would give the answers.

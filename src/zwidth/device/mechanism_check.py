@@ -8,14 +8,14 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.faults import KeyPath, comma_list, plural
+from zwidth.device.faults import KeyMessages, comma_list, plural
 from zwidth.device.legs import members
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.model.continuation import assemble_batch
-from zwidth.model.joint_space import joint_axes, joint_mass_matrix
+from zwidth.model.handle_position import constraints
+from zwidth.model.inertia import joint_axes, joint_mass_matrix
 from zwidth.model.mechanism import FIXED, POSE, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-from zwidth.model.mobility import constraints
 
 CLOSED: Final = 1e-9  # gap of a closed loop, relative to the mechanism's size
 RANK_TOLERANCE: Final = 1e-7  # of singular values, relative to the largest
@@ -24,8 +24,6 @@ NEARBY: Final = 0.05  # how far joints turn to a posture that is not special [ra
 INDEPENDENT: Final = 1e-6  # share of the largest motion, below which a joint follows from others
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes are parallel
 MOVING: Final = 1e-6  # share of the largest part of a motion, below which a joint rests in it
-
-KeyMessages = Iterator[tuple[KeyPath, str]]
 
 
 def mechanism_faults(mechanism: Mechanism, section: MechanismSection, *, assembled: bool = False) -> KeyMessages:

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from zwidth.device.address import table
 from zwidth.device.faults import KeyPath, comma_list, dotted
 from zwidth.device.legs import members, written
-from zwidth.device.toml_access import table
 
 LINKS: Final = ("mass_kg", "inertia_kg_m2")
 DRIVES: Final = ("motor_inertia_kg_m2", "transmission_ratio")

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any, Final
 
-from zwidth.device.faults import KeyPath
+from zwidth.device.address import is_number, row_count, table, tables
+from zwidth.device.faults import KeyMessages, KeyPath
 from zwidth.device.loop_consistency import along_fault, lag_fault
-from zwidth.device.toml_access import is_number, row_count, table, tables
-
-KeyMessages = Iterator[tuple[KeyPath, str]]
 
 # Keys of a friction section without their units -> the models that read them.
 READ_BY: Final = {

@@ -1,19 +1,25 @@
-"""Who holds the device: the [operator] of its file, one of the bundled operators, one from a file, or nobody."""
+"""Who holds the device: the [operator] of its file, one of the bundled operators, one from a file, or nobody.
+
+Under what load a device is: the [load] of its file, or another.
+"""
 
 from __future__ import annotations
 
 import os
-from typing import Any, Final
+from typing import Any, Final, cast
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from zwidth.device.consistency import DEVICE_KEYS, operator_inconsistencies
 from zwidth.device.faults import DeviceError, Fault, dotted, fail
-from zwidth.device.format_version import KEY, without_version
 from zwidth.device.read import OPERATORS, read
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.value_types import VERSION, Section, WholeNumber
+from zwidth.device.text_file import KEY, without_version
 from zwidth.device.validation_messages import validation_messages
+from zwidth.model.load import Load, LoadError
 from zwidth.model.operator import Operator
 
 NOBODY: Final = "none"
@@ -103,3 +109,72 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
     if faults:
         raise DeviceError(Fault(label, dotted(path), message) for path, message in faults)
     return {"name": label, **table}
+
+
+Tables = dict[str, Any]
+
+
+def document_under(
+    document: Tables, load: Load | ArrayLike | None, gravity: ArrayLike | None, moment: bool, label: str
+) -> Tables:
+    """The device's document with another [load].
+
+    load     a `Load`; the hand's force (2,) or (3,), or about an axis its moment, in place of that of the
+             document; None: as the document says
+    gravity  (2,) or (3,) in place of the document's; None: as the document says
+    Raises   DeviceError  for what is no load
+    """
+    if isinstance(load, Load):
+        try:
+            whole = load if gravity is None else load.with_gravity(gravity)
+        except LoadError as error:
+            raise fail(label, "load", str(error)) from None
+        return {**document, "load": table_of_load(whole)}
+    changes: Tables = {}
+    try:
+        if load is not None:
+            own = Load(moment=cast(Any, load)) if moment else Load(force=cast(Any, load))
+            changes |= table_of_load(own)
+        if gravity is not None:
+            changes |= table_of_load(Load(gravity=cast(Any, gravity)))
+    except LoadError as error:
+        raise fail(label, "load", str(error)) from None
+    if not changes:
+        return document
+    kept = dict(document.get("load", {}))
+    if load is not None:
+        for key in ("force_N", "push_N", "moment_Nm"):
+            kept.pop(key, None)
+    return {**document, "load": kept | changes}
+
+
+NAMES: Final = {
+    "force_N": "force",
+    "moment_Nm": "moment",
+    "push_N": "push",
+    "gravity_m_per_s2": "gravity",
+    "hand": "hand",
+    "posture_of": "posture_of",
+    "settle": "settle",
+    "surface_radius_m": "surface_radius",
+    "count_sideways": "count_sideways",
+    "spring_branch": "branch",
+}
+"""Keys of [load], and the fields of `Load` that they fill."""
+
+
+def load_of_table(table: Tables) -> Load:
+    """A [load] as `Load`. Raises LoadError."""
+    return Load(**{NAMES[key]: value for key, value in table.items()})
+
+
+def table_of_load(load: Load) -> Tables:
+    """A load as the [load] of a device file, without what is as by default."""
+    plain, table = Load(), Tables()
+    for key, name in NAMES.items():
+        value = getattr(load, name)
+        if isinstance(value, np.ndarray):
+            table[key] = value.tolist()
+        elif value != getattr(plain, name):
+            table[key] = value
+    return table

@@ -15,17 +15,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from zwidth.device.address import table
 from zwidth.device.beam_plausibility import implausible_beams
-from zwidth.device.faults import Fault, KeyPath, dotted
+from zwidth.device.faults import Fault, KeyMessages, KeyPath, dotted
 from zwidth.device.legs import written
-from zwidth.device.ratio_consistency import largest_ratio
-from zwidth.device.toml_access import table
+from zwidth.device.loop_consistency import largest_ratio
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
     from zwidth.model.response import Response
 
-KeyMessages = Iterator[tuple[KeyPath, str]]
 
 LONGEST: Final = 5.0  # m, of a link or a position
 FULL_TURN: Final = 2.0 * math.pi

@@ -13,10 +13,10 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.device.faults import DeviceError, Fault, fail, plural, quote
-from zwidth.device.schema.response import ResponseSection
+from zwidth.device.schema.plant import ResponseSection
 from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
+from zwidth.model.raw_sweep import sweep_response
 from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, ResponseError, mean_path
-from zwidth.model.sweep_response import sweep_response
 
 Table = dict[str, Floats]  # columns, with the line of each row under LINE
 Cause = tuple[

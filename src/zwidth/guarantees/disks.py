@@ -25,8 +25,7 @@ from scipy.special import gamma, roots_genlaguerre, zeta
 
 from zwidth.arrays import Complexes, Floats
 from zwidth.guarantees.port import Port, port_response
-from zwidth.loop.factor_response import factor_response
-from zwidth.loop.feedback_response import feedforward_response
+from zwidth.loop.factor_response import factor_response, feedforward_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from zwidth.arrays import Complexes, Floats
-from zwidth.model.idle_motions import IDLE, modal_damping, separated_modes
+from zwidth.model.first_order_form import IDLE, modal_damping, separated_modes
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import LaggedDamper, Plant
 

@@ -13,7 +13,7 @@ from shapely.geometry.polygon import orient
 
 from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import Arcs
-from zwidth.chart.peak import find_peak
+from zwidth.chart.area import find_peak
 from zwidth.result import Result
 
 

@@ -11,9 +11,8 @@ from scipy.optimize import minimize_scalar
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arc
 from zwidth.chart.robust.common_edge import common_edge
-from zwidth.chart.robust.common_set import intersect_members
-from zwidth.chart.robust.members import Member, member_polygons
-from zwidth.guarantees.envelope_cuts import EnvelopeCuts
+from zwidth.chart.robust.members import Member, intersect_members, member_polygons
+from zwidth.guarantees.envelope import EnvelopeCuts
 from zwidth.guarantees.port import without_idle_motions
 from zwidth.guarantees.region import Region, empty_region, rings_of, stiffest_corner
 from zwidth.guarantees.spring_family import SpringFamily, handle_of, polygons_of, spring_for

@@ -19,8 +19,7 @@ import scipy.linalg
 
 from zwidth.arrays import Floats
 from zwidth.guarantees.port import port
-from zwidth.loop.closed_plant import close_plant
-from zwidth.loop.closed_sections import zero_poles
+from zwidth.loop.closed_plant import close_plant, zero_poles
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant

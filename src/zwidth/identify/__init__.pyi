@@ -11,10 +11,10 @@ from .identification import Identification as Identification
 from .identification import IdentificationError as IdentificationError
 from .impedance.identify import identify_impedance as identify_impedance
 from .joint.friction import identify_friction as identify_friction
-from .joint.mass import identify_mass as identify_mass
+from .joint.friction import identify_mass as identify_mass
 from .kinds import identify as identify
 from .profile_likelihood import fit_least_squares as fit_least_squares
-from .records.columns import Columns as Columns
+from .records.record import Columns as Columns
 from .records.record import read_record as read_record
 from .records.record import record_of as record_of
 from .records.sampling import check_sampling as check_sampling

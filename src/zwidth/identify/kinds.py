@@ -11,8 +11,7 @@ from typing import Any, Final
 from zwidth.device.device import Device
 from zwidth.device.faults import fail, quote, suggestion
 from zwidth.identify.identification import Identification
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import Record, read_record, record_of
+from zwidth.identify.records.record import Columns, Record, read_record, record_of
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.progress import Progress
 

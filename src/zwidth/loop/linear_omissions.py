@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from zwidth.loop.controller import Controller
-from zwidth.model.drive_nonlinearity import nonlinear_of_drives
 from zwidth.model.load import Load
-from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism import Mechanism, nonlinear_of_drives
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 from zwidth.model.ratio_table import with_any_ratio

@@ -1,29 +1,45 @@
-"""The sampled loop of a plant and a wall:  1 + P(z) (K + B w(z)) = 0."""
+"""The sampled loop of a plant and a wall:  1 + P(z) (K + B w(z)) = 0.
+
+A feedforward's inertia given as a share of the device's rigid mass, at a posture and along a direction.
+
+Motions that grow by themselves and that no wall reaches: a chart leaves them out, a device does not.
+
+Motions that no wall moves without load: how fast they grow or decay under one.
+
+A free device slides along a wall as it likes, neither pushed nor held: its roots stay at z = 1. Under load it is
+pushed: by the hand's force, whose lever arms change, and by the computer's, which turns with the counts a little
+late. With rigid drives the two cancel but for that delay, and one root of each motion moves by the order of
+(1/2 + delay)(w T)^2 from 1, w^2 being the load's stiffness over the mass. With flexible drives a static stiffness
+stays, of the order of the load's square over theirs, and a growth rate of the order of the load.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from math import isfinite, log, pi
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.arrays import Complexes, Floats
-from zwidth.loop.closed_sections import ClosedSections, closed_sections, closed_table
+from zwidth.loop.closed_plant import ClosedSections, close_plant, closed_sections, closed_table
 from zwidth.loop.controller import Controller, NotKnown
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.factor_response import factor_response, rows_response, window_response
 from zwidth.loop.filters import NO_FILTER, Filter, force_path, velocity_estimator
-from zwidth.loop.inertia_share import has_inertia_share
+from zwidth.loop.hold import denominator
 from zwidth.loop.linear_omissions import with_computer
 from zwidth.loop.loop_table import LoopTable, loop_table
-from zwidth.loop.plant_rows import plant_rows
+from zwidth.loop.motion_names import motion_name
+from zwidth.loop.point_text import OperatingPointError
 from zwidth.loop.realisation import StateSpace, realise
-from zwidth.loop.sections import Sections, sampled_sections
-from zwidth.loop.sideways import SidewaysMotion, held_motions, sideways_motions
+from zwidth.loop.sections import Sections, plant_rows, sampled_sections
 from zwidth.model.argument_checks import require
+from zwidth.model.first_order_form import first_order_form
+from zwidth.model.modes import real_modes, undamped_modes
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
 
@@ -229,3 +245,142 @@ class Loop:
         Unobserved motions are left out.
         """
         return self.state_space.transition_matrix(np.asarray(wall_stiffness), np.asarray(wall_damping))
+
+
+def has_inertia_share(controller: Controller) -> bool:
+    """Whether the computer's feedforward is known only where the device's rigid mass is."""
+    ahead = controller.feedforward
+    return ahead is not None and bool(np.any(ahead.inertia_share))
+
+
+def with_inertia_of(controller: Controller, rigid_mass: float) -> Controller:
+    """The computer with the share of a rigid mass [kg] as its inertia.
+
+    Raises  OperatingPointError  for a device that has no rigid mass
+    """
+    ahead = controller.feedforward
+    if ahead is None or not has_inertia_share(controller):
+        return controller
+    if not isfinite(rigid_mass):
+        raise OperatingPointError(
+            "feedforward.inertia_share is a share of the device's rigid mass, and it has none here: a spring ties "
+            "it to the ground; give feedforward.inertia_kg instead"
+        )
+    inertia = ahead.inertia_share * rigid_mass
+    return replace(controller, feedforward=replace(ahead, inertia=inertia, inertia_share=0.0))
+
+
+GROWS = 1e-12  # |z|^2 - 1 above which a pole lies outside the unit circle by more than rounding
+
+
+def unobserved_instability(loop: Loop) -> bool:
+    """Whether the plant has an unstable motion that no wall affects, or that the sensor does not read.
+
+    True if the plant has more poles outside the unit circle than are left in the sampled sections, from which
+    such motions have been cancelled.
+    """
+    if not loop.unobserved_modes:
+        return False
+    if loop.closed is not None:
+        return bool(np.any(np.exp(2.0 * loop.closed.hidden * loop.period) - 1.0 > GROWS))
+    observed_poles = _section_poles(loop.sections.rows[:, :2])
+    return _unstable_count(_poles(loop.plant, loop.period)) > _unstable_count(observed_poles)
+
+
+def _poles(plant: Plant, period: float) -> Complexes:
+    """All poles of the sampled plant, as z - 1; those of free motions, which do not grow, may be missing."""
+    modes = real_modes(plant)
+    if modes is None:
+        form = first_order_form(plant, period)
+        return np.expm1(np.concatenate([form.poles, form.hidden_poles]) * period)
+    pairs = zip(modes.decay.tolist(), modes.frequency_squared.tolist(), strict=True)
+    return _section_poles(np.array([denominator(decay, squared, period) for decay, squared in pairs]))
+
+
+def _section_poles(denominators: Floats) -> Complexes:
+    """Roots e of e^2 + d1 e + d0 for each row d1, d0."""
+    roots = [np.roots([1.0, *row]) for row in denominators]
+    return np.concatenate([np.zeros(0, dtype=complex), *roots])
+
+
+def _unstable_count(e: Complexes) -> int:
+    """Number of poles z = 1 + e outside the unit circle."""
+    return int(np.sum(2.0 * e.real + np.abs(e) ** 2 > GROWS))
+
+
+NEUTRAL: Final = 1e-12  # |z| - 1 that is rounding
+
+
+@dataclass(frozen=True)
+class SidewaysMotion:
+    """A motion that stands apart.
+
+    growth_rate  [1/s], negative where it decays, 0 where it does neither;   frequency [Hz], 0 without vibration
+    """
+
+    growth_rate: float
+    frequency: float
+
+    @property
+    def time_to_double(self) -> float:
+        """[s]; inf of a motion that does not grow."""
+        return log(2.0) / self.growth_rate if self.growth_rate > 0.0 else np.inf
+
+    @property
+    def name(self) -> str:
+        """The motion in words."""
+        kind = f"sideways vibration at {self.frequency:.4g} Hz" if self.frequency else "sideways motion"
+        if self.growth_rate > 0.0:
+            return f"{kind} that grows by {self.growth_rate:.4g} 1/s (doubles in {self.time_to_double:.4g} s)"
+        return f"{kind} that decays by {-self.growth_rate:.4g} 1/s" if self.growth_rate else f"{kind} (neutral)"
+
+    def document(self) -> dict[str, float | None]:
+        """Its numbers by their keys."""
+        return {
+            "growth_rate_1_per_s": self.growth_rate,
+            "time_to_double_s": self.time_to_double if self.growth_rate > 0.0 else None,
+            "frequency_Hz": self.frequency,
+        }
+
+
+def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMotion, ...]:
+    """The motions that stand apart under a computer that renders no wall, fastest-growing first: as many as are
+    free without load, and all that grow.
+
+    plant  the motions that stand apart, with what they are without load. Of the two roots of a coordinate that are
+           real, the larger one counts
+    """
+    form, states = close_plant(plant, controller.wall_alone)
+    d = np.linalg.eigvals(form.growth)
+    d[np.argsort(np.abs(d))[: states.neutral]] = 0.0  # several at once, rounding makes a slow vibration of them
+    # |1 + d|^2 - 1 without cancellation
+    excess = 2.0 * d.real + np.abs(d) ** 2
+    order = np.argsort(-excess)[: 2 * plant.size]
+    rates = 0.5 * np.log1p(np.maximum(excess[order], np.nextafter(-1.0, 0.0))) / controller.sampling_period
+    rates[np.abs(excess[order]) < NEUTRAL] = 0.0
+    frequencies = np.abs(np.angle(1.0 + d[order])) / (2.0 * pi * controller.sampling_period)
+    vibrates = np.abs(d[order].imag) > 0.0
+    motions, pair = [], False
+    for rate, frequency, complex_root in zip(rates.tolist(), frequencies.tolist(), vibrates.tolist(), strict=True):
+        pair = complex_root and not pair
+        if not complex_root or pair:
+            motions.append(SidewaysMotion(rate, frequency if complex_root else 0.0))
+    free = 0 if plant.without_load is None else len(_squared(plant.without_load)[0])
+    return tuple(motion for i, motion in enumerate(motions[: plant.size]) if i < free or motion.growth_rate > 0.0)
+
+
+def held_motions(plant: Plant) -> tuple[str, ...]:
+    """Names of the motions that stand apart and are held by springs, as they are without load."""
+    if plant.without_load is None:
+        return ()
+    squared, decay = _squared(plant.without_load)[1:]
+    return tuple(motion_name(float(w2), float(a)) for w2, a in zip(squared, decay, strict=True))
+
+
+def _squared(plant: Plant) -> tuple[Floats, Floats, Floats]:
+    """Squared frequencies of the free motions of a plant, and of the others with how they decay, dampers that
+    couple them left out [1/s^2], [1/s]."""
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    decay = 0.5 * np.einsum("ik,ij,jk->k", shapes, plant.damping, shapes)
+    free = squared == 0.0
+    return squared[free], squared[~free], decay[~free]

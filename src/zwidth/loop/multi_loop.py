@@ -5,6 +5,13 @@ diagonal (`wall_matrices.PrincipalDirections`) it is one number per direction, a
 directions
 
     det(1 + P(z) (k diag(s) + b w(z) diag(v))) = 0.
+
+Positions that nobody holds, of a device on a wall without stiffness.
+
+A damper resists motion and holds no place: where a motion of the device has no spring to the ground either, the
+device rests wherever it was left. Its characteristic function has the plant's pole z = 1 and the zero z = 1 of the
+velocity estimate, so that z - 1 divides the characteristic polynomial for every B: the root is the position, which
+neither comes back nor runs away. A second root there is a velocity that nothing brakes, and counts.
 """
 
 from __future__ import annotations
@@ -12,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,20 +27,23 @@ from numpy.typing import ArrayLike
 from zwidth import _verbs
 from zwidth.arrays import Complexes, Floats
 from zwidth.loop.controller import Controller
-from zwidth.loop.filter_states import FilterStates, filter_states
 from zwidth.loop.filters import force_filter, velocity_estimator
+from zwidth.loop.loop import Loop
 from zwidth.loop.motion_names import motion_name
 from zwidth.loop.multi_hold import ContinuousPlant, SampledPlant, continuous_plant, sample_plant
-from zwidth.loop.point_errors import SeveralDirectionsError
+from zwidth.loop.point_text import SeveralDirectionsError
+from zwidth.loop.realisation import FilterStates, filter_states
 from zwidth.loop.sections import UnmovedError
 from zwidth.loop.wall_matrices import PrincipalDirections, WallMatrices
 from zwidth.model.argument_checks import require
+from zwidth.model.modes import undamped_modes
 from zwidth.model.multi_plant import MultiPlant
 from zwidth.model.plant import Plant
 
 if TYPE_CHECKING:
     from zwidth.chart.several_directions.chart import MultiChart
     from zwidth.chart.verdict import Verdicts
+
 
 # A state moves from sample to sample, and is read, by less than this share of what others are: no wall
 # sees it.
@@ -288,3 +298,59 @@ def _without_motions(
         return np.asarray(matrix[kept] - along @ matrix[left_out])
 
     return rows(open_)[:, kept], rows(enters), position[:, kept], velocity[:, kept]
+
+
+# Share of the sizes of force and reading along the free motions that rounding leaves of 0: with less, a motion
+# that no wall moves would count as one that the wall leaves unheld; with more, one that hardly moves would not.
+MOVED: Final = 1e-12
+# Distance from z = 1 within which an unheld position's root is computed, where a few others are beside it: with
+# less, it is mistaken for a vibration; with more, nothing is set aside that was not there, but a wrong count would
+# hide a root.
+AT_ONE: Final = 1e-5
+
+
+def unheld_positions(loop: Loop | MultiLoop) -> int:
+    """How many roots z = 1 of walls without stiffness belong to positions that nobody holds; 0 with a spring to
+    the ground, of the device, its operator, or a local loop."""
+    if isinstance(loop, MultiLoop):
+        return _directions_unheld(loop)
+    if "unheld" not in loop.results:
+        loop.results["unheld"] = _unheld(loop)
+    return int(loop.results["unheld"])
+
+
+def set_aside(roots: Complexes, count: int) -> Complexes:
+    """Roots (..., N), of which so many, those nearest to z = 1, are replaced by 0."""
+    rest = np.array(roots, dtype=np.complex128)
+    for _ in range(count):
+        away = np.abs(rest - 1.0)
+        at = np.argmin(away, axis=-1)[..., None]
+        own = np.take_along_axis(rest, at, axis=-1)
+        np.put_along_axis(rest, at, np.where(np.abs(own - 1.0) < AT_ONE, 0.0, own), axis=-1)
+    return rest
+
+
+def _unheld(loop: Loop) -> int:
+    plant, local = loop.plant, loop.controller.local_loop
+    if plant.is_loaded or (local is not None and local.stiffness):
+        return 0
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    free = shapes[:, squared == 0.0].T
+    pushed, read = free @ plant.actuator, free @ plant.sensor
+    if not abs(float(pushed @ read)) > MOVED * float(np.linalg.norm(pushed) * np.linalg.norm(read)):
+        return 0
+    if loop.closed is not None or loop.sections.sampled_form is not None:
+        return 1
+    # motions of different damping have a row each
+    return max(1, int(np.count_nonzero(loop.sections.rows[:, 1] == 0.0)))
+
+
+def _directions_unheld(loop: MultiLoop) -> int:
+    plant = loop.plant
+    squared, shapes = undamped_modes(plant.mass, plant.stiffness)
+    free = shapes[:, squared == 0.0]
+    pushed, read = plant.actuators @ free, plant.sensors @ free
+    size = float(np.linalg.norm(pushed) * np.linalg.norm(read))
+    if not size > 0.0:
+        return 0
+    return int(np.sum(np.linalg.svd(read @ pushed.T, compute_uv=False) > MOVED * size))

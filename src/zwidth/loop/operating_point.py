@@ -15,12 +15,10 @@ from numpy.typing import ArrayLike
 from zwidth import _verbs
 from zwidth.arrays import Floats
 from zwidth.loop.controller import Controller
-from zwidth.loop.inertia_share import has_inertia_share, with_inertia_of
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
-from zwidth.loop.loop import Loop
+from zwidth.loop.loop import Loop, has_inertia_share, with_inertia_of
 from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.point_errors import OperatingPointError, check_several_directions
-from zwidth.loop.point_text import point_text
+from zwidth.loop.point_text import OperatingPointError, check_several_directions, point_text
 from zwidth.loop.posed_device import NO_MODEL, PosedDevice
 from zwidth.model.arm import attach_arm
 from zwidth.model.loaded_plant import LoadedPlants, counting_all, linearise, set_apart
@@ -40,17 +38,16 @@ if TYPE_CHECKING:
     from zwidth.contact.hand import Reach, Reflex, Tremor
     from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
     from zwidth.contact.mechanism.motion import MechanismMotion
+    from zwidth.contact.mechanism.simulate_mechanism import SurfaceRendering
     from zwidth.contact.mechanism.surfaces import Surface
-    from zwidth.contact.mechanism.walls import SurfaceRendering
     from zwidth.guarantees.guarantees import Guarantees
     from zwidth.loop.measured.measured_port import MeasuredPort
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.measures.felt import FeltWall
     from zwidth.progress import Progress
-    from zwidth.study.boundary.experiment_plan import Plan
-    from zwidth.study.boundary.measured_boundary import Experiment
-    from zwidth.study.validity import Validity
+    from zwidth.study.boundary.measured_boundary import Experiment, Plan
+    from zwidth.study.model_validity import Validity
 
 
 MOVES: Final = 1e-9  # share of the handle's motions that is none

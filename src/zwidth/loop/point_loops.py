@@ -11,15 +11,13 @@ import numpy as np
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sections_batch import section_rows
+from zwidth.loop.sections import section_rows
 from zwidth.model.coupled_pairs import coupled_pairs
 from zwidth.model.drive_side import is_plain
-from zwidth.model.general_modes import has_general_modes, modes_in_general
 from zwidth.model.mechanism import Mechanism
-from zwidth.model.plant_modes import plant_modes
-from zwidth.model.pole_pairs import PolePairs
+from zwidth.model.plant_modes import has_general_modes, modes_in_general, plant_modes
 from zwidth.model.reduction import Model
-from zwidth.model.rendered_modes import RenderedModes, rendered_modes
+from zwidth.model.rendered_modes import PolePairs, RenderedModes, rendered_modes
 
 AT_ONCE: Final = 32768  # loops that are in memory at once
 

@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Floats
 from zwidth.loop.controller import Controller
-from zwidth.loop.point_errors import MissingNumbersError, NoMechanismError, OperatingPointError
-from zwidth.loop.point_text import points_text
+from zwidth.loop.point_text import MissingNumbersError, NoMechanismError, OperatingPointError, points_text
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.arm import Arm
 from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.drive_side import DriveSide, drive_side
-from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
+from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.equilibrium import Equilibrium, EquilibriumError, solve_equilibrium
 from zwidth.model.load import Load, unit_of_push
 from zwidth.model.loaded_posture import loaded_postures
@@ -36,6 +35,7 @@ from zwidth.model.response import Response
 
 if TYPE_CHECKING:
     from zwidth.loop.measured.plant_fit import PlantFit
+
 
 # Where the handle is: x, y or x, y, z [m], or the angle of every driven joint by the name of its link [rad].
 Position: TypeAlias = Sequence[float] | Mapping[str, float]

@@ -1,14 +1,22 @@
-"""The sampled plant as rows of second-order factors, without what no wall moves or no sensor reads."""
+"""The sampled plant as rows of second-order factors, without what no wall moves or no sensor reads.
+
+Rows of `loop.sections` for many plants at once, from their pairs of poles.
+
+The rows of one plant by the kernels that serve many.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from zwidth.arrays import Floats
+from zwidth.arrays import Floats, Ints
+from zwidth.compiled import compiled
+from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.coupled_hold import SampledForm, exact_rows, form_rows, rows_error, sample_form, separate_rows
-from zwidth.loop.hold import modal_row
+from zwidth.loop.hold import held_row, lagged_row, modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
 from zwidth.model.modes import (
@@ -20,6 +28,9 @@ from zwidth.model.modes import (
     repeat_tolerance,
 )
 from zwidth.model.plant import Plant
+from zwidth.model.plant_modes import fill_modes
+from zwidth.model.rendered_modes import PolePairs
+from zwidth.threads import in_chunks
 
 # Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
 SAME_POLES = 1e-6
@@ -171,3 +182,115 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
         if max(apart) <= SAME_POLES and size(row) <= SAME_POLES * rate**2 * size(other):
             return True
     return False
+
+
+def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints]:
+    """The rows (N, m, 9) of each plant, and how many of them are used (N,): 0 where its reach is nan.
+
+    controller  the same for all plants, or one of N designs for each
+    """
+    rows = np.zeros((*pairs.decay.shape, 9))
+    used = np.empty(len(rows), dtype=np.int64)
+    delay = np.ravel(np.asarray(controller.delay, dtype=np.float64))
+    fraction = np.maximum(delay - whole_samples(delay), 0.0)
+    period = np.array(np.ravel(controller.sampling_period), dtype=np.float64)
+    lag = np.array(np.ravel(controller.actuator_time_constant), dtype=np.float64)
+
+    def several(first: int, last: int) -> None:
+        fill_rows(
+            pairs.decay, pairs.frequency_squared, pairs.position, pairs.velocity, pairs.reach, period, fraction,
+            lag, bool(lag.any()), rows, used, first, last,
+        )  # fmt: skip
+
+    in_chunks(several, len(rows))
+    return rows, used
+
+
+@compiled
+def fill_rows(
+    decay: Floats,
+    squared: Floats,
+    position: Floats,
+    velocity: Floats,
+    reach: Floats,
+    periods: Floats,
+    fractions: Floats,
+    lags: Floats,
+    lagging: bool,
+    rows: Floats,
+    used: Ints,
+    first: int,
+    last: int,
+) -> None:
+    """Fill in `rows` and `used` from the pole pairs (N, m) of plants first to last - 1; one period serves all."""
+    m = squared.shape[1]
+    taken = np.empty(m, dtype=np.bool_)
+    for i in range(first, last):
+        period = periods[i if len(periods) > 1 else 0]
+        fraction = fractions[i if len(fractions) > 1 else 0]
+        lag = lags[i if len(lags) > 1 else 0]
+        used[i] = 0
+        # a plant without numbers has no sections: `used` stays 0
+        if not np.isfinite(reach[i]):
+            continue
+        stiffest, fastest = 0.0, 0.0
+        for k in range(m):
+            taken[k] = False
+            stiffest, fastest = max(stiffest, abs(squared[i, k])), max(fastest, abs(decay[i, k]))
+        for k in range(m):
+            if taken[k]:
+                continue
+            x, v = position[i, k], velocity[i, k]
+            for j in range(k + 1, m):
+                # pairs of one frequency and damping are one section with the sum of their shares: apart, rounding
+                # would leave a pole and a zero that nearly cancel
+                apart = abs(squared[i, j] - squared[i, k])
+                if apart <= REPEATED * stiffest and abs(decay[i, j] - decay[i, k]) <= REPEATED * fastest:
+                    taken[j] = True
+                    x, v = x + position[i, j], v + velocity[i, j]
+            if lagging:
+                row = lagged_row(decay[i, k], squared[i, k], x, v, period, fraction, lag)
+            else:
+                row = held_row(decay[i, k], squared[i, k], x, v, period, fraction)
+            still = abs(decay[i, k]) * period < 1e-9
+            # a mode that the wall does not move, or the sensor does not read, is only rounding: it is left out
+            level = reach[i] * period**2 * (UNOBSERVED_UNDAMPED if still else UNOBSERVED)
+            size = 0.0
+            for c in range(2, 8):
+                size = max(size, abs(row[c]))
+            if not size > level:
+                continue
+            for c in range(8):
+                rows[i, used[i], c] = row[c]
+            rows[i, used[i], 8] = 0.0
+            used[i] += 1
+
+
+MOST: Final = 12  # coordinates of which the kernel finds the modes; of more they are found faster otherwise
+
+
+def plant_rows(plant: Plant, controller: Controller) -> Floats | None:
+    """The rows (m, 9) of a plant, as of `loop.sections`.
+
+    Returns  None for a plant that `sections` says more about: dampers that couple its modes or lag, a loss factor,
+             a wall force that moves nothing that the sensor reads; and for a large one
+    """
+    if plant.lagged_dampers or plant.hysteresis is not None or plant.size > MOST:
+        return None
+    n = plant.size
+    numbers, drag, coupled = np.empty((5, 1, n)), np.empty((1, n, n)), np.zeros(1, dtype=np.bool_)
+    decay, squared, enter, leave, handle = numbers
+    M, B, K, actuator, sensor = (
+        np.array(each, dtype=np.float64)[None]
+        for each in (plant.mass, plant.damping, plant.stiffness, plant.actuator, plant.sensor)
+    )
+    fill_modes(M, B, K, actuator, sensor, actuator, decay, squared, enter, leave, handle, drag, coupled, 0, 1)
+    if coupled[0] or not np.isfinite(numbers).all():
+        return None
+    position, none = enter * leave, np.zeros((1, n))
+    reach = np.abs(enter).sum(axis=1) * np.abs(leave).sum(axis=1)
+    timing = (controller.sampling_period, controller.fractional_delay, controller.actuator_time_constant)
+    T, fraction, lag = np.array(timing, dtype=np.float64).reshape(3, 1)
+    rows, used = np.zeros((1, n, 9)), np.empty(1, dtype=np.int64)
+    fill_rows(decay, squared, position, none, reach, T, fraction, lag, bool(lag[0] > 0.0), rows, used, 0, 1)
+    return rows[0, : used[0]] if used[0] > 0 else None

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.contact.predict_limit_cycles import (
+from zwidth.contact.wall_limit_cycles import (
     NothingNonlinearError,
     amplitude_dependent,
     predict_limit_cycles,

@@ -12,8 +12,8 @@ from zwidth.arrays import Floats
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.dexterity import dynamic_manipulability_at, isotropy_at, manipulability_at
 from zwidth.model.argument_checks import require
-from zwidth.model.effective_parameters import EffectiveParameters
-from zwidth.model.flexible_link import FlexibleLink, Method
+from zwidth.model.effective_mass import EffectiveParameters
+from zwidth.model.flexible_body import FlexibleLink, Method
 from zwidth.model.mechanism import FIXED, Mechanism
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant

@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats
-from zwidth.conditions.friction_and_resolution import ground_friction, reading_step
+from zwidth.conditions.traits import ground_friction, reading_step
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
 from zwidth.measures.preconditions import numbers_of
-from zwidth.model.effective_parameters import screw, unit_directions
+from zwidth.model.effective_mass import screw, unit_directions
 
 OFF: Final = (
     1e-6  # largest part of a unit direction outside the handle's motions; above it the handle cannot move along it

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import NoMechanismError
+from zwidth.loop.point_text import NoMechanismError
 from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
 from zwidth.measures.dexterity import isotropy, jacobian_by_drives
 from zwidth.measures.preconditions import numbers_of

@@ -26,9 +26,8 @@ from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
-from zwidth.chart.point_numbers import numbers_of_points
-from zwidth.chart.point_radii import radii_at_points
-from zwidth.chart.table_radii import slowest_roots
+from zwidth.chart.point_chart import numbers_of_points
+from zwidth.chart.table_radii import radii_at_points, slowest_roots
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, eigenvalues, judge
 from zwidth.compiled import compiled
 from zwidth.loop.circle_factors import (
@@ -49,7 +48,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import modes_of_points, table_of_points
 from zwidth.loop.unsupported_feedback import FeedbackError
 from zwidth.measures.definition import OK, MeasureError, MeasureValues, NoValueError, WantedWall, WantedWalls
-from zwidth.measures.evaluate import complete_charts, complete_pointwise
+from zwidth.measures.evaluation import complete_charts, complete_pointwise
 from zwidth.measures.handle_impedance import felt_impedance, free_impedance, refuse_local_loop
 from zwidth.measures.preconditions import numbers_of, plant_with_handle
 from zwidth.measures.rate_hardness import rate_hardness

@@ -18,8 +18,8 @@ from typing import Final
 import numpy as np
 
 from zwidth.chart.chart import largest_stiffness
+from zwidth.loop.loop import SidewaysMotion
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sideways import SidewaysMotion
 from zwidth.measures.definition import MeasureError, NoValueError
 from zwidth.model.loaded_plant import moved_motions
 

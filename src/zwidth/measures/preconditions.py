@@ -9,12 +9,10 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, WALL_ALONE, ConditionCase, case_of
 from zwidth.loop.estimator import NonlinearError
-from zwidth.loop.inertia_share import with_inertia_of
-from zwidth.loop.loop import Loop
+from zwidth.loop.loop import Loop, with_inertia_of
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
+from zwidth.measures.definition import WANTED_BY_NAME, MeasureError, WantedWall, WantedWalls
 from zwidth.measures.handle_impedance import HandleError, handle_of
-from zwidth.measures.wanted import WANTED_BY_NAME
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import ModelError
 

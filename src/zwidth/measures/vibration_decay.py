@@ -35,12 +35,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.chart.point_radii import radii_at_points
+from zwidth.chart.table_radii import radii_at_points
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, Verdicts, judge, spectral_radius
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
-from zwidth.measures.evaluate import complete_pointwise
+from zwidth.measures.evaluation import complete_pointwise
 from zwidth.measures.preconditions import walls_of
 from zwidth.model.plant import Plant
 

@@ -9,12 +9,11 @@ from .continuation import OUT_OF_REACH as OUT_OF_REACH
 from .damping import GivenDamping as GivenDamping
 from .damping import ModalDamping as ModalDamping
 from .damping import ProportionalDamping as ProportionalDamping
-from .effective_parameters import effective_parameters as effective_parameters
+from .effective_mass import effective_parameters as effective_parameters
 from .equilibrium import EquilibriumError as EquilibriumError
 from .flexible_body import FlexibleBody as FlexibleBody
 from .flexible_body import clamped_frequencies as clamped_frequencies
 from .flexible_body import highest_frequency as highest_frequency
-from .general_modes import modes_in_general as modes_in_general
 from .load import Load as Load
 from .load import LoadError as LoadError
 from .loaded_posture import loaded_postures as loaded_postures
@@ -49,6 +48,7 @@ from .operator import OperatorError as OperatorError
 from .operator import attach as attach
 from .plant import LaggedDamper as LaggedDamper
 from .plant import Plant as Plant
+from .plant_modes import modes_in_general as modes_in_general
 from .posture import OutOfReach as OutOfReach
 from .posture import Posture as Posture
 from .posture import PostureError as PostureError
@@ -60,6 +60,8 @@ from .posture import reachable_positions as reachable_positions
 from .posture import solve_posture as solve_posture
 from .posture_failure import BeyondLimit as BeyondLimit
 from .ratio_table import RatioTable as RatioTable
+from .raw_sweep import sweep_response as sweep_response
+from .raw_sweep import sweep_response_of_blocks as sweep_response_of_blocks
 from .reduction import MODELS as MODELS
 from .reduction import DirectionError as DirectionError
 from .reduction import ModelError as ModelError
@@ -71,5 +73,3 @@ from .response import Response as Response
 from .response import ResponseError as ResponseError
 from .response import integrators_of as integrators_of
 from .rotations import rotation_matrix as rotation_matrix
-from .sweep_response import sweep_response as sweep_response
-from .sweep_response import sweep_response_of_blocks as sweep_response_of_blocks

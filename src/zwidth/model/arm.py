@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.model.closed_posture import moved_posture
+from zwidth.model.continuation import moved_posture
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions

@@ -2,16 +2,22 @@
 
 They are summed at Gauss points of panels, between which strains may jump; each station is an edge of panels, so
 that the integrals up to it are as exact as the others.
+
+Shape functions along a beam: vibration modes, static deflections and finite elements.
+
+A family of n functions at q places is an array (d, q, n) of their values and first derivatives by s: d = 3 for
+bending (deflection, slope, curvature), d = 2 for stretch and twist (displacement or angle, strain). All functions
+and the slopes of bending are 0 at the base, s = 0, where the beam's frame sits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from zwidth.arrays import Floats
+from zwidth.arrays import Floats, Ints
 from zwidth.model.beam_section import BeamProperties
 from zwidth.model.flexible_body import FlexibleBody, symmetric
 
@@ -132,3 +138,150 @@ def rod_inertia(beam: BeamProperties) -> Floats:
 def _gram(one: Floats, weights: Floats, other: Floats | None = None) -> Floats:
     """Sum over points of weight times one_i times other_j, (e, e)."""
     return np.asarray((one * weights[:, None]).T @ (one if other is None else other))
+
+
+BOUNDARIES: Final = ("clamped", "clamped-pinned", "pinned")
+
+
+def assembled(in_y: Floats, in_z: Floats, along: Floats, twist: Floats) -> Shapes:
+    """Shapes of four families: bending in the x-y and in the x-z plane, stretch and twist, in this order.
+
+    A deflection to z turns the beam about -y.
+    """
+    q = in_y.shape[1]
+    sizes = [family.shape[2] for family in (in_y, in_z, along, twist)]
+    y, z, x, t = (slice(end - size, end) for end, size in zip(np.cumsum(sizes).tolist(), sizes, strict=True))
+    displacement, rotation, curvature = (np.zeros((q, 3, sum(sizes))) for _ in range(3))
+    stretch = np.zeros((q, sum(sizes)))
+    displacement[:, 1, y], rotation[:, 2, y], curvature[:, 2, y] = in_y
+    displacement[:, 2, z], rotation[:, 1, z], curvature[:, 1, z] = in_z[0], -in_z[1], -in_z[2]
+    displacement[:, 0, x], stretch[:, x] = along
+    rotation[:, 0, t], curvature[:, 0, t] = twist
+    return Shapes(displacement, rotation, curvature, stretch)
+
+
+# --- vibration modes --------------------------------------------------------------------------------
+
+
+def bending_modes(places: Floats, length: float, count: int, boundary: str) -> Floats:
+    """The first modes of bending (3, q, count), clamped or turned to be level at the base.
+
+    boundary  "clamped": free at the tip; "clamped-pinned": held in place at the tip, free to turn; "pinned": held
+              in place at both ends and free to turn, sin(n pi s/L) over the chord, from which the straight line
+              along the tangent at the base is subtracted
+    """
+    x = places[:, None] / length
+    if boundary == "pinned":
+        k = np.pi * np.arange(1, count + 1)
+        family = np.stack([np.sin(k * x) - k * x, k * (np.cos(k * x) - 1.0), -(k**2) * np.sin(k * x)])
+    else:
+        family = _clamped_modes(x, bending_numbers(count, boundary), 1.0 if boundary == "clamped" else -1.0)
+    return np.asarray(family / np.array([1.0, length, length**2])[:, None, None])
+
+
+def bending_numbers(count: int, boundary: str) -> Floats:
+    """b = beta L (count,) of the clamped beam's modes, ascending.
+
+        "clamped"         cos b + 1/cosh b = 0          (1.875104, 4.694091, 7.854757, ...)
+        "clamped-pinned"  sin b - tanh b cos b = 0      (3.926602, 7.068583, ...)
+
+    >>> bending_numbers(3, "clamped").round(6).tolist()
+    [1.875104, 4.694091, 7.854757]
+    """
+    n = np.arange(1, count + 1)
+    b = (n - 0.5) * np.pi if boundary == "clamped" else (n + 0.25) * np.pi
+    for _ in range(8):  # Newton's method from roots that are within 0.3 of the first and exp(-b) of the others
+        tanh, sech = np.tanh(b), 2.0 * np.exp(-b) / (1.0 + np.exp(-2.0 * b))
+        if boundary == "clamped":
+            b = b - (np.cos(b) + sech) / (-np.sin(b) - tanh * sech)
+        else:
+            b = b - (np.sin(b) - tanh * np.cos(b)) / (np.cos(b) * (1.0 - sech**2) + tanh * np.sin(b))
+    return np.asarray(b)
+
+
+def _clamped_modes(x: Floats, b: Floats, sign: float) -> Floats:
+    """cosh - cos - g (sinh - sin) of b x and its first two derivatives by x, (3, q, count).
+
+        g = (cosh b + sign cos b) / (sinh b + sign sin b)
+
+    The two growing functions are written as one that decays from the base and one that decays from the tip,
+
+        cosh - g sinh = exp(-b x) (1 + g)/2 + exp(-b (1 - x)) h,     h = exp(b) (1 - g)/2
+
+    so that nothing large is subtracted: as written above, digits are lost by exp(b), all of them from the twelfth
+    mode on.
+    """
+    small = np.exp(-b)
+    share = 1.0 - small**2 + 2.0 * sign * small * np.sin(b)  # 2 exp(-b) (sinh b + sign sin b)
+    h = (sign * (np.sin(b) - np.cos(b)) - small) / share
+    g = 1.0 - 2.0 * small * h
+    base, tip = 0.5 * (1.0 + g) * np.exp(-b * x), h * np.exp(-b * (1.0 - x))
+    cos, sin = np.cos(b * x), np.sin(b * x)
+    return np.stack(
+        [base + tip - cos + g * sin, b * (tip - base + sin + g * cos), b**2 * (base + tip + cos - g * sin)]
+    )
+
+
+def bar_modes(places: Floats, length: float, count: int, boundary: str) -> Floats:
+    """The first modes of stretch or twist (2, q, count), held at the base: sin((n - 1/2) pi s/L) with the tip free
+    for "clamped", else sin(n pi s/L) with the tip held."""
+    n = np.arange(1, count + 1)
+    k = np.pi / length * (n - 0.5 if boundary == "clamped" else n)
+    return np.stack([np.sin(places[:, None] * k), k * np.cos(places[:, None] * k)])
+
+
+# --- static deflections -----------------------------------------------------------------------------
+
+
+def bending_deflections(places: Floats, loaded: Floats) -> Floats:
+    """Deflection of the clamped beam of unit stiffness under a force, then under a moment, at each of the loaded
+    places (k,) > 0: (3, q, 2 k)."""
+    s, c = places[:, None], loaded
+    t = np.minimum(s, c)  # beyond the load the beam is straight
+    force = np.stack([t**2 * (3.0 * c - t) / 6.0 + c**2 / 2.0 * (s - t), t * (2.0 * c - t) / 2.0, c - t])
+    moment = np.stack([t**2 / 2.0 + c * (s - t), t, np.where(s < c, 1.0, 0.0)])
+    return np.concatenate([force, moment], axis=2)
+
+
+def bar_deflections(places: Floats, loaded: Floats) -> Floats:
+    """The same of stretch under a force, or of twist under a torque, (2, q, k)."""
+    s = places[:, None]
+    return np.stack([np.minimum(s, loaded), np.where(s < loaded, 1.0, 0.0)])
+
+
+# --- finite elements --------------------------------------------------------------------------------
+
+
+def hermite_bending(places: Floats, nodes: Floats) -> Floats:
+    """Cubic elements between ascending nodes (n+1,), the first of them clamped: deflections of the others, then
+    their slopes, (3, q, 2 n)."""
+    element, x, h = _local(places, nodes)
+    start = np.stack([(1.0 - x) ** 2 * (1.0 + 2.0 * x), -6.0 * x * (1.0 - x) / h, (12.0 * x - 6.0) / h**2])
+    end = np.stack([x**2 * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / h, (6.0 - 12.0 * x) / h**2])
+    slope_start = np.stack([h * x * (1.0 - x) ** 2, (1.0 - x) * (1.0 - 3.0 * x), (6.0 * x - 4.0) / h])
+    slope_end = np.stack([h * x**2 * (x - 1.0), x * (3.0 * x - 2.0), (6.0 * x - 2.0) / h])
+    n, q, inner = len(nodes) - 1, np.arange(len(places)), np.flatnonzero(element > 0)
+    family = np.zeros((3, len(places), 2 * n))
+    family[:, q, element], family[:, q, n + element] = end, slope_end
+    family[:, inner, element[inner] - 1] = start[:, inner]
+    family[:, inner, n + element[inner] - 1] = slope_start[:, inner]
+    return family
+
+
+def quadratic_bar(places: Floats, nodes: Floats) -> Floats:
+    """Quadratic elements, the first node held: values at the other nodes, then the height of a bubble 4 x (1 - x)
+    within each element, which is 0 at the nodes, (2, q, 2 n)."""
+    element, x, h = _local(places, nodes)
+    n, q, inner = len(nodes) - 1, np.arange(len(places)), np.flatnonzero(element > 0)
+    family = np.zeros((2, len(places), 2 * n))
+    family[:, q, element] = np.stack([x, 1.0 / h])
+    family[:, q, n + element] = np.stack([4.0 * x * (1.0 - x), (4.0 - 8.0 * x) / h])
+    family[:, inner, element[inner] - 1] = np.stack([1.0 - x, -1.0 / h])[:, inner]
+    return family
+
+
+def _local(places: Floats, nodes: Floats) -> tuple[Ints, Floats, Floats]:
+    """Element of each place, where it is between the element's ends (0 to 1), and the element's length."""
+    element = np.clip(np.searchsorted(nodes, places, side="right") - 1, 0, len(nodes) - 2)
+    h = np.diff(nodes)[element]
+    return element, (places - nodes[element]) / h, h

@@ -25,8 +25,7 @@ from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.modes import UNOBSERVED_UNDAMPED
 from zwidth.model.operator import Operator
-from zwidth.model.pole_pairs import PolePairs
-from zwidth.model.rendered_modes import RenderedModes
+from zwidth.model.rendered_modes import PolePairs, RenderedModes
 from zwidth.threads import in_chunks
 
 ITERATIONS: Final = 3

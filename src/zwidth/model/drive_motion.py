@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.model.closed_posture import moved_posture
+from zwidth.model.continuation import moved_posture
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.motions import Motions
 

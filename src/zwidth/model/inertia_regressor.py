@@ -24,8 +24,8 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.bias import LinkAccelerations, closing_accelerations, fill_accelerations, new_link_accelerations
-from zwidth.model.closed_posture import close_at
 from zwidth.model.closure import closure_step, equations, passive_rates
+from zwidth.model.continuation import close_at
 from zwidth.model.forward_kinematics import WorkingMemory, place_links, working_memory
 from zwidth.model.inertia import unit_motions
 from zwidth.model.mechanism_arrays import MechanismArrays

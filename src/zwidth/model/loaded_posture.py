@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
-from zwidth.model.closed_posture import moved_posture
 from zwidth.model.closure import equations, passive_rates
+from zwidth.model.continuation import moved_posture
 from zwidth.model.design_axes import change_designs
 from zwidth.model.equilibrium import Balance, Equilibrium, EquilibriumError
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory

@@ -37,8 +37,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled
-from zwidth.model.flexible_body import symmetric
-from zwidth.model.flexible_link import FlexibleLink
+from zwidth.model.flexible_body import FlexibleLink, symmetric
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.mechanism import AXIS, POINT, PRISMATIC
 from zwidth.model.mechanism_arrays import MechanismArrays

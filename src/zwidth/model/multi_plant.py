@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping, modal_matrix
 from zwidth.model.drive_side import is_plain
-from zwidth.model.effective_parameters import screw
+from zwidth.model.effective_mass import screw
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture

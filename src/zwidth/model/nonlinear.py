@@ -2,6 +2,8 @@
 
 Charts and closed forms speak of the linear rest; `contact` simulates all of it. Every part works on one motion of
 the plant, along . x, so that a reduced model carries it as it carries its dampers.
+
+Projection of a part that acts on one motion of the full model onto the motions of a reduced one.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.model.motion_projection import project_onto_motions
 
 FrictionModel = Literal["coulomb", "dahl", "lugre"]
 
@@ -176,3 +177,13 @@ def _projected(parts: tuple[NonlinearElement, ...], motions: Floats) -> tuple[No
 
 def _padded(parts: tuple[NonlinearElement, ...], count: int) -> tuple[NonlinearElement, ...]:
     return tuple(replace(part, along=np.append(part.along, np.zeros(count))) for part in parts)
+
+
+ROUNDING = 1e-12  # share of a motion that is none
+
+
+def project_onto_motions(vector: Floats, motions: Floats) -> Floats:
+    """vector . motion for each motion (m,), a column each of (n, m); rounding set to 0."""
+    products = vector @ motions
+    inside = np.abs(vector) @ np.abs(motions)
+    return np.asarray(np.where(np.abs(products) > ROUNDING * inside, products, 0.0))

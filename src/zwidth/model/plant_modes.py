@@ -1,14 +1,31 @@
-"""The modes of many given plants at once; `modes.real_modes` says the same of one, with its special cases."""
+"""The modes of many given plants at once; `modes.real_modes` says the same of one, with its special cases.
+
+The modes of many postures of a mechanism whose drives are not its coordinates, or whose joints act by
+themselves.
+
+The full model's matrices (`reduction.full_matrices`) are put together for all postures at once, as a plant of as
+many designs, whose modes are found as those of any given plant.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
-from zwidth.arrays import Flags, Floats
+from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
+from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.design_axes import design_shape
+from zwidth.model.drive_side import DriveSide, drive_side
+from zwidth.model.effective_mass import lever_arms, screw
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.modes import REPEATED, RIGID
 from zwidth.model.plant import Plant
+from zwidth.model.posture import OK, Posture
+from zwidth.model.ratio_table import at_postures
+from zwidth.model.reduction import Encoders
 from zwidth.model.rendered_modes import RenderedModes, jacobi
 from zwidth.threads import in_chunks
 
@@ -151,3 +168,151 @@ def relative(root: Floats, A: Floats, out: Floats) -> None:
     for r in range(n):
         for c in range(r):
             out[r, c] = out[c, r] = 0.5 * (out[r, c] + out[c, r])
+
+
+@dataclass(frozen=True)
+class Postures:
+    """N postures and their directions, flat; those that are not OK stand for the first that is.
+
+    known    (N,)  which are OK;   design (N,) of each
+    h        (N, c)  lever arms;   mass (N, c, c)  of the links;   side  of the drives, (N, ...)
+    flexible (d,)  marks of the flexible drives
+    rotor, spring, damper (N, d)  at the joints;   spun (N, d)  J_m n
+    """
+
+    known: Flags
+    design: Ints
+    h: Floats
+    mass: Floats
+    side: DriveSide
+    flexible: Flags
+    rotor: Floats
+    spring: Floats
+    damper: Floats
+    spun: Floats
+
+
+def has_general_modes(mechanism: Mechanism) -> bool:
+    """Whether `modes_in_general` applies: the same drives are flexible in all designs, and no winding brakes."""
+    drives = mechanism.drives
+    flexible = np.isfinite(per_design(mechanism, drives.stiffness, 1))
+    braked = drives.winding_damping is not None and bool(np.any(drives.winding_damping))
+    return bool((flexible == flexible[0]).all()) and not braked
+
+
+def modes_in_general(
+    mechanism: Mechanism, posture: Posture, direction: Floats, damping: Damping, encoders: Encoders
+) -> RenderedModes:
+    """The modes of each posture's full model, flat; nan as input where a posture is not OK or the drives cannot
+    move the handle along its direction.
+
+    direction  (..., 3) or (..., 6), as for `rendered_modes.rendered_modes`
+    """
+    side, mechanism = drive_side(mechanism, posture), at_postures(mechanism, posture)
+    at = _flat_postures(mechanism, posture, side, screw(direction))
+    M, K, D = _matrices(at)
+    B, ratio = _damping(mechanism, at, damping, M, K, D)
+    N, n = M.shape[:2]
+    c, F = at.h.shape[1], np.flatnonzero(at.flexible)
+    links = np.zeros((N, len(at.flexible), n))
+    links[:, :, :c] = at.side.motion
+    motors = links.copy()
+    motors[:, F] = np.eye(n)[c:]
+    t = at.side.shares(at.h)[:, None]
+    actuator, reading = (t @ motors)[:, 0], (t @ (motors if encoders == "motor" else links))[:, 0]
+    handle = np.concatenate([at.h, np.zeros((N, len(F)))], axis=1)
+    modes = plant_modes(Plant(M, B, K, actuator, reading, handle), (N,))
+    moved = np.abs(at.h[:, : at.side.driven]).max(axis=1) > 0.0
+    modes.input[np.logical_not(at.known & moved)] = np.nan
+    return _with_ratio(modes, ratio)
+
+
+def _flat_postures(mechanism: Mechanism, posture: Posture, side: DriveSide, u: Floats) -> Postures:
+    drives = mechanism.drives
+    shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1], mechanism.design_shape)
+    design, known = design_of_each(mechanism, shape), np.broadcast_to(posture.status == OK, shape).ravel()
+    first = int(np.argmax(known))
+
+    def flat(array: Floats, own: int) -> Floats:
+        tail = array.shape[array.ndim - own :]
+        full = np.broadcast_to(array, (*shape, *tail)).reshape(-1, *tail)
+        return np.asarray(np.where(known.reshape(-1, *(1,) * own), full, full[first]))
+
+    ratio = flat(drives.transmission, 1)
+    inertia, spring, damper = (
+        per_design(mechanism, x, 1)[design] for x in (drives.motor_inertia, drives.stiffness, drives.damping)
+    )
+    flat_side = replace(
+        side,
+        motion=flat(side.motion, 2),
+        spin=None if side.spin is None else flat(side.spin, 2),
+        stiffness=None if side.stiffness is None else flat(side.stiffness, 2),
+        damping=None if side.damping is None else flat(side.damping, 2),
+    )
+    return Postures(
+        known=known,
+        design=design,
+        h=flat(lever_arms(posture, u), 1),
+        mass=flat(posture.mass_matrix, 2),
+        side=flat_side,
+        flexible=np.isfinite(spring[0]),
+        rotor=ratio**2 * inertia,
+        spring=ratio**2 * spring,
+        damper=ratio**2 * damper,
+        spun=ratio * inertia,
+    )
+
+
+def _matrices(at: Postures) -> tuple[Floats, Floats, Floats]:
+    """M and K (N, n, n), and the deflections D (N, f, n) of the flexible drives."""
+    T, (N, c) = at.side.motion, at.h.shape
+    F, R = np.flatnonzero(at.flexible), np.flatnonzero(~at.flexible)
+    f, n = len(F), c + len(F)
+    M = np.zeros((N, n, n))
+    M[:, :c, :c] = at.mass + _transposed(T[:, R]) @ (at.rotor[:, R, None] * T[:, R])
+    M[:, range(c, n), range(c, n)] = at.rotor[:, F]
+    if at.side.spin is not None:
+        spun = at.spun[..., None] * at.side.spin
+        cross = _transposed(T[:, R]) @ spun[:, R]
+        M[:, :c, :c] += cross + _transposed(cross)
+        M[:, c:, :c], M[:, :c, c:] = spun[:, F], _transposed(spun[:, F])
+    D = np.concatenate([T[:, F], np.broadcast_to(-np.eye(f), (N, f, f))], axis=2)
+    K = _transposed(D) @ (at.spring[:, F, None] * D)
+    if at.side.stiffness is not None:
+        K[:, :c, :c] += at.side.stiffness
+    return M, K, D
+
+
+def _damping(
+    mechanism: Mechanism, at: Postures, damping: Damping, M: Floats, K: Floats, D: Floats
+) -> tuple[Floats, Floats | None]:
+    """B (N, n, n), and the damping ratio (N,) that comes to every flexible mode."""
+    B, ratio, c = np.zeros_like(K), None, at.h.shape[1]
+
+    def of_each(number: float | Floats) -> Floats:
+        return np.asarray(np.broadcast_to(number, mechanism.design_shape).ravel()[at.design])
+
+    if isinstance(damping, ModalDamping):
+        ratio = of_each(damping.ratio)
+    elif isinstance(damping, ProportionalDamping):
+        r_m, r_k = of_each(damping.mass_coefficient_1_per_s), of_each(damping.stiffness_coefficient_s)
+        B = r_m[:, None, None] * M + r_k[:, None, None] * K
+    else:
+        B = _transposed(D) @ (at.damper[:, at.flexible, None] * D)
+    if at.side.damping is not None:
+        B[:, :c, :c] += at.side.damping
+    return B, ratio
+
+
+def _with_ratio(modes: RenderedModes, ratio: Floats | None) -> RenderedModes:
+    """The modes with a damping ratio (N,) more of each flexible one."""
+    if ratio is None:
+        return modes
+    assert modes.drag is not None
+    extra = ratio[:, None] * np.sqrt(np.maximum(modes.frequency_squared, 0.0))
+    drag = modes.drag + 2.0 * extra[..., None] * np.eye(extra.shape[1])
+    return replace(modes, decay=modes.decay + extra, drag=drag)
+
+
+def _transposed(matrices: Floats) -> Floats:
+    return np.swapaxes(matrices, -1, -2)

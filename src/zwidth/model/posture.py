@@ -23,11 +23,25 @@ from zwidth.model.continuation import (
     reference_batch,
 )
 from zwidth.model.forward_kinematics import place_links, working_memory
-from zwidth.model.handle_position import answered_goal, goal_distance, goal_of_angles, positions_about_reference
+from zwidth.model.handle_position import (
+    answered_goal,
+    check_mobility,
+    drives_fit,
+    goal_distance,
+    goal_of_angles,
+    positions_about_reference,
+)
 from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
-from zwidth.model.mobility import check_mobility, drives_fit
-from zwidth.model.posture_batch import PostureBatch, failed_batch, solve_batch, solve_from_starts
+from zwidth.model.posture_batch import (
+    PostureBatch,
+    arm_length,
+    failed_batch,
+    far_outside_shells,
+    shells,
+    solve_batch,
+    solve_from_starts,
+)
 from zwidth.model.posture_failure import (
     BeyondLimit,
     LoopOpen,
@@ -37,7 +51,6 @@ from zwidth.model.posture_failure import (
     posture_failure,
     singular_throughout,
 )
-from zwidth.model.reach_shells import arm_length, far_outside_shells, shells
 from zwidth.model.roadmap import roadmap
 from zwidth.model.rotations import rotation_matrix, rotation_vector
 

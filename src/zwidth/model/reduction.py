@@ -21,17 +21,23 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats, Ints
 from zwidth.model.argument_checks import require
-from zwidth.model.damping import Damping, GivenDamping, ModalDamping, ProportionalDamping, modal_matrix
-from zwidth.model.drive_nonlinearity import nonlinear_of_drives
+from zwidth.model.damping import (
+    Damping,
+    GivenDamping,
+    ModalDamping,
+    ProportionalDamping,
+    add_dampers,
+    modal_matrix,
+    project_dampers,
+    winding_dampers,
+)
 from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
-from zwidth.model.effective_parameters import EffectiveParameters, effective_parameters, lever_arms, screw
-from zwidth.model.electrical_damping import add_dampers, project_dampers, winding_dampers
-from zwidth.model.mechanism import Drives, Mechanism
+from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
+from zwidth.model.mechanism import Drives, Mechanism, nonlinear_of_drives
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.modes import undamped_modes
-from zwidth.model.motion_projection import project_onto_motions
 from zwidth.model.motions import Motions
-from zwidth.model.nonlinear import Friction, Nonlinear
+from zwidth.model.nonlinear import Friction, Nonlinear, project_onto_motions
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.posture import OK, Posture
 from zwidth.model.ratio_table import at_postures

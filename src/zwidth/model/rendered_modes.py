@@ -9,6 +9,8 @@ a symmetric eigenproblem of the size of F alone:
 with the mass-normalised shapes v_phi = -M^-1 E k^1/2 e / w and v_theta = I^-1 k^1/2 e / w. All motions in which no
 drive deflects are free and act as one, of the mass 1/(h^T (M_phi + M_theta)^-1 h). So nothing of the size of the
 whole plant is ever decomposed; `reduction` and `modes` say the same of one posture, for any damping.
+
+Many plants as sums of second-order parts, one for each pair of poles: held by an operator or not.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import numpy as np
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
-from zwidth.model.effective_parameters import (
+from zwidth.model.effective_mass import (
     EffectiveParameters,
     effective_parameters,
     inverse_form,
@@ -29,7 +31,6 @@ from zwidth.model.effective_parameters import (
 )
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
-from zwidth.model.pole_pairs import PolePairs
 from zwidth.model.posture import Posture
 from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders, Model
@@ -327,3 +328,47 @@ def jacobi(A: Floats, V: Floats) -> None:
                     V[k, p], V[k, q] = c * V[k, p] - s * V[k, q], s * V[k, p] + c * V[k, q]
         if not turned:
             break
+
+
+@dataclass(frozen=True)
+class PolePairs:
+    """Parts xi'' + 2 a xi' + w^2 xi = f,  y = sum of position xi + velocity xi'; N plants of at most m parts.
+
+    decay              (N, m)  a [1/s]
+    frequency_squared  (N, m)  w^2 [1/s^2]; 0 for a free motion
+    position, velocity (N, m)  share of each part in the reading [1/kg], [s/kg]; velocity 0 for undamped shapes
+    reach              (N,)    the reading that all participations together could have [1/kg], by which rounding is
+                               told; nan for a plant that is to be looked at alone
+    """
+
+    decay: Floats
+    frequency_squared: Floats
+    position: Floats
+    velocity: Floats
+    reach: Floats
+
+    def with_free_motion(self, share: Floats) -> PolePairs:
+        """The same plants with one more part each, a free mass with these shares in the reading (N,) [1/kg]."""
+        none = np.zeros((len(share), 1))
+        return PolePairs(
+            np.hstack([self.decay, none]),
+            np.hstack([self.frequency_squared, none]),
+            np.hstack([self.position, share[:, None]]),
+            np.hstack([self.velocity, none]),
+            self.reach,
+        )
+
+    def with_rows(self, rows: Ints, others: PolePairs) -> PolePairs:
+        """The same with these plants' parts taken from others, one for each of the rows."""
+        most = max(self.decay.shape[1], others.decay.shape[1])
+        merged = {}
+        for name in ("decay", "frequency_squared", "position", "velocity"):
+            own, other = getattr(self, name), getattr(others, name)
+            whole = np.zeros((len(own), most))
+            whole[:, : own.shape[1]] = own
+            whole[rows] = 0.0
+            whole[rows, : other.shape[1]] = other
+            merged[name] = whole
+        reach = self.reach.copy()
+        reach[rows] = others.reach
+        return PolePairs(**merged, reach=reach)

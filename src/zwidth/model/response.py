@@ -1,4 +1,17 @@
-"""A measured frequency response of a device: from the commanded force to the encoder's reading."""
+"""A measured frequency response of a device: from the commanded force to the encoder's reading.
+
+Errors of a measured response that hold at all its frequencies together.
+
+The lowest measured frequencies as a device's stiffness, damping and mass to the ground.
+
+However many modes and whatever delay a device has, near frequency 0
+
+    1 / P = k + b s + m s^2 + j s^3 + ...,   s = 2 pi i f,   all of them real,
+
+as long as P has no zero near there: k is the stiffness to the ground, b the damping with what a delay adds to it,
+m the mass with the same. A free device has k = b = 0, and P has two poles at z = 1; one with a dashpot to the
+ground k = 0, and one pole; one on a spring none.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +22,6 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Flags, Floats
-from zwidth.model.joint_confidence import joint_radius
-from zwidth.model.low_frequencies import LowFrequencies, fit_low_frequencies
 
 LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
 SAME_FREQUENCY: Final = 1e-9  # relative difference of two frequencies that are one
@@ -221,3 +232,175 @@ def integrators_of(response: Response, period: float) -> int:
             "integrators = 0, 1 or 2 in [response], or measure lower"
         )
     return nearest
+
+
+CONFIDENCE: Final = 0.95
+POOLED: Final = 7  # neighbouring frequencies whose scatter is taken together
+
+
+def joint_radius(response: Response) -> Floats | None:
+    """Radius (n,) of the disk round each P, over |P|; with 95 % all disks together hold the true response.
+
+    With n disks each has to hold its own with 1 - 0.05 / n (Bonferroni). A complex Gaussian error of variance v,
+    estimated with nu complex degrees of freedom, is less than r with probability 1 - (1 + r^2 / (nu v))^-nu
+    (Fisher's F with 2 and 2 nu degrees), so that
+
+        r^2 = nu v ((n / 0.05)^(1 / nu) - 1),      for known v:  v ln(n / 0.05)
+
+    From coherence v = (1 - g^2) / (a g^2) of a averages, a - 1 degrees unless they are given; known, if a is 1.
+    From the scatter of k sweeps, v = u, their squared distance from their mean summed over k (k - 1), with that of
+    their neighbours: 7 (k - 1) degrees. Of both, where there are both, the larger; but of what coherence tells,
+    only the part k u that differs from sweep to sweep is averaged, v - (k - 1) u, at least v / k: an error that
+    repeats itself, as that of an encoder's steps under the same force, is in the mean as well.
+
+    Returns  None where neither coherence nor repetitions are known; inf where the coherence is 0
+
+    >>> from zwidth.model.response import Response
+    >>> exact = Response(np.arange(1.0, 11.0), np.ones(10, complex), coherence=np.full(10, 0.99), averages=16.0)
+    >>> joint_radius(exact).round(4).tolist()[:2]
+    [0.0633, 0.0633]
+    """
+    count = len(response.frequency)
+    radii = []
+    scatter = None if response.sweeps is None else _scatter(response.sweeps, response.value)
+    repeated = 1 if response.sweeps is None else len(response.sweeps)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if scatter is not None:
+            radii.append(_radius(scatter, np.full(count, POOLED * (repeated - 1.0)), count))
+        if response.coherence is not None:
+            averages, freedom = response.averages, response.freedom
+            if freedom is None:
+                freedom = np.full(count, averages - 1.0 if averages > 1.0 else np.inf)
+            variance = (1.0 - response.coherence) / (averages * response.coherence)
+            if scatter is not None:
+                variance = np.maximum(variance - (repeated - 1.0) * scatter, variance / repeated)
+            radii.append(_radius(variance, freedom, count))
+    return np.asarray(np.max(radii, axis=0)) if radii else None
+
+
+def _scatter(sweeps: Complexes, mean: Complexes) -> Floats:
+    """Variance (n,) of the mean of sweeps (k, n), over |mean|^2, by their scatter and that of their neighbours."""
+    repeated = len(sweeps)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.sum(np.abs(sweeps / mean - 1.0) ** 2, axis=0) / ((repeated - 1) * repeated)
+    padded = np.pad(np.where(np.isfinite(own), own, 0.0), POOLED // 2, mode="reflect")
+    return np.asarray(np.fmax(own, np.convolve(padded, np.full(POOLED, 1.0 / POOLED), mode="valid")))
+
+
+def _radius(variance: Floats, freedom: Floats, count: int) -> Floats:
+    """Radius (n,) that one of `count` errors of these variances (n,) exceeds with 5 %."""
+    exponent = np.log(count / (1.0 - CONFIDENCE))
+    known = np.isinf(freedom)
+    with np.errstate(over="ignore", invalid="ignore"):
+        estimated = np.where(known, 1.0, freedom) * np.expm1(exponent / np.where(known, np.inf, freedom))
+        return np.asarray(np.sqrt(variance * np.where(known, exponent, estimated)))
+
+
+TERMS = 4
+FEWEST = 5  # frequencies that are fitted
+REACHES = (
+    50.0,
+    25.0,
+    12.0,
+    6.0,
+    4.0,
+    2.5,
+    1.7,
+    1.4,
+)  # of the fit, over the lowest frequency: the farthest that fits
+MISFIT = 0.02  # relative error of the fit that is always allowed
+MISFIT_IN_DEVIATIONS = 4.0
+ROUGHEST = 0.3  # relative error with which the fit to the lowest frequencies still tells something
+MOST_OF_LAST = 0.3  # what the last term is at most, of the largest: more of it fits whatever there is
+NEIGHBOURS = 2.0  # times the variance by independent errors that is taken where no error is known
+SEEN_SHARE, SEEN_DEVIATIONS = 0.1, 3.0  # what a term is at the lowest frequency, of the largest, if it counts
+
+
+@dataclass(frozen=True)
+class LowFrequencies:
+    """1 / P = sum of terms[i] (2 pi i f)^i below and around the lowest measured frequency.
+
+    lowest      that frequency [Hz]
+    terms       (4,) k [N/m], b [N s/m], m [kg], j [kg s]
+    covariance  (4, 4) of these
+    fits        whether P is so at least roughly; how roughly is in the covariance
+    closely     whether to within its error
+    """
+
+    lowest: float
+    terms: Floats
+    covariance: Floats
+    fits: bool
+    closely: bool
+
+    def inverse(self, frequency: Floats, integrators: int) -> Complexes:
+        """1 / P (...) at frequencies [Hz] with this number of poles at z = 1: terms below are none."""
+        s = 2j * np.pi * np.asarray(frequency)[..., None]
+        order = np.arange(TERMS)
+        return np.asarray(np.sum(np.where(order < integrators, 0.0, self.terms) * s**order, axis=-1))
+
+    def deviation(self, frequency: Floats) -> Floats:
+        """Standard deviation (...) of 1 / P at frequencies [Hz], of its real and imaginary part together [N/m]."""
+        s = (2.0 * np.pi * np.asarray(frequency))[..., None] ** np.arange(TERMS)
+        sign = np.array([1.0, 1.0, -1.0, -1.0])
+        even, odd = s * sign * [1.0, 0.0, 1.0, 0.0], s * sign * [0.0, 1.0, 0.0, 1.0]
+        squares = [np.einsum("...i,ij,...j->...", part, self.covariance, part) for part in (even, odd)]
+        return np.asarray(np.sqrt(np.maximum(squares[0] + squares[1], 0.0)))
+
+    @property
+    def first_seen(self) -> tuple[int, float] | None:
+        """Number of the first term that is seen at the lowest frequency, and its sign; None: nothing fits."""
+        scale = (2.0 * np.pi * self.lowest) ** np.arange(TERMS)
+        size, error = self.terms * scale, np.sqrt(np.diag(self.covariance)) * scale
+        seen = np.abs(size) > np.maximum(SEEN_SHARE * np.max(np.abs(size[:3])), SEEN_DEVIATIONS * error)
+        first = np.flatnonzero(seen[:3])
+        return (int(first[0]), float(np.sign(size[first[0]]))) if self.fits and len(first) else None
+
+    @property
+    def integrators(self) -> int | None:
+        """Poles of P at z = 1: the number of the first term that is seen, if it is positive; None: unclear."""
+        return self.first_seen[0] if self.first_seen and self.first_seen[1] > 0.0 else None
+
+
+def fit_low_frequencies(frequency: Floats, value: Complexes, deviation: Floats | None) -> LowFrequencies:
+    """Stiffness, damping and mass by linear least squares on P (k + b s + ...) = 1 at the lowest frequencies.
+
+    frequency  (n,) [Hz], ascending;  value (n,) P
+    deviation  (n,) standard deviation of the complex error of P over |P|; None: unknown
+
+    >>> f = np.linspace(1.0, 50.0, 50)
+    >>> s = 2j * np.pi * f
+    >>> found = fit_low_frequencies(f, 1.0 / (0.1 * s**2 + 3.0 * s), None)
+    >>> found.terms.round(9).tolist(), found.integrators
+    ([0.0, 3.0, 0.1, 0.0], 1)
+    """
+    error = np.full(len(frequency), MISFIT / MISFIT_IN_DEVIATIONS) if deviation is None else deviation
+    error = np.maximum(error, 1e-9)
+    for reach in REACHES:
+        count = max(FEWEST, int(np.searchsorted(frequency, reach * frequency[0], side="right")))
+        terms, covariance, misfit = _fit(frequency[:count], value[:count], error[:count])
+        allowed = np.maximum(MISFIT, MISFIT_IN_DEVIATIONS * error[:count])
+        closely = bool(np.all(misfit <= allowed))
+        if closely:
+            break
+    # errors of neighbours may all be one: no number of them makes the fit surer
+    together = NEIGHBOURS if deviation is None else float(count)
+    size = np.abs(terms) * (2.0 * np.pi * frequency[0]) ** np.arange(TERMS)
+    fits = np.max(misfit) < ROUGHEST and size[3] < MOST_OF_LAST * np.max(size[:3])
+    return LowFrequencies(float(frequency[0]), terms, together * covariance, bool(fits), closely)
+
+
+def _fit(f: Floats, P: Complexes, error: Floats) -> tuple[Floats, Floats, Floats]:
+    """Terms, their covariance, and how far P times the fit is from 1 at each frequency."""
+    scale = (2.0 * np.pi * f[-1]) ** np.arange(TERMS)
+    equations = P[:, None] * (2j * np.pi * f[:, None]) ** np.arange(TERMS) / scale
+    weighted = np.concatenate([equations.real, equations.imag]) / np.tile(error, 2)[:, None]
+    size = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
+    wanted = np.concatenate([1.0 / error, np.zeros(len(f))])
+    inverse = np.linalg.pinv(weighted / size, rcond=1e-12) / size[:, None]
+    terms = inverse @ wanted
+    misfit = np.abs(equations @ terms - 1.0)
+    spread = max(1.0, float(np.sum((misfit / error) ** 2)) / max(2 * len(f) - TERMS, 1))
+    # errors are complex, of this deviation: half of its square in each part
+    covariance = spread * 0.5 * (inverse @ inverse.T)
+    return terms / scale, covariance / np.outer(scale, scale), misfit

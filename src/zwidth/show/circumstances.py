@@ -1,18 +1,21 @@
-"""The circumstances of a result in words: its computer, its operator, and what a linear answer leaves out."""
+"""The circumstances of a result in words: its computer, its operator, and what a linear answer leaves out.
+
+The members of a family of devices in words.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.show.moment_units import speaks_of_moments, spoken_unit
 from zwidth.show.output import printable
-from zwidth.show.units import as_written, typed
+from zwidth.show.units import as_written, speaks_of_moments, spoken_unit, typed
 
 if TYPE_CHECKING:
     from zwidth.loop.controller import Butterworth, Controller, FirstOrder
     from zwidth.model.load import Load
+
 
 AS_GIVEN: Final = "as given"  # a plant that no model reduces; an operator that the device file describes
 
@@ -91,3 +94,24 @@ def _filter(low_pass: FirstOrder | Butterworth) -> str:
 
 def _given(value: float, unit: str = "") -> str:
     return typed(as_written(value, unit))
+
+
+def value_text(value: Any) -> str:
+    """A member's value, in four digits where it is a number.
+
+    >>> value_text(30004.0), value_text(0.74483), value_text("thesis-arm")
+    ('30000', '0.7448', 'thesis-arm')
+    """
+    if isinstance(value, str):
+        return value
+    return f"{float(f'{value:.3e}'):.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
+
+
+def member_text(index: int, values: Mapping[str, Any]) -> str:
+    """A member by its number and its values.
+
+    >>> member_text(3, {"plant.mass_kg": 0.1})
+    '3 (plant.mass_kg = 0.1)'
+    """
+    pairs = ", ".join(f"{path} = {printable(value_text(value))}" for path, value in values.items())
+    return f"{index} ({pairs})"

@@ -1,21 +1,36 @@
-"""Labelled arrays as files: NetCDF for Python, Julia and R, MAT for MATLAB and Octave."""
+"""Labelled arrays as files: NetCDF for Python, Julia and R, MAT for MATLAB and Octave.
+
+A study's results as files that are written piece by piece, so that they may be larger than the memory.
+"""
 
 from __future__ import annotations
 
 import re
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.show.output import OutputError, replacing
+from zwidth.show.output import OutputError, csv_text, replacing
+from zwidth.study.designs.sweep_data import (
+    DESIGN,
+    column_attributes,
+    coordinates,
+    dataset_attributes,
+    status_flags,
+    table_pieces,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from zwidth.study.designs.sweep import Sweep
+
 
 HEADER: Final = 116  # bytes of text that a MAT file begins with
 LONGEST_NAME: Final = 63  # letters of a name in MATLAB
@@ -114,3 +129,157 @@ def _cells(values: np.ndarray) -> np.ndarray:
 
 
 _WRITERS: Final = {".nc": _netcdf, ".mat": _matlab}
+
+
+CHUNK: Final = 1 << 16  # designs in each chunk of a zarr folder, at most
+Columns = Mapping[str, Sequence[Any]]
+
+
+def write_sweep_csv(path: Path, sweep: Sweep, renamed: Callable[[Any], Any] = dict) -> None:
+    """Write a study's designs as a table, one a row, whole or not at all.
+
+    renamed  changes the names of the columns
+    Raises   OutputError  where the file cannot be written
+    """
+    with replacing(path) as draft, open(draft, "w", encoding="utf-8", newline="\n") as file:
+        header = ""
+        for piece in table_pieces(sweep):
+            columns: Columns = renamed(piece)
+            if not header:
+                header = csv_text({name: [] for name in columns})
+                file.write(header)
+            file.write(csv_text(columns)[len(header) :])
+
+
+def write_sweep_zarr(path: Path, sweep: Sweep) -> None:
+    """Write a study's dataset as a zarr folder (version 2, which knows texts), whole or not at all.
+
+    It holds what `Sweep.dataset` has, and xarray opens it.
+    path    where nothing is yet
+    Raises  OutputError  where it cannot be written
+    """
+    import xarray as xr
+    import zarr
+
+    with new_folder(path) as draft:
+        listed = sweep.job.sampling.kind == "grid"
+        along = coordinates(sweep, 0, 0 if not listed else sweep.job.count) if listed else {}
+        xr.Dataset(coords=along, attrs=dataset_attributes(sweep)).to_zarr(
+            draft, mode="w", zarr_format=2, consolidated=False
+        )
+        group = zarr.open_group(str(draft), mode="r+", zarr_format=2)
+        if not listed:
+            _write_coordinates(group, sweep)
+        _write_columns(group, sweep)
+        zarr.consolidate_metadata(str(draft), zarr_format=2)
+
+
+def _write_columns(group: Any, sweep: Sweep) -> None:
+    """The values and status of each measure, over the study's axes."""
+    sampling = sweep.job.sampling
+    shape = sampling.shape
+    dims = [axis.key for axis in sampling.axes] if sampling.kind == "grid" else [DESIGN]
+    chunks = _chunks(shape)
+    arrays = []
+    for n, one in enumerate(sweep.job.columns):
+        attributes = column_attributes(sweep, n)
+        values = _array(group, one.name, shape, chunks, np.dtype(np.float64), np.nan, dims, attributes)
+        flags = {key: getattr(value, "tolist", lambda v=value: v)() for key, value in status_flags().items()}
+        status = _array(group, f"{one.name}_status", shape, chunks, np.dtype(np.uint8), None, dims, flags)
+        arrays.append((values, status))
+    pieces = ((np.asarray(cells.values), np.asarray(cells.status)) for _, cells in sweep.cells.pieces())
+    cut = _cut(pieces, _lengths(shape, chunks))
+    for place, (values, status) in zip(_places(shape, chunks), cut, strict=True):
+        size = tuple(part.stop - part.start for part in place)
+        for n, (array_of_values, array_of_status) in enumerate(arrays):
+            array_of_values[place] = values[:, n].reshape(size)
+            array_of_status[place] = status[:, n].reshape(size)
+
+
+def _write_coordinates(group: Any, sweep: Sweep) -> None:
+    """The axes of a study whose designs are listed one after the other."""
+    count = sweep.job.count
+    types = {name: column[1].dtype for name, column in _named(sweep, 0, min(count, CHUNK))}
+    # texts are as long as the longest: of listed values all are looked at
+    for axis in sweep.job.sampling.axes:
+        if axis.values and types[axis.key].kind == "U":
+            texts = [len(str(text)) for _, part in _blocks(sweep, axis.key) for text in part]
+            types[axis.key] = np.dtype(f"<U{max(texts)}")
+    arrays: dict[str, Any] = {}
+    for first in range(0, count, CHUNK):
+        last = min(first + CHUNK, count)
+        for name, column in _named(sweep, first, last):
+            if name not in arrays:
+                attributes = column[2] if len(column) > 2 else {}
+                fill = np.nan if types[name].kind == "f" else None
+                shape, chunks = (count,), (min(CHUNK, count),)
+                arrays[name] = _array(group, name, shape, chunks, types[name], fill, [DESIGN], attributes)
+            arrays[name][first:last] = column[1]
+    group.attrs["coordinates"] = " ".join(name for name in arrays if name != DESIGN)
+
+
+def _named(sweep: Sweep, first: int, last: int) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    for name, column in coordinates(sweep, first, last).items():
+        yield name, (DESIGN, column) if name == DESIGN else column
+
+
+def _blocks(sweep: Sweep, name: str) -> Iterator[tuple[int, Any]]:
+    for first in range(0, sweep.job.count, CHUNK):
+        yield first, coordinates(sweep, first, min(first + CHUNK, sweep.job.count))[name][1]
+
+
+def _array(
+    group: Any,
+    name: str,
+    shape: tuple[int, ...],
+    chunks: tuple[int, ...],
+    dtype: np.dtype[Any],
+    fill: float | None,
+    dims: Sequence[str],
+    attributes: Mapping[str, Any],
+) -> Any:
+    stated = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
+    return group.create_array(
+        name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill, attributes=stated, write_data=False
+    )
+
+
+def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Chunks of consecutive designs: the last axes whole, a part of one, and single places of those before.
+
+    >>> _chunks((3, 1000, 1000))
+    (1, 65, 1000)
+    """
+    chunks, size = [1] * len(shape), 1
+    for n in reversed(range(len(shape))):
+        chunks[n] = max(1, min(shape[n], CHUNK // size))
+        if chunks[n] < shape[n]:
+            break
+        size *= shape[n]
+    return tuple(chunks)
+
+
+def _places(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    """Where each chunk lies, in the order of the designs."""
+    counts = tuple(-(-length // chunk) for length, chunk in zip(shape, chunks, strict=True))
+    for place in np.ndindex(counts):
+        yield tuple(
+            slice(at * chunk, min((at + 1) * chunk, length))
+            for at, chunk, length in zip(place, chunks, shape, strict=True)
+        )
+
+
+def _lengths(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[int]:
+    return (prod(part.stop - part.start for part in place) for place in _places(shape, chunks))
+
+
+def _cut(pieces: Iterable[tuple[Any, Any]], lengths: Iterable[int]) -> Iterator[tuple[Any, Any]]:
+    """Consecutive rows of two arrays, given in pieces, in parts of other lengths."""
+    coming = iter(pieces)
+    held: list[tuple[Any, Any]] = []
+    for length in lengths:
+        while sum(len(values) for values, _ in held) < length:
+            held.append(next(coming))
+        values, status = (np.concatenate([piece[n] for piece in held]) for n in range(2))
+        yield values[:length], status[:length]
+        held = [(values[length:], status[length:])]

@@ -1,8 +1,14 @@
-"""Where everything of a posed mechanism is: links, joints, base and handle, for whoever draws it."""
+"""Where everything of a posed mechanism is: links, joints, base and handle, for whoever draws it.
+
+How the drawn points of a mechanism move with the coordinates of its plant.
+
+A plant as masses in a row, where it is such a row.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,6 +16,9 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.model.mechanism import FIXED, Mechanism
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.motions import Motions
+from zwidth.model.plant import Plant
 from zwidth.model.posture import LinkPoints, Posture, link_points
 
 Place = tuple[int, Floats]  # a link, -1 for the base, and a point (3,) of its frame [m]
@@ -169,3 +178,82 @@ def _is_free(mechanism: Mechanism, entry: int) -> bool:
     """Whether an entry belongs to a free link, which has six of them and no joint that holds it."""
     names = [name.partition("/")[0] for name in mechanism.links.names]
     return names.count(names[entry]) > 3
+
+
+@dataclass(frozen=True)
+class SceneRates:
+    """Motion of each point of a `MechanismScene` per unit of each of n coordinates [m/rad], or [1] of a length.
+
+    strokes  (k, 3, n)  of all links one after another;   joints (j, 3, n), driven (d, 3, n), handle (3, n)
+    """
+
+    strokes: Floats
+    joints: Floats
+    driven: Floats
+    handle: Floats
+
+
+def mode_strokes(mechanism: Mechanism, posture: Posture, count: int | None = None) -> SceneRates:
+    """Motion of the drawn points with the coordinates of the full model's plant, the loops kept closed.
+
+        x' = J B p'        as in `model.motions`; times the shape of a mode in p, how it moves the picture
+
+    count    n of the plant: driven and free joints, bending, then motors and an arm, with which no link moves;
+             None: without the latter
+    Returns  SceneRates of a single posture that is OK
+    """
+    motions = Motions(pack(mechanism), posture.angles, mechanism.flexible)
+    unmoving = 0 if count is None else count - motions.count
+    placed = link_points(mechanism, posture)
+    known: dict[tuple[int, bytes], Floats] = {}
+
+    def rates(places: Sequence[Place]) -> Floats:
+        found = np.zeros((len(places), 3, motions.count + unmoving))
+        for k, (link, local) in enumerate(places):
+            key = (link, local.tobytes())  # strokes go through a joint many times
+            if key not in known:
+                known[key] = motions.point(link, local).speed
+            found[k, :, : motions.count] = known[key]
+        return found
+
+    return SceneRates(
+        strokes=rates([place for stroke in stroke_places(mechanism, placed) for place in stroke]),
+        joints=rates(joint_places(mechanism)),
+        driven=rates([(int(joint), np.zeros(3)) for joint in mechanism.drives.joint]),
+        handle=rates([(mechanism.handle_link, np.asarray(mechanism.handle_point))])[0],
+    )
+
+
+@dataclass(frozen=True)
+class MassChain:
+    """Masses in a row.
+
+    mass       (n,)     [kg]
+    stiffness  (n + 1,)  springs: ground to first, between neighbours, last to ground [N/m]
+    damping    (n + 1,)  dampers in the same places [N s/m]
+    """
+
+    mass: Floats
+    stiffness: Floats
+    damping: Floats
+
+
+def as_chain(plant: Plant) -> MassChain | None:
+    """The plant as a row of masses joined to their neighbours and to the ground at the ends; None if it is not."""
+    n = plant.size
+    links = []
+    if np.any(plant.mass != np.diag(np.diag(plant.mass))):
+        return None
+    for matrix in (plant.stiffness, plant.damping):
+        scale = float(np.max(np.abs(matrix))) or 1.0
+        between = -np.diag(matrix, 1)
+        far = matrix - np.diag(np.diag(matrix)) + np.diag(between, 1) + np.diag(between, -1)
+        to_ground = matrix.sum(axis=1)
+        if np.any(far != 0.0) or np.any(between < 0.0) or np.any(np.abs(to_ground[1:-1]) > 1e-12 * scale):
+            return None
+        to_ground = np.where(np.abs(to_ground) > 1e-12 * scale, to_ground, 0.0)
+        last = to_ground[-1] if n > 1 else 0.0
+        if to_ground[0] < 0.0 or last < 0.0:
+            return None
+        links.append(np.concatenate([[to_ground[0]], between, [last]]))
+    return MassChain(np.diag(plant.mass), links[0], links[1])

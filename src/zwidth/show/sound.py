@@ -20,8 +20,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.contact.motion_verdict import QUIET, dominant_frequency
-from zwidth.contact.time_response import TimeResponse
+from zwidth.contact.time_response import QUIET, TimeResponse, dominant_frequency
 from zwidth.show.output import replacing
 
 Pitch = float | Literal["auto"] | None

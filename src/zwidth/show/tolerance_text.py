@@ -10,10 +10,10 @@ from zwidth.show.units import amount, number, percent, typed
 
 if TYPE_CHECKING:
     from zwidth.study.tolerances.band import BandWall
-    from zwidth.study.tolerances.indices import Index, Indices
+    from zwidth.study.tolerances.distribution import Tolerance
     from zwidth.study.tolerances.intervals import Interval
+    from zwidth.study.tolerances.outcomes import Index, Indices
     from zwidth.study.tolerances.result import ToleranceStudy
-    from zwidth.study.tolerances.tolerance import Tolerance
 
 UNDECIDED: Final = "undecided"  # an outcome
 MUCH_CUT: Final = 0.01  # share of a distribution that is cut off, and said to be

@@ -14,8 +14,8 @@ from tests.study_sizes import study_size
 from zwidth.chart import eigenvalues, measured_chart, stability_chart
 from zwidth.loop import Butterworth, Controller, Loop
 from zwidth.model import Plant, ResponseError, integrators_of
-from zwidth.model.joint_confidence import joint_radius
-from zwidth.model.sweep_response import sweep_response
+from zwidth.model.raw_sweep import sweep_response
+from zwidth.model.response import joint_radius
 
 CLAIMED = 0.95
 BATCH = study_size(continuous=100, full=250)

@@ -10,8 +10,7 @@ import pytest
 from systems import mass, two_mass
 
 from zwidth.chart import TracedEdge, robust_chart
-from zwidth.chart.robust.chart import robust_chart_of_members
-from zwidth.chart.robust.edge_check import walls_off_edge
+from zwidth.chart.robust.chart import robust_chart_of_members, walls_off_edge
 from zwidth.chart.robust.members import chart_members
 from zwidth.loop import Controller, Loop
 

@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from zwidth.chart import Box, multi_chart, trace_curves
-from zwidth.chart.off_circle import sides_of_circle
 from zwidth.chart.several_directions.completeness import shows_all_walls, walls_beside_regions
+from zwidth.chart.verdict import sides_of_circle
 from zwidth.loop import Controller, MultiLoop, WallMatrices
 from zwidth.model import MultiPlant
 

@@ -1,20 +1,24 @@
-"""The stability chart of a measured device, without a model: boundary by its response, cells by counting roots."""
+"""The stability chart of a measured device, without a model: boundary by its response, cells by counting roots.
+
+How far a fitted plant stands for a measured device: its misfit, and its largest stiffness beside the data's.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import nan
-from typing import Any, ClassVar
+from math import isnan, nan
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.chart.arcs import Arcs
+from zwidth.chart.arcs import Arcs, Window, cut_at_holes, window_of
 from zwidth.chart.area import quadrant_area
+from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_base import BoundaryArc, Chart, DrawnChart
 from zwidth.chart.measured.boundary import (
     Boundary,
@@ -24,12 +28,16 @@ from zwidth.chart.measured.boundary import (
     refine_angles,
     sample_boundary,
 )
-from zwidth.chart.measured.doubt import Doubt, doubt_of
-from zwidth.chart.measured.extreme_walls import angles_at_wall, largest_damping, refine_peak
-from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.chart.measured.doubt import Doubt, EdgeFrequencies, MeasuredVerdicts, doubt_of, judge_measured
+from zwidth.chart.measured.loop import MeasuredLoop, UnusableRange
 from zwidth.chart.measured.stable_regions import (
+    Band,
     StableRegions,
+    angles_at_wall,
+    band_rings,
     has_stable_inner_side,
+    largest_damping,
+    refine_peak,
     regions_within,
     window_of_regions,
 )
@@ -40,15 +48,11 @@ from zwidth.chart.measured.stiffness_limits import (
     damping_lines,
     largest_possible,
 )
-from zwidth.chart.measured.uncertainty_band import Band, band_rings
-from zwidth.chart.measured.usable_frequencies import UnusableRange
-from zwidth.chart.measured.verdict import EdgeFrequencies, MeasuredVerdicts, judge_measured
-from zwidth.chart.rings import Window, cut_at_holes, window_of
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.loop.controller import Controller
+from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
-from zwidth.model.joint_confidence import CONFIDENCE, joint_radius
-from zwidth.model.response import Response, ResponseError
+from zwidth.model.response import CONFIDENCE, Response, ResponseError, joint_radius
 
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it
@@ -461,3 +465,47 @@ def _mark_on_edge(loop: MeasuredLoop, cells: StableRegions) -> Iterator[Unusable
         touched = bool(np.any(has_stable_inner_side(edge, which[:: max(1, len(which) // 200)], scale)))
         beyond = not loop.interpolation.closed and stretch.high >= 0.5 / loop.period * (1.0 - 1e-9)
         yield replace(stretch, on_edge=touched or (beyond and cells.open))
+
+
+FURTHEST: Final = 2.0  # ratio of both largest stiffnesses, beyond which the plant does not stand for the device
+
+
+def modelled_point(point: OperatingPoint) -> OperatingPoint:
+    """The operating point with a plant fitted to its measured response in its place; any other point itself.
+
+    A plant may come close to the response at every frequency that was measured, and have other stable walls all
+    the same: where the response is none of a sampled device, or ends too soon.
+
+    Raises  what `OperatingPoint.modelled` and `chart.point_chart.chart_at` raise
+            ResponseError  where the plant's largest stiffness is beyond half to twice that of the response
+    """
+    if point.response is None:
+        return point
+    document = fit_document(point)
+    both = [document[key] for key in ("stiffness_max_N_per_m", "stiffness_max_of_response_N_per_m")]
+    by_fit, by_data = both
+    if not (by_data / FURTHEST <= by_fit <= by_data * FURTHEST or all(map(isnan, both))):
+        fitted, measured = ("none" if isnan(K) else f"{K:.4g} N/m" for K in both)
+        raise ResponseError(
+            f"is not explained by masses, springs, dampers and a delay: the best plant misses it by "
+            f"{100.0 * document['misfit']:.3g} %, but its largest stiffness is {fitted}, by the response itself "
+            f"{measured}; sweep from the force command to the encoder at the loop's own samples, up to half the "
+            "sampling rate, or describe the device as a [plant]"
+        )
+    return point.modelled
+
+
+def fit_document(point: OperatingPoint) -> dict[str, Any]:
+    """The fit of a measured device at an operating point, by key and unit; largest stiffness of both [N/m],
+    of the response nominal.
+
+    Raises  what `OperatingPoint.modelled` and `chart.point_chart.chart_at` raise
+    """
+    modelled, chart = point.modelled, point.chart(decay=False)
+    assert modelled.fit is not None
+    assert isinstance(chart, MeasuredChart)
+    peak = largest_stiffness(modelled.loop)
+    return modelled.fit.document() | {
+        "stiffness_max_N_per_m": nan if peak is None else peak.stiffness,
+        "stiffness_max_of_response_N_per_m": chart.stiffness_max_nominal,
+    }

@@ -1,18 +1,28 @@
-"""The cells that a measured boundary cuts a window of the plane into, and which of them are stable."""
+"""The cells that a measured boundary cuts a window of the plane into, and which of them are stable.
+
+The largest stiffness and the largest damping of measured cells.
+
+Chords follow the curve to a share of the window, so that both are found in the whole of it first and then again in
+a small one of their own.
+
+The band along the stable walls' edge that the error of a measurement leaves in doubt.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isnan, nan
+from typing import Any
 
 import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.chart.arcs import Arcs
+from zwidth.chart.arcs import DAMPING, STIFFNESS, Arcs, Window, cut_at_holes
+from zwidth.chart.area import find_peak
 from zwidth.chart.measured.boundary import Boundary, real_root, refine_angles, sample_boundary, wall_scales
 from zwidth.chart.measured.loop import MeasuredLoop
-from zwidth.chart.rings import Window
 
 CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
 GRID = 1e-11  # to which lines are noded, as a share of the window
@@ -147,3 +157,163 @@ def _walls_in_sectors(loop: MeasuredLoop, beside: float) -> Floats:
     along = beside * np.array([[-w0, 1.0], [-w1, 1.0]])
     signs = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
     return np.asarray(np.array([h0 - B * w0, B]) + signs @ along)
+
+
+def refine_peak(loop: MeasuredLoop, cells: StableRegions) -> tuple[tuple[float, float], StableRegions]:
+    """The wall of the largest stiffness with K > 0, B >= 0, nan if there is none, and the cells round it."""
+    peak, nearby = _stiffest(cells), cells
+    for _ in range(2):
+        if isnan(peak[0]):
+            break
+        near = _around(peak, nearby.box, 1e-3, 2e-2)
+        closer = regions_within(loop, cells.edge, near)
+        better = _stiffest(closer)
+        if isnan(better[0]) or better[0] > near[1] - 1e-6 * (near[1] - near[0]):
+            break
+        peak, nearby = better, closer
+        if near[2] < peak[1] < near[3]:
+            break
+    return peak, nearby
+
+
+def _stiffest(cells: StableRegions) -> tuple[float, float]:
+    """The corner or crossing of B = 0 of largest K, with K > 0 and B >= 0; nan where there is none."""
+    # corners are noded to 1e-11 of the window: what is stiff by less than 1e-9 of it may be no wall
+    peak = find_peak(cells.edge_arcs, (), 10.0 * (cells.box[1] - cells.box[0]))
+    return (peak.stiffness, peak.damping) if peak else (nan, nan)
+
+
+def _around(wall: tuple[float, float], box: Window, of_K: float, of_B: float) -> Window:
+    """The window that extends these shares of a box to either side of a wall."""
+    K, B = wall
+    half_K, half_B = of_K * (box[1] - box[0]), of_B * (box[3] - box[2])
+    return K - half_K, K + half_K, B - half_B, B + half_B
+
+
+def angles_at_wall(cells: StableRegions, wall: tuple[float, float]) -> list[float]:
+    """The angles of the branches that pass through a wall, ascending: one, or two at a corner."""
+    if isnan(wall[0]):
+        return []
+    K0, K1, B0, B1 = cells.box
+    scale = np.array([K1 - K0, B1 - B0])
+    ends = (cells.edge.segments.reshape(-1, 2, 2) - np.array(wall)) / scale
+    a, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    share = np.clip(-np.einsum("ij,ij->i", a, along) / length, 0.0, 1.0)
+    away = np.hypot(*(a + share[:, None] * along).T)
+    angles: list[float] = []
+    near = np.flatnonzero(away < 1e-4)
+    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else []:
+        k = run[np.argmin(away[run])]
+        at = cells.edge.angle_index[k]
+        if at >= 0:
+            low, high = cells.edge.angles[at], cells.edge.angles[at + 1]
+            angles.append(float(low + share[k] * (high - low)))
+        elif at > -3:
+            angles.append(0.0 if at == -1 else float(np.pi))
+    return sorted(angles)
+
+
+def largest_damping(loop: MeasuredLoop, cells: StableRegions) -> float:
+    """Supremum of B >= 0 stable for all small K > 0: on a line close to K = 0, then in a window there."""
+    largest, nearby = 0.0, cells
+    for _ in range(2):
+        _, walls = nearby.edge_arcs.crossings(STIFFNESS, 1e-6 * (nearby.box[1] - nearby.box[0]))
+        top = float(np.max(walls[:, DAMPING], initial=0.0))
+        if top <= 0.0:
+            break
+        largest = top
+        nearby = regions_within(loop, cells.edge, _around((0.0, largest), cells.box, 1e-3, 1e-3))
+    return largest
+
+
+CORNERS = 24  # of a polygon round an ellipse
+MOST_ELLIPSES = 600
+LARGEST_DRAWN = 0.9  # relative error of the response whose ellipse is drawn at most
+
+
+@dataclass(frozen=True)
+class Band:
+    """The doubtful walls along the stable set's edge.
+
+    regions         rings (k, 2) of [stiffness, damping] that cover them
+    stiffness_low   the largest stiffness (K > 0, B >= 0) that is stable for certain [N/m]; nan: none
+    stiffness_high  the largest that may be stable [N/m]; nan: none, inf: nothing limits it
+    meaning         what the band covers, in words
+    """
+
+    regions: tuple[Floats, ...]
+    stiffness_low: float
+    stiffness_high: float
+    meaning: str
+
+    def document(self) -> dict[str, Any]:
+        """The band as numbers and lists."""
+        return {
+            "stiffness_low_N_per_m": self.stiffness_low,
+            "stiffness_high_N_per_m": self.stiffness_high,
+            "meaning": self.meaning,
+            "regions": [ring.tolist() for ring in self.regions],
+        }
+
+
+def band_rings(loop: MeasuredLoop, cells: StableRegions) -> tuple[Floats, ...]:
+    """Rings that cover the walls in doubt along the stable set's edge.
+
+    With an error of radius r in P, over |P|, a wall is in doubt where |K + B w - h| <= r |K + B w|: an ellipse
+    beside each point of the curve. The band is the ellipses along the edge, neighbours joined.
+    """
+    scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
+    covered = _doubtful_walls(loop, cells, scale)
+    parts = [part for part in shapely.get_parts(covered) if isinstance(part, shapely.Polygon)]
+    return tuple(np.array(piece.exterior.coords) * scale for part in parts for piece in cut_at_holes(part))
+
+
+def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> shapely.Geometry:
+    """The ellipses along the stable set's edge, in units of `scale`.
+
+    Where two arcs meet, each goes on beyond the corner as far as the other leaves it in doubt: there the edge
+    would run if both were as far out as they can be.
+    """
+    edge = cells.edge
+    curve = np.flatnonzero(edge.angle_index >= 0)
+    segments = edge.segments[curve]
+    low, high = np.minimum(segments[:, :2], segments[:, 2:]), np.maximum(segments[:, :2], segments[:, 2:])
+    K0, K1, B0, B1 = cells.box
+    curve = curve[np.all((high >= (K0, B0)) & (low <= (K1, B1)), axis=1)]
+    flags = has_stable_inner_side(edge, curve, scale)
+    covered = _ellipses(loop, cells, scale, curve[flags])
+    starts = edge.segments[curve, :2] / scale
+    beyond = flags | shapely.contains_xy(covered, starts[:, 0], starts[:, 1])
+    return _ellipses(loop, cells, scale, curve[beyond])
+
+
+def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Ints) -> shapely.Geometry:
+    """The union of convex hulls of each two neighbouring ellipses along these chords."""
+    edge = cells.edge
+    every = max(1, len(curve) // MOST_ELLIPSES)
+    hulls: list[shapely.Geometry] = []
+    for run in np.split(curve, np.flatnonzero(np.diff(curve) > 1) + 1) if len(curve) else []:
+        at = edge.angle_index[run]
+        at = np.unique(np.concatenate([at[::every], at[-1:], at[-1:] + 1]))
+        outlines = _outlines(loop, edge.angles[at], edge.walls[at]) / scale
+        points = np.concatenate([outlines[:-1], outlines[1:]], axis=1)
+        number = np.repeat(np.arange(len(points)), 2 * CORNERS)
+        hulls.extend(shapely.convex_hull(shapely.multipoints(points.reshape(-1, 2), indices=number)))
+    return shapely.union_all(hulls)
+
+
+def _outlines(loop: MeasuredLoop, theta: Floats, walls: Floats) -> Floats:
+    """Points (n, CORNERS, 2) round the ellipses of doubt at walls (n, 2) of the curve.
+
+    |c - h| <= r |c| is a disk round h / (1 - r^2) of radius r |h| / (1 - r^2). Where the error is as large as the
+    response no ellipse is left, and the largest that is drawn stands for it.
+    """
+    w, h = loop.w(theta), loop.h(theta)
+    r = np.minimum(loop.relative_error(theta), LARGEST_DRAWN)
+    size = (r * np.abs(h) + loop.error_below(theta) * (theta < loop.angles[0])) / (1.0 - r * r)
+    circle = np.exp(2j * np.pi * np.arange(CORNERS) / CORNERS) / np.cos(np.pi / CORNERS)
+    offset = (r * r / (1.0 - r * r) * h)[:, None] + size[:, None] * circle
+    dB = offset.imag / w.imag[:, None]
+    dK = offset.real - dB * w.real[:, None]
+    return np.asarray(walls[:, None, :] + np.stack([dK, dB], axis=2))

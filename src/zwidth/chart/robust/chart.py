@@ -1,4 +1,7 @@
-"""Robust charts: the walls that every one of many loops renders stably, and which of them sets each limit."""
+"""Robust charts: the walls that every one of many loops renders stably, and which of them sets each limit.
+
+Whether the walls of a common edge are on the stability limit of the member that binds, and of no other.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,22 @@ import shapely
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.chart.arc_kernels import CHORD
 from zwidth.chart.arcs import ArcPoints
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_edge import common_edge
-from zwidth.chart.robust.common_set import Shapes, incompatible_members, intersect_members
-from zwidth.chart.robust.edge_check import walls_off_edge
-from zwidth.chart.robust.members import Member, chart_members, member_polygons
+from zwidth.chart.robust.instability import perhaps_unstable
+from zwidth.chart.robust.members import (
+    Member,
+    Shapes,
+    chart_members,
+    incompatible_members,
+    intersect_members,
+    member_polygons,
+)
 from zwidth.chart.traced_edge import TracedEdge
-from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge
+from zwidth.chart.tracer import CHORD
+from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge, sides_of_circle
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require, wrong_type
 
@@ -165,3 +174,31 @@ def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, floa
         areas = shapely.area(shapely.clip_by_rect(cells, 0.0, 0.0, right, top))
     best = list(charted)[int(np.argmax(areas))]
     return best, charted[best].edge.area
+
+
+def walls_off_edge(edge: TracedEdge, members: Sequence[Member]) -> Floats:
+    """Walls (k, 2) of [K, B] of an edge of several members that are not on the stability limit.
+
+    Their largest root is off the circle for the member that binds there, or outside it for another one.
+
+    edge     its arcs name the members by their index
+    members  all of which the edge is that of the common set
+    """
+    points = edge.arc_points
+    if not points:
+        return np.empty((0, 2))
+    walls = np.vstack([np.column_stack([K, B]) for _, K, B in points])
+    binding = np.repeat(edge.arcs.member, [len(K) for _, K, _ in points])
+    K, B = np.ascontiguousarray(walls.T)
+    off = np.zeros(len(walls), dtype=bool)
+    for member in members:
+        tracer, binds = member.tracer, binding == member.index
+        if tracer.is_high_degree:
+            suspect = tracer.flags_by_phase(walls, np.zeros(len(walls)), 0) <= 0
+        else:
+            suspect = perhaps_unstable(tracer.polynomials, K, B)
+        judged = ~off & (binds | suspect)
+        if judged.any():
+            side = sides_of_circle(member.tracer.loop, *walls[judged].T)
+            off[judged] = (side > 0.0) | (binds[judged] & (side != 0.0))
+    return np.asarray(walls[off])

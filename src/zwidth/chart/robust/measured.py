@@ -18,13 +18,12 @@ from numpy.typing import ArrayLike
 from shapely.geometry.polygon import orient
 
 from zwidth.arrays import Floats
+from zwidth.chart.arcs import cut_at_holes
 from zwidth.chart.chart_base import BoundaryArc
 from zwidth.chart.measured.chart import MeasuredChart
-from zwidth.chart.measured.verdict import MeasuredVerdicts
-from zwidth.chart.rings import cut_at_holes
+from zwidth.chart.measured.doubt import MeasuredVerdicts
 from zwidth.chart.robust.common_chart import CommonChart, lost_share
-from zwidth.chart.robust.common_set import incompatible_shapes
-from zwidth.chart.robust.members import polygonal
+from zwidth.chart.robust.members import incompatible_shapes, polygonal
 from zwidth.chart.verdict import STABLE, UNDECIDED
 
 CHORD: Final = 1e-5  # share of a chart's size to which chords of measured charts follow the edge

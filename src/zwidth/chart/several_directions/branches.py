@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.chart.several_directions.box import Box
 from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, correct
+from zwidth.chart.several_directions.wall_curves import Box
 
 # A wall continues in another one if it misses it by less than these shares of their distance, and of what it
 # misses the next best by.

@@ -13,17 +13,24 @@ from shapely.geometry.polygon import orient
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.chart_base import DrawnChart
-from zwidth.chart.off_circle import sides_of_circle
-from zwidth.chart.several_directions.box import Box
-from zwidth.chart.several_directions.branch import Branch
-from zwidth.chart.several_directions.completeness import shows_all_walls, walls_beside_regions
+from zwidth.chart.several_directions.completeness import (
+    BESIDE,
+    ROOM,
+    Raster,
+    box_of_edges,
+    cut_lines,
+    missed_angles,
+    shows_all_walls,
+    stable_polygons,
+    try_orders,
+    try_walls,
+    walls_beside_regions,
+)
 from zwidth.chart.several_directions.curve_set import CurveSet, trace_curves
-from zwidth.chart.several_directions.polygon_arcs import ring_arcs
-from zwidth.chart.several_directions.raster import BESIDE, Raster, missed_angles, try_orders, try_walls
-from zwidth.chart.several_directions.stable_polygons import ROOM, box_of_edges, cut_lines, stable_polygons
-from zwidth.chart.several_directions.wall_curves import WallCurve
+from zwidth.chart.several_directions.polygon_arcs import Branch, ring_arcs
+from zwidth.chart.several_directions.wall_curves import Box, WallCurve
 from zwidth.chart.traced_edge import TracedEdge
-from zwidth.chart.verdict import Verdicts, verdicts
+from zwidth.chart.verdict import Verdicts, sides_of_circle, verdicts
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.model.argument_checks import require

@@ -2,6 +2,28 @@
 
 Of the equation of each set of coupled directions all walls are known at the sampled angles (`wall_equation`); they
 are joined to branches (`branches`), and points are added between them until chords follow (`curve_chords`).
+
+Branches with so many points that chords follow them.
+
+Halfway along each chord a point of the curve is found by correction across it. It shows how far the curve is from
+the chord, whether it turns so much that it may cross itself in a small loop, and whether it is that curve at all:
+another one may run close by in walls, at another angle. Where the point does not fit, more angles are sampled.
+
+Where a curve of pairs of roots ends: at theta = 0 or pi, in a wall with a double root at z = 1 or -1.
+
+Walls are even functions of the angle from there, so that the limit follows from a few angles close by. Nearer ones
+are all rounding, and further ones see the curve turn: those are taken of which four tell the same as three.
+
+Directions along which a law has stiffness only, or damping only: one number moves their roots, k or b.
+
+Their walls with a pair of roots on the circle are lines of one number x at a few angles: those at which an
+eigenvalue x of F + x D Y, or of F + x w E Y, is real.
+
+Directions that a plant does not couple: each set of them has an equation of its own.
+
+Under one law for several directions these can be turned into each other. Of a plant that has the same response
+along two of them, all walls would be there twice, which no curve can be followed through; turned so that they are
+not coupled, they are told apart, and equal ones are left out.
 """
 
 from __future__ import annotations
@@ -10,19 +32,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from scipy.optimize import brentq, linear_sum_assignment
 
-from zwidth.arrays import Floats
-from zwidth.chart.several_directions.box import Box
-from zwidth.chart.several_directions.branches import Samples
-from zwidth.chart.several_directions.curve_chords import followed_branches
-from zwidth.chart.several_directions.curve_limits import with_limits
-from zwidth.chart.several_directions.loop_features import first_angles
-from zwidth.chart.several_directions.one_number import pair_lines
-from zwidth.chart.several_directions.plant_parts import wall_equations
+from zwidth.arrays import Complexes, Flags, Floats, Ints
+from zwidth.chart.several_directions.branches import Samples, trace_branches
 from zwidth.chart.several_directions.real_roots import RealRootEquation, real_root_walls
-from zwidth.chart.several_directions.traced_curve import TracedCurve
-from zwidth.chart.several_directions.wall_curves import StraightLine, WallCurve
-from zwidth.chart.several_directions.wall_equation import WallEquation
+from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, TracedCurve, correct
+from zwidth.chart.several_directions.wall_curves import Box, StraightLine, WallCurve
+from zwidth.chart.several_directions.wall_equation import WallEquation, first_angles, on_circle
 from zwidth.loop.multi_loop import MultiLoop
 
 # Steps of a curve of real roots across a box, before its chords are looked at.
@@ -110,3 +127,254 @@ def _steps_across(real: RealRootEquation, box: Box) -> Floats:
     s = 0.5 * (corners[:, 0] / real.period - corners[:, 1] * real.estimate)
     margin = 0.5 * (s.max() - s.min())
     return np.linspace(s.min() - margin, s.max() + margin, STEPS)
+
+
+# Rounds in which chords are halved; those are looked at that come as close to the box as this share of its size.
+HALVINGS, BESIDE = 24, 0.1
+# Chords are halved where the parameter, halfway, is this share of its step away from the middle, and more than
+# rounding.
+BENT, ROUNDING = 0.5, 1e-8
+# Where a curve turns so much from point to point (the cosine of the angle), chords are halved, all down to this
+# share of the box: it may cross itself in a small loop.
+STRAIGHT, SMALLEST = 0.95, 1e-9
+# A point halfway is no further from its chord than this share of the chord, and its parameter no further outside
+# of the chord's than the chord's is long.
+NEAR_CHORD: Final = 0.5
+# Rounds in which angles are sampled where points did not fit, and at which shares of the steps there.
+ROUNDS, SHARES = 4, (0.25, 0.5, 0.75)
+
+
+def followed_branches(
+    equation: RootEquation, samples: Samples, box: Box, scale: Floats, tolerance: float
+) -> tuple[Samples, list[CurvePoints]]:
+    """All branches that run through a box, followed by chords there; and the samples that this took.
+
+    scale      (3,) size of u, k T and b
+    tolerance  largest distance of a chord from its branch, in shares of the box
+    """
+    for attempt in range(ROUNDS):
+        samples, branches = trace_branches(equation, samples, box)
+        inside = [branch for branch in branches if box.meets(branch.points[:, 1:]).any()]
+        followed, unfit = [], [np.empty(0)]
+        for branch in inside:
+            traced, parameters = _followed(equation, branch, box, scale, tolerance)
+            followed.append(traced)
+            unfit.append(parameters)
+        more = np.setdiff1d(np.concatenate(unfit), samples.parameters)
+        if not len(more) or attempt + 1 == ROUNDS:
+            break
+        samples = samples.with_more(equation, more)
+    return samples, followed
+
+
+def _followed(
+    equation: RootEquation, branch: CurvePoints, box: Box, scale: Floats, tolerance: float
+) -> tuple[CurvePoints, Floats]:
+    """A branch with more points, and parameters at which to sample where none fit."""
+    traced, unfit = branch.forwards(scale), [np.empty(0)]
+    loose = np.ones(len(traced.points) - 1, dtype=bool)
+    around = box.with_margin(BESIDE)
+    for _ in range(HALVINGS):
+        points, directions = traced
+        k = np.flatnonzero(loose & around.meets(points[:, 1:]))
+        if not len(k):
+            break
+        chord = points[k + 1] - points[k]
+        guess = traced.guess(k, np.full(len(k), 0.5), scale)
+        middles, along, settled = correct(equation, guess, chord / scale**2, scale)
+        along *= np.where(np.einsum("ni,ni->n", along, chord / scale) < 0.0, -1.0, 1.0)[:, None] * scale
+        fits = settled & _fits(points[k], chord, middles, scale)
+        unfit.append(_steps_between(points[k[~fits]], points[k[~fits] + 1]))
+        off = np.abs(middles - points[k] - 0.5 * chord)
+        bent = off[:, 0] > BENT * np.abs(chord[:, 0]) + ROUNDING * np.abs(middles[:, 0])
+        finer = (bent | _turns(traced, k, box)) & (np.abs(chord[:, 1:] / box.size) > SMALLEST).any(axis=1)
+        more = fits & ((off[:, 1:] / box.size > tolerance).any(axis=1) | finer)
+        at = np.concatenate([np.arange(len(points)), k[more] + 0.5])
+        order = np.argsort(at)
+        traced = CurvePoints(
+            np.vstack([points, middles[more]])[order], np.vstack([directions, along[more]])[order]
+        )
+        new = np.flatnonzero(order >= len(points))
+        loose = np.zeros(len(at) - 1, dtype=bool)
+        loose[new], loose[new - 1] = True, True
+    return traced, np.concatenate(unfit)
+
+
+def _fits(first: Floats, chord: Floats, middles: Floats, scale: Floats) -> Flags:
+    """Which points (n, 3) can lie halfway on the curve from points `first` along chords."""
+    off = np.linalg.norm((middles - first - 0.5 * chord)[:, 1:] / scale[1:], axis=1)
+    ahead = (middles - first)[:, 0] / np.where(chord[:, 0] == 0.0, np.inf, chord[:, 0])
+    return np.asarray((off <= NEAR_CHORD * np.linalg.norm(chord / scale, axis=1)) & (np.abs(ahead - 0.5) <= 1.5))
+
+
+def _steps_between(first: Floats, last: Floats) -> Floats:
+    """Parameters between those of points (n, 3), where they are more than rounding apart."""
+    u, step = first[:, 0], last[:, 0] - first[:, 0]
+    apart = np.abs(step) > ROUNDING * np.abs(u)
+    return np.asarray((u[apart, None] + step[apart, None] * np.array(SHARES)).ravel())
+
+
+def _turns(traced: CurvePoints, k: Ints, box: Box) -> Flags:
+    """Which steps from points k turn so much that a loop may hide there."""
+    ahead = traced.directions[:, 1:] / box.size
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    return np.asarray(np.einsum("ni,ni->n", ahead[k], ahead[k + 1]) < STRAIGHT)
+
+
+# Angles from which a limit is extrapolated, in units of the first sample's: each twice the one before.
+ANGLES: Final = 2.0 ** np.arange(-2, 6)
+
+
+def _weights(count: int) -> Floats:
+    """Weights of a polynomial's values in the squares of so many of these angles for its value at 0."""
+    x = ANGLES[:count]
+    return np.array([np.prod([o**2 / (o**2 - y**2) for o in x if o != y]) for y in x])
+
+
+THREE, FOUR = _weights(3), _weights(4)
+# What is extrapolated from these angles lies this close, in units of the curve's scale, to what the slope says.
+NEAR_PARABOLA: Final = 1e-3
+# A limit further away from the first sample than this, in units of the curve's scale, is none.
+FAR: Final = 1.0
+
+
+def with_limits(curve: TracedCurve, samples: Samples) -> TracedCurve:
+    """A curve of pairs of roots with its limits, where it begins or ends in the first or the last sample."""
+    lowest, highest = samples.parameters[[0, -1]]
+    traced, limits = curve.traced, []
+    for k in (0, -1):
+        theta = traced.points[k, 0]
+        end = 0.0 if theta == lowest else np.pi if theta == highest else None
+        limit = None if end is None else _limit(curve, k, end)
+        if limit is not None:
+            points, directions = [limit, traced.points], [np.zeros((1, 3)), traced.directions]
+            order = slice(None, None, 1 if k == 0 else -1)
+            traced = CurvePoints(np.vstack(points[order]), np.vstack(directions[order]))
+        limits.append(limit is not None)
+    return replace(curve, traced=traced, limits=(limits[0], limits[1]))
+
+
+def _limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
+    """The point (1, 3) in which a curve ends beside its point k; None where it goes to infinity."""
+    point, direction = curve.traced.points[k], curve.traced.directions[k]
+    with np.errstate(all="ignore"):
+        slope = direction[1:] / direction[0]
+        away = point[0] - end
+        parabola = 0.5 * away * slope
+        if not np.all(np.abs(parabola) <= FAR * curve.scale[1:]):
+            return None
+        guess = np.empty((len(ANGLES), 3))
+        guess[:, 0] = end + away * ANGLES
+        guess[:, 1:] = point[1:] + parabola * (ANGLES[:, None] ** 2 - 1.0)
+        upright = np.tile([1.0, 0.0, 0.0], (len(ANGLES), 1))
+        near, _, settled = correct(curve.equation, guess, upright, curve.scale)
+    near[~settled] = np.nan
+    windows = np.lib.stride_tricks.sliding_window_view(near[:, 1:], 4, axis=0)
+    by_four = windows @ FOUR
+    apart = np.abs((by_four - windows[..., :3] @ THREE) / curve.scale[1:]).max(axis=1)
+    walls = by_four[np.nanargmin(apart)] if np.isfinite(apart).any() else point[1:] - parabola
+    if np.abs((walls - point[1:] + parabola) / curve.scale[1:]).max() > NEAR_PARABOLA:
+        walls = point[1:] - parabola
+    return np.array([[end, *walls]])
+
+
+# Imaginary part of a real number that was solved for, in shares of it; where it passes a pole that is not small.
+REAL: Final = 1e-6
+
+
+def pair_lines(equation: WallEquation, thetas: Floats) -> list[StraightLine]:
+    """Lines of walls with a pair of roots, found between ascending angles (N,)."""
+    damped, T = bool((equation.damping > 0.0).any()), equation.loop.period
+    across, unit = (np.array([0.0, 1.0]), 1.0) if damped else (np.array([1.0, 0.0]), T)
+    numbers = _numbers(equation, thetas)
+    lines = []
+    for n in range(len(thetas) - 1):
+        apart = np.abs(numbers[n][:, None] - numbers[n + 1]) / (
+            np.abs(numbers[n][:, None]) + np.abs(numbers[n + 1])
+        )
+        for i, j in zip(*linear_sum_assignment(apart), strict=True):
+            ends = numbers[n, i], numbers[n + 1, j]
+            if ends[0].imag * ends[1].imag < 0.0:
+                theta, x = _real_number(equation, thetas[n : n + 2], ends)
+                if abs(x.imag) <= REAL * abs(x):
+                    lines.append(StraightLine(across, x.real * unit, theta, T))
+    return lines
+
+
+def _numbers(equation: WallEquation, thetas: Floats) -> Complexes:
+    """Numbers x (N, r) by which walls have a root at each angle (N,): real ones are walls."""
+    A, B, C = equation.terms(thetas)
+    moving = C if (equation.damping > 0.0).any() else B
+    return np.asarray(-np.linalg.eigvals(np.linalg.solve(moving, A)), dtype=complex)
+
+
+def _real_number(equation: WallEquation, thetas: Floats, ends: tuple[complex, complex]) -> tuple[float, complex]:
+    """Angle between two others at which a number's imaginary part changes sign, and the number there."""
+    low, high = (float(theta) for theta in thetas)
+
+    def number(theta: float) -> complex:
+        expected = ends[0] + (theta - low) / (high - low) * (ends[1] - ends[0])
+        every = _numbers(equation, np.array([theta]))[0]
+        return complex(every[np.argmin(np.abs(every - expected))])
+
+    theta = float(brentq(lambda theta: number(theta).imag, low, high, xtol=1e-300, rtol=1e-14))
+    return theta, number(theta)
+
+
+# Directions whose coupling is a smaller share of their own responses are not coupled.
+UNCOUPLED: Final = 1e-11
+# Angles at which responses are compared.
+PROBES: Final = (0.03, 0.4, 1.1, 1.9, 2.7)
+
+
+def wall_equations(loop: MultiLoop) -> list[WallEquation]:
+    """The equations of the sets of directions that a plant couples, each different one once."""
+    z, d = on_circle(np.array(PROBES))
+    P = loop.plant_slope(z, d)[0]
+    law = loop.principal
+    S = _turned(P, law.stiffness, law.damping)
+    P = S @ P @ S.T
+    equations: list[WallEquation] = []
+    known: list[Complexes] = []
+    for part in _coupled_sets(P):
+        stiffness, damping, own = law.stiffness[part], law.damping[part], P[:, part][:, :, part]
+        if not any(
+            np.array_equal(stiffness, other.stiffness)
+            and np.array_equal(damping, other.damping)
+            and np.abs(own - response).max() <= UNCOUPLED * np.abs(P).max()
+            for other, response in zip(equations, known, strict=True)
+        ):
+            equations.append(WallEquation(loop, S[part], stiffness, damping))
+            known.append(own)
+    return equations
+
+
+def _turned(P: Complexes, stiffness: Floats, damping: Floats) -> Floats:
+    """Directions (r, r), orthonormal, each in the place of one under the same law, that are coupled least.
+
+    Where turning a set of directions of one law uncouples them at all angles, their axes are the eigenvectors of
+    any mean of the responses there.
+    """
+    r = len(stiffness)
+    S = np.eye(r)
+    for k in range(r):
+        same = np.flatnonzero((stiffness == stiffness[k]) & (damping == damping[k]))
+        if same[0] != k or len(same) == 1:
+            continue
+        own = P[:, same][:, :, same]
+        share = own / np.abs(own).max(axis=(1, 2))[:, None, None]
+        mean = np.einsum("n,nij->ij", np.arange(1.0, len(P) + 1.0), share.real + 0.7 * share.imag)
+        turn = np.linalg.eigh(mean + mean.T)[1].T
+        if len(_coupled_sets(turn @ own @ turn.T)) > len(_coupled_sets(own)):
+            S[np.ix_(same, same)] = turn
+    return S
+
+
+def _coupled_sets(P: Complexes) -> list[Ints]:
+    """Sets of directions that responses (n, r, r) couple: within one each leads to each."""
+    r = P.shape[-1]
+    own = np.sqrt(np.abs(np.diagonal(P, axis1=1, axis2=2)))
+    coupled = (np.abs(P) > UNCOUPLED * own[:, :, None] * own[:, None, :]).any(axis=0)
+    reached = np.linalg.matrix_power(coupled.astype(float) + np.eye(r), r) > 0.0
+    sets = [np.flatnonzero(reached[k] & reached[:, k]) for k in range(r)]
+    return [part for k, part in enumerate(sets) if part[0] == k]

@@ -6,6 +6,7 @@ from zwidth.contact.environments.catalogue import (
     friction_patch,
     grating,
     hunt_crossley,
+    load_environment,
     nonlinear_wall,
     one_sided_wall,
     slot,
@@ -21,7 +22,6 @@ from zwidth.contact.environments.environment import (
     environment,
     environment_at,
 )
-from zwidth.contact.environments.load import load_environment
 
 __all__ = [
     "ENVIRONMENTS",

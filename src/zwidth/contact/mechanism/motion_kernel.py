@@ -9,10 +9,14 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.computer import Computer, Computers, arrived_command, computer_at
-from zwidth.contact.mechanism.acceleration import configure
-from zwidth.contact.mechanism.rendering import RenderingMemory, locate_handle, render, rendering_memory_of
-from zwidth.contact.mechanism.rendering_inputs import RenderingInputs
-from zwidth.contact.mechanism.stepping import linearise, prepare, step, turned
+from zwidth.contact.mechanism.rendering import (
+    RenderingInputs,
+    RenderingMemory,
+    locate_handle,
+    render,
+    rendering_memory_of,
+)
+from zwidth.contact.mechanism.stepping import configure, linearise, prepare, step, turned
 from zwidth.contact.mechanism.surfaces import penetration
 from zwidth.contact.mechanism.system import Memory, System, memory_of
 from zwidth.model.closure import equations, orientation, passive_rates

@@ -1,6 +1,8 @@
 """One period of the computer of a whole mechanism: locate the handle by its counts, render the surface.
 
 Counting, estimating, filtering and delaying one signal are `contact.computer`'s.
+
+Environment, surface and drives of a rendering as numbers for the kernels.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from zwidth.arrays import Floats
+from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.contact.computer import (
     Computer,
@@ -22,12 +24,12 @@ from zwidth.contact.computer import (
     signals_of,
 )
 from zwidth.contact.environments import MEMORY, environment_at
-from zwidth.contact.mechanism.rendering_inputs import RenderingInputs
 from zwidth.contact.mechanism.surfaces import NONE, penetration
 from zwidth.contact.mechanism.system import System
-from zwidth.model.closed_posture import close_at
+from zwidth.model.continuation import close_at
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, working_memory
 from zwidth.model.inertia import handle_jacobian, unit_motions
+from zwidth.model.mechanism import Drives
 from zwidth.model.mechanism_arrays import MechanismArrays
 
 
@@ -143,3 +145,56 @@ def torque_at(jacobian: Floats, force: Floats, i: int) -> float:
 def share_within(size: float, limit: float) -> float:
     """By what a signal of this size has to be multiplied to stay within its limit."""
     return limit / size if size > limit else 1.0
+
+
+class RenderingInputs(NamedTuple):
+    """The environment at the surface, and the drives as the computer counts and commands them.
+
+    surface            as `surfaces.packed` gives it
+    address            where the environment's machine code begins;   values (P,)  of its parameters
+    encoder_coordinates  (d,)      coordinates that the encoders read
+    step                 (d,)      one count [rad at the joint]; 0: as fine as you like
+    noise                (d,)      standard deviation of what is added before counting [rad at the joint];   seed
+                         of the noise
+    limit                (d,)      largest torques at the joints [N m]
+    together           True: all torques are scaled alike where one is at its limit
+    """
+
+    surface: Floats
+    address: int
+    values: Floats
+    encoder_coordinates: Ints
+    step: Floats
+    noise: Floats
+    seed: np.uint64
+    limit: Floats
+    together: bool
+
+
+def rendering_inputs(
+    drives: Drives,
+    surface: Floats,
+    address: int,
+    values: Floats,
+    read: Ints,
+    counted: bool,
+    seed: int,
+    together: bool,
+) -> RenderingInputs:
+    """The law at a surface.
+
+    counted  False: encoders without steps and noise
+    """
+    n, counts, parts = drives.transmission, drives.encoder_counts, drives.nonlinearity
+    known = np.isfinite(counts) & counted
+    return RenderingInputs(
+        surface=surface,
+        address=address,
+        values=values,
+        encoder_coordinates=np.array(read, dtype=np.int64),
+        step=np.where(known, 2.0 * np.pi / np.where(known, counts * n, 1.0), 0.0),
+        noise=np.zeros(len(n)) if parts is None or not counted else np.array(parts.encoder_noise / n),
+        seed=np.uint64(seed),
+        limit=np.array(n * drives.torque_limit),
+        together=together,
+    )

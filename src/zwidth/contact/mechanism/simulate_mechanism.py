@@ -1,9 +1,15 @@
-"""The motion of a whole mechanism held by a computer at a surface."""
+"""The motion of a whole mechanism held by a computer at a surface.
+
+Whether the handle ever touches a surface.
+
+Rendering at a surface: the Kelvin-Voigt wall, or any environment along the surface's normal.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from math import isfinite
 from typing import Final, Literal
 
 import numpy as np
@@ -11,23 +17,22 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.contact.computer import computers
-from zwidth.contact.environments import Environment
+from zwidth.contact.environments import ENVIRONMENTS, Environment
 from zwidth.contact.mechanism import motion_kernel as kernel
 from zwidth.contact.mechanism.motion import MechanismMotion
 from zwidth.contact.mechanism.motion_inputs import MotionError, motion_inputs, start_rates
-from zwidth.contact.mechanism.rendering_inputs import rendering_inputs
-from zwidth.contact.mechanism.surface_reach import check_reach
-from zwidth.contact.mechanism.surfaces import Surface, depth_and_normal, packed
+from zwidth.contact.mechanism.rendering import rendering_inputs
+from zwidth.contact.mechanism.surfaces import Plane, Surface, depth_and_normal, packed
 from zwidth.contact.mechanism.system import System, system_of
-from zwidth.contact.mechanism.walls import SurfaceRendering, rendered_environment
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import NoMechanismError
+from zwidth.loop.point_text import NoMechanismError
 from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.mechanism import Mechanism
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.posture import OK, Posture
+from zwidth.model.mechanism_arrays import MechanismArrays, pack
+from zwidth.model.posture import OK, Posture, handle_motions, solve_posture
 from zwidth.model.reduction import reduce_mechanism
+from zwidth.model.roadmap import roadmap
 from zwidth.progress import Progress, watched
 
 REASONS: Final = {
@@ -87,7 +92,7 @@ def simulate_mechanism(
 
     >>> import zwidth
     >>> from zwidth.contact.mechanism.surfaces import Sphere
-    >>> from zwidth.contact.mechanism.walls import SurfaceWall
+    >>> from zwidth.contact.mechanism.simulate_mechanism import SurfaceWall
     >>> devices = (zwidth.load(name) for name, *_ in zwidth.bundled())
     >>> device = next(device for device in devices if device.mechanism and not device.missing)
     >>> hollow = Sphere(device.reference_position, radius=0.01, hollow=True)
@@ -237,3 +242,116 @@ def _unanswered(motion: MechanismMotion, environment: Environment, surface: Surf
         f"after {motion.time[-1]:.6g} s {environment.name} gave no finite force, where it was given a depth of "
         f"{float(depth):.6g} m and {rate:.6g} m/s"
     )
+
+
+TRIED: Final = 64  # postures nearest to the surface from which it is tried to touch it
+REACHES: Final = 4  # times that each goes on from where it got nearest
+
+
+class SurfaceOutOfReach(ValueError):
+    """The handle never touches the surface in this assembly."""
+
+
+def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, surface: Surface) -> None:
+    """Raise SurfaceOutOfReach unless the handle can touch the surface in the posture's assembly.
+
+    All postures of the assembly are known coarsely (`model.roadmap`). Where none of them is inside the wall, the
+    ones nearest to it are taken to the point of the surface that they are nearest to.
+    """
+    road = roadmap(mech, 0, np.ascontiguousarray(posture.angles))
+    here = np.concatenate([posture.position[None], road.position])
+    depth, normal = depth_and_normal(surface, here)
+    if np.max(depth) >= 0.0:
+        return
+    best = np.argsort(-depth)[:TRIED]
+    nearest, least = here[best[0]], -depth[best[0]]
+    at, depth, normal = here[best], depth[best], normal[best]
+    plane = handle_motions(posture)
+    for _ in range(REACHES):
+        ways = normal @ plane @ plane.T
+        gain = np.sum(ways * normal, axis=1)
+        reachable = gain > 1e-9  # elsewhere the handle cannot move towards the surface at all
+        if not reachable.any():
+            break
+        goals = at[reachable] + (depth[reachable] / gain[reachable])[:, None] * ways[reachable]
+        solved = solve_posture(mechanism, goals, posture.assembly)
+        if np.any(solved.status == OK):
+            at, depth = goals[solved.status == OK], depth_and_normal(surface, goals[solved.status == OK])[0]
+            normal = depth_and_normal(surface, at)[1]
+            if np.max(depth) > -1e-9:
+                return
+        else:
+            break
+    where = "(" + ", ".join(f"{x:.4g}" for x in nearest) + ") m"
+    raise SurfaceOutOfReach(
+        f"the handle never touches the surface in assembly {posture.assembly!r}: of the postures tried the "
+        f"closest is about {least:.3g} m away, at {where}; move the surface into the workspace"
+    )
+
+
+@dataclass(frozen=True)
+class SurfaceWall:
+    """A Kelvin-Voigt wall at a surface: f = (K depth + B depth') normal, inside only or on both sides of a plane.
+
+    stiffness K [N/m];   damping B [N s/m], of either sign
+    no_pull   True: the wall never pulls the handle in
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    no_pull: bool = False
+
+
+@dataclass(frozen=True)
+class SurfaceEnvironment:
+    """Any environment at a surface, along its normal: f = -F(depth, depth', ...) normal.
+
+    The environment's position is the depth behind the surface, its velocity the depth's estimated rate, and its
+    force F acts along the way in, as in the simulation of one direction. What the law says of a motion along a
+    texture, a grating or a rubbing patch it says of the motion along the normal.
+
+    environment   what is rendered;   values (P,) of its parameters, as `Environment.values` gives them
+    """
+
+    environment: Environment
+    values: ArrayLike
+
+
+SurfaceRendering = SurfaceWall | SurfaceEnvironment
+
+
+def rendered_environment(wall: SurfaceRendering, surface: Surface) -> tuple[Environment, Floats]:
+    """The environment that renders a wall at this surface, and its parameters. Raises MotionError."""
+    if not isinstance(surface, Surface):
+        raise MotionError(f"the surface must be a Plane, a Sphere or a Box, got {type(surface).__name__}")
+    two_sided = isinstance(surface, Plane) and surface.two_sided
+    if isinstance(wall, SurfaceEnvironment):
+        return wall.environment, _values(wall, two_sided)
+    if not isinstance(wall, SurfaceWall):
+        raise MotionError(f"the wall must be a SurfaceWall or a SurfaceEnvironment, got {type(wall).__name__}")
+    if not (isfinite(wall.stiffness) and wall.stiffness >= 0.0):
+        raise MotionError(f"the wall's stiffness must be at least 0 and finite [N/m], got {wall.stiffness}")
+    if not isfinite(wall.damping):
+        raise MotionError(f"the wall's damping must be finite [N s/m], of either sign, got {wall.damping}")
+    if two_sided and wall.no_pull:
+        raise MotionError("a two-sided plane always pulls; leave out no_pull or two_sided")
+    gains = {"stiffness": float(wall.stiffness), "damping": float(wall.damping)}
+    if two_sided:
+        return ENVIRONMENTS["wall"], ENVIRONMENTS["wall"].values(**gains)
+    one_sided = ENVIRONMENTS["one_sided_wall"]
+    return one_sided, one_sided.values(**gains, no_pull=float(wall.no_pull))
+
+
+def _values(wall: SurfaceEnvironment, two_sided: bool) -> Floats:
+    names, values = wall.environment.names, np.array(wall.values, dtype=np.float64)
+    if values.shape != (len(names),):
+        raise MotionError(
+            f"{wall.environment.name} takes {len(names)} values ({', '.join(names) or 'none'}), got an array of "
+            f"shape {values.shape}; make it by Environment.values"
+        )
+    if two_sided:
+        raise MotionError(
+            f"two_sided is of a SurfaceWall; {wall.environment.name} says itself on which sides of the surface it "
+            "acts: leave two_sided out"
+        )
+    return values

@@ -16,10 +16,9 @@ from zwidth.device.faults import DeviceError, Fault, dotted
 from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.validation_messages import validation_messages
-from zwidth.model.handle_position import handle_goal
+from zwidth.model.handle_position import constraints, handle_goal
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-from zwidth.model.mobility import constraints
 
 REGULAR: Final = 1e-6  # least singular value over the largest, of a handle that its drives control
 NEGLIGIBLE: Final = 1e-9  # share of a handle's largest motion, below which a joint does not move it

@@ -1,28 +1,48 @@
-"""A device file from MJCF or URDF: reading, deciding what those leave open, checking and writing."""
+"""A device file from MJCF or URDF: reading, deciding what those leave open, checking and writing.
+
+Reading the text of a robot file, and telling MJCF from URDF.
+
+A loop file beside a URDF: what closes, and which joints are driven.
+
+The device file's tables, from a robot and what was decided about it.
+
+A device file as text: sections in the order of their documentation, numbers to their last digit, and
+comments.
+"""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Mapping, Sequence
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
+from xml.etree import ElementTree
 
-from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
+import numpy as np
+from pydantic import Field, ValidationError
+
+from zwidth.device.build import roll_pitch_yaw
+from zwidth.device.faults import DeviceError, Fault, comma_list, dotted, fail, suggestion
 from zwidth.device.load import from_document
 from zwidth.device.missing import unknown_numbers
 from zwidth.device.plausibility import implausible
+from zwidth.device.read import LARGEST_FILE, parse_document
 from zwidth.device.robot_files.compile_mjcf import compile_mjcf, mjcf_file, mujoco_or_fail
-from zwidth.device.robot_files.decide import Choices, decide
-from zwidth.device.robot_files.document import document_of
-from zwidth.device.robot_files.loops_file import add_loops, loops_path
+from zwidth.device.robot_files.decide import Choices, Decided, decide, section_of
+from zwidth.device.robot_files.links import LinkTree, listed
 from zwidth.device.robot_files.read_actuators import read_actuators, read_equalities, read_the_rest
-from zwidth.device.robot_files.read_model import read_bodies
-from zwidth.device.robot_files.read_urdf import read_urdf
-from zwidth.device.robot_files.robot import WARNING, Finding, Robot
-from zwidth.device.robot_files.robot_text import included_files, read_robot_text, root_of
-from zwidth.device.robot_files.toml_text import device_text
+from zwidth.device.robot_files.read_model import read_bodies, read_urdf
+from zwidth.device.robot_files.robot import BASE, WARNING, Finding, Motor, Robot, RobotClosure
+from zwidth.device.schema.mechanism import LoopClosure
+from zwidth.device.schema.value_types import Section
+from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.validation_messages import validation_messages
 from zwidth.model.argument_checks import check_choice
+from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix
 
 CONTROLS: Final = ("position", "orientation", "pose")
 
@@ -164,3 +184,333 @@ def _checked(document: dict[str, Any], label: str) -> Any:
         raise DeviceError(
             Fault(label, f"imported {fault.key}" if fault.key else "", fault.message) for fault in error.faults
         ) from None
+
+
+LARGEST_ROBOT_FILE: Final = 20_000_000  # bytes; a humanoid's has a hundred thousand
+OTHERS: Final = {
+    "sdf": "is SDF; export it as URDF or MJCF",
+    "COLLADA": "is a COLLADA scene; export the robot as URDF or MJCF",
+    "opensimdocument": "is an OpenSim model; export it as MJCF",
+}
+
+
+def read_robot_text(path: str | os.PathLike[str]) -> str:
+    """The text of a file. Raises DeviceError where it cannot be read."""
+    label = os.fspath(path)
+    try:
+        return read_text(path, LARGEST_ROBOT_FILE)
+    except UnreadableFileError as error:
+        raise fail(label, "", f"{error}; give an MJCF or URDF file") from None
+
+
+def root_of(text: str, label: str) -> ElementTree.Element:
+    """The root element of MJCF ("mujoco") or URDF ("robot"). Raises DeviceError for anything else.
+
+    A document type is refused: it defines entities, of which a few lines make gigabytes, and neither format has
+    use for them.
+    """
+    if re.search(r"<!(DOCTYPE|ENTITY)", text):
+        raise fail(label, "", "has a document type (<!DOCTYPE ...>), which neither MJCF nor URDF needs; remove it")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        line, column = error.position
+        reason = str(error).partition(":")[0]
+        if not text.lstrip().startswith("<"):
+            raise fail(label, "", "is neither MJCF nor URDF, which are XML; give one of those") from None
+        raise fail(label, "", f"is not XML: {reason} in line {line}, column {column + 1}") from None
+    if root.tag not in ("mujoco", "robot"):
+        other = OTHERS.get(root.tag.rpartition("}")[2], OTHERS.get(root.tag.lower(), ""))
+        told = other or f"has the root <{root.tag[:40]}>; MJCF begins with <mujoco>, URDF with <robot>"
+        raise fail(label, "", told)
+    if "xacro" in text and any("www.ros.org/wiki/xacro" in element.tag for element in root.iter()):
+        name = Path(label).name.removesuffix(".xacro").removesuffix(".urdf")
+        raise fail(label, "", f"is a xacro macro, not yet a URDF; expand it first: xacro FILE > {name}.urdf")
+    return root
+
+
+def included_files(root: ElementTree.Element, folder: Path, label: str) -> None:
+    """Check the files that an MJCF file includes, as the file itself is checked. Raises DeviceError."""
+    waiting, seen = [root], {""}
+    while waiting:
+        for element in waiting.pop().iter("include"):
+            name = element.get("file", "")
+            if name in seen:
+                continue
+            seen.add(name)
+            try:
+                text = read_text(folder / name, LARGEST_ROBOT_FILE)
+            except UnreadableFileError as error:
+                raise fail(label, f"include '{name}'", str(error)) from None
+            if re.search(r"<!(DOCTYPE|ENTITY)", text):
+                raise fail(label, f"include '{name}'", "has a document type (<!DOCTYPE ...>); remove it")
+            try:
+                waiting.append(ElementTree.fromstring(text))
+            except ElementTree.ParseError:
+                continue  # MuJoCo says what is wrong, with its line
+
+
+class LoopsFile(Section):
+    """NAME.loops.toml: loops as in a device file, by the names of the URDF's links, in their frames."""
+
+    loops: tuple[LoopClosure, ...] = Field(default=(), description="the loop closures")
+    drives: tuple[str, ...] | None = Field(default=None, description="names of the joints that are driven")
+
+
+def loops_path(path: Path) -> Path:
+    """Where the loop file of a URDF is looked for: arm.loops.toml beside arm.urdf."""
+    return path.with_name(path.stem + ".loops.toml")
+
+
+def add_loops(robot: Robot, path: Path) -> None:
+    """Add the closures and the driven joints of a loop file to a robot, if there is one.
+
+    Raises DeviceError  with its faults
+    """
+    if not path.exists():
+        return
+    label = str(path)
+    try:
+        document = parse_document(read_text(path, LARGEST_FILE), label)
+    except UnreadableFileError as error:
+        raise DeviceError([Fault(label, "", str(error))]) from None
+    try:
+        section = LoopsFile.model_validate(document)
+    except ValidationError as error:
+        told = validation_messages(error, document)
+        raise DeviceError(Fault(label, dotted(place, document), message) for place, message in told) from None
+    order = {body.name: i for i, body in enumerate(robot.bodies)} | {"base": BASE}
+    faults = [
+        Fault(
+            label, f"loops.{loop.name}.links", f"'{name}' is not a link; {suggestion(name, set(order), 'links')}"
+        )
+        for loop in section.loops
+        for name in loop.links
+        if name not in order
+    ]
+    singles = {name for name, (_, joint) in robot.joints.items() if joint.single}
+    faults += [
+        Fault(label, "drives", f"'{name}' is no joint that turns or slides; {suggestion(name, singles, 'joints')}")
+        for name in section.drives or ()
+        if name not in singles
+    ]
+    if faults:
+        raise DeviceError(faults)
+    robot.closures += [_closure(loop, order) for loop in section.loops]
+    if section.drives is not None:
+        given = {motor.joint: motor for motor in robot.motors or ()}
+        robot.motors = [given.get(name, Motor(name, name)) for name in section.drives]
+    robot.note(label, "is read beside the URDF")
+
+
+def _closure(loop: LoopClosure, order: dict[str, int]) -> RobotClosure:
+    points: Any = loop.points_m or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    axes = np.array(loop.axes or ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), dtype=np.float64)
+    return RobotClosure(
+        loop.name,
+        (order[loop.links[0]], order[loop.links[1]]),
+        np.array(points, dtype=np.float64),
+        loop.closes,
+        axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        roll_pitch_yaw(loop.orientation_rad or (0.0, 0.0, 0.0)),
+    )
+
+
+SETTLED = 1e-9  # of joint coordinates that closing the loops does not change [rad], [m]
+
+
+def document_of(robot: Robot, decided: Decided, source: str) -> dict[str, Any]:
+    """All tables of the device file."""
+    names = LinkTree()
+    drives = _drives(robot, decided, names)
+    section = section_of(robot, decided.tree, decided.handle, decided.controls, drives)
+    _close(robot, decided, section)
+    goal, reference = decided.motions.goal, section["reference"]
+    reference["position_m"] = listed(goal[:3])
+    reference["orientation_rad"] = listed(roll_pitch_yaw_of(rotation_matrix(goal[3:])))
+    if decided.controls == "position":
+        del reference["orientation_rad"]
+    elif decided.controls == "orientation":
+        del reference["position_m"]
+    reference["direction"] = _direction(robot, decided)
+    return {"name": robot.name, "source": source, "mechanism": section, "loop": {}}
+
+
+def _drives(robot: Robot, decided: Decided, names: LinkTree) -> list[dict[str, Any]]:
+    """The drives; rotor and ratio are given for all of them or for none."""
+    motors, tree = decided.motors, decided.tree
+    ratios = all(motor.turns for motor in motors)
+    inertias = [_rotor(robot, motor) for motor in motors]
+    rotors = ratios and any(inertias)
+    tables = []
+    for motor, inertia in zip(motors, inertias, strict=True):
+        table: dict[str, Any] = {"name": names.name(motor.name), "joint": tree.link_of[motor.joint]}
+        if rotors:
+            table["motor_inertia_kg_m2"] = inertia
+            if not inertia:
+                robot.warn(
+                    f"actuator '{motor.name}'", "has no armature, which others have; its rotor is taken as 0"
+                )
+        if ratios:
+            table["transmission_ratio"] = motor.turns[motor.joint]
+        if ratios and len(motor.turns) > 1:
+            others = {joint: turns for joint, turns in motor.turns.items() if joint != motor.joint}
+            table["coupling"] = {tree.link_of[joint]: turns for joint, turns in others.items()}
+        torque = _torque(robot, motor)
+        if torque is not None and ratios:
+            table["torque_limit_Nm"] = torque
+        tables.append(table)
+    _tell_of_armature(robot, decided)
+    return tables
+
+
+def _rotor(robot: Robot, motor: Motor) -> float:
+    """Inertia of the rotor at the motor: its own, and the armature of the joint that it drives alone, and of those
+    that follow this, over the square of the ratio."""
+    own = float(motor.inertia or 0.0)
+    if len(motor.turns) != 1:
+        return own
+    joints = robot.joints
+    led = sum(one.ratio**2 * joints[one.joint][1].armature for one in robot.followers if one.leader == motor.joint)
+    return float(own + (joints[motor.joint][1].armature + led) / motor.turns[motor.joint] ** 2)
+
+
+def _torque(robot: Robot, motor: Motor) -> float | None:
+    """Largest torque at the motor: its own, or what its joint bears."""
+    if motor.torque is not None or not motor.turns:
+        return motor.torque
+    effort = robot.joints[motor.joint][1].effort
+    return None if effort is None else effort / motor.turns[motor.joint]
+
+
+def _tell_of_armature(robot: Robot, decided: Decided) -> None:
+    """Armature of joints that no motor has for itself: a device file has rotors, not joints with inertia."""
+    own = {motor.joint for motor in decided.motors if len(motor.turns) == 1}
+    own |= {one.joint for one in robot.followers if one.leader in own}
+    left = [
+        f"{name} {joint.armature:.4g}"
+        for name, (_, joint) in robot.joints.items()
+        if joint.armature > 0.0 and name not in own and name not in decided.shape.fixed
+    ]
+    if left:
+        robot.warn("armature", f"of joints without a motor of their own is left out: {comma_list(left, 8)}")
+
+
+def _close(robot: Robot, decided: Decided, section: dict[str, Any]) -> None:
+    """The assembly's coordinates where the loops are closed."""
+    mechanism, angles = decided.motions.mechanism, decided.motions.angles
+    (started,) = mechanism.assemblies.values()
+    if np.abs(angles - started).max(initial=0.0) <= SETTLED:
+        return
+    (assembly,) = section["assemblies"].values()
+    values = dict(zip(mechanism.links.names, angles.tolist(), strict=True))
+    for link in section["links"]:
+        name, kind = link["name"], link["joint"]
+        own = [values[one] for one in (*(f"{name}/{k}" for k in range(1, 6)), name) if one in values]
+        if kind == "free":
+            assembly["joints_m"][name], assembly["joints_rad"][name] = own[:3], own[3:]
+        elif kind == "prismatic":
+            assembly["joints_m"][name] = own[0]
+        elif kind != "fixed":
+            assembly["joints_rad"][name] = own[0] if len(own) == 1 else own
+    robot.warn("mechanism.assemblies", "the loops of the file are open where it puts the joints; closed nearby")
+
+
+def _direction(robot: Robot, decided: Decided) -> list[float]:
+    """The axis of the base along which the drives move the handle most."""
+    sizes = np.linalg.norm(decided.columns[:3], axis=1)
+    axis = int(np.argmax(np.round(sizes / max(sizes.max(), np.finfo(float).tiny), 6)))
+    robot.note(
+        "mechanism.reference.direction",
+        f"is not of the file; {'xyz'[axis]} is taken, along which the handle moves most",
+    )
+    return listed(np.eye(3)[axis])
+
+
+HEADINGS = {
+    "links": "Links, each behind the joint that carries it.",
+    "loops": "What closes the loops.",
+    "drives": "Drives. Not in the file that was imported, and worth giving:\n"
+    "stiffness_Nm_per_rad (omitted: rigid), encoder_counts_per_rev, torque_constant_Nm_per_A.",
+}
+
+
+def device_text(document: dict[str, Any], findings: Sequence[Finding]) -> str:
+    """The text of a device file.
+
+    document  its tables: name, source, mechanism with lists of tables, loop
+    findings  written into its head
+    """
+    return (
+        "\n".join([*_head(document, findings), *_mechanism(document["mechanism"]), *_loop(document["loop"])])
+        + "\n"
+    )
+
+
+def _head(document: dict[str, Any], findings: Sequence[Finding]) -> Iterator[str]:
+    if findings:
+        yield "# What was found while importing:"
+    for finding in findings:
+        mark = "warning, " if finding.severity == "warning" else ""
+        yield from _comment(f"{mark}{finding}", "  ")
+    yield ""
+    for key in ("name", "source"):
+        yield f"{key} = {json.dumps(document[key], ensure_ascii=False)}"
+
+
+def _comment(text: str, indent: str = "") -> Iterator[str]:
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    for k, line in enumerate(textwrap.wrap(printable, 110, break_long_words=False, break_on_hyphens=False)):
+        yield f"# {'- ' if indent and k == 0 else indent}{line}"
+
+
+def _mechanism(mechanism: dict[str, Any]) -> Iterator[str]:
+    for group in ("links", "loops"):
+        yield from _tables(group, mechanism.get(group, []))
+    yield from ("", "# Where the operator holds the device.", "[mechanism.handle]", *_pairs(mechanism["handle"]))
+    for name, assembly in mechanism["assemblies"].items():
+        yield from ("", "# Joint coordinates of the reference posture.")
+        for key, values in assembly.items():
+            yield from (f"[mechanism.assemblies.{name}.{key}]", *_pairs(values))
+    yield from ("", "[mechanism.reference]", *_pairs(mechanism["reference"]))
+    yield from _tables("drives", mechanism["drives"])
+
+
+def _tables(group: str, entries: Sequence[dict[str, Any]]) -> Iterator[str]:
+    if entries:
+        yield ""
+        yield from (f"# {line}" for line in HEADINGS[group].splitlines())
+    for k, entry in enumerate(entries):
+        yield from ([""] if k else [])
+        yield f"[[mechanism.{group}]]"
+        yield from _pairs(entry)
+
+
+def _loop(loop: dict[str, Any]) -> Iterator[str]:
+    yield from ("", "[loop]", *_pairs(loop))
+    if "sampling_period_s" not in loop:
+        yield "# sampling_period_s = 0.001   # not in the file that was imported; charts and simulations need it"
+
+
+def _pairs(table: dict[str, Any]) -> Iterator[str]:
+    for key, value in table.items():
+        yield f"{key} = {toml_value(value)}"
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML, numbers to their last digit.
+
+    >>> toml_value([1, 0.1, True, "a"]), toml_value({"b": 1e-7})
+    ('[1, 0.1, true, "a"]', '{ b = 1e-07 }')
+    """
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case dict():
+            return "{ " + ", ".join(f"{key} = {toml_value(inner)}" for key, inner in value.items()) + " }"
+        case list() | tuple():
+            return "[" + ", ".join(map(toml_value, value)) + "]"
+        case _:
+            return repr(value)

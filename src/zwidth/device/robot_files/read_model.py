@@ -1,16 +1,25 @@
-"""From MuJoCo's compiled model to a `Robot`: bodies, joints, sites and the reference posture."""
+"""From MuJoCo's compiled model to a `Robot`: bodies, joints, sites and the reference posture.
+
+From URDF to a `Robot`: MuJoCo reads the tree, and what it passes over is read here.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, Final
+from xml.etree import ElementTree
 
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.faults import fail, suggestion
-from zwidth.device.robot_files.compile_mjcf import Compiled, matrix_of_six
+from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
+from zwidth.device.robot_files.compile_mjcf import Compiled, compile_mjcf, matrix_of_six, xml_text
 from zwidth.device.robot_files.robot import (
     UNMOVED,
+    Follower,
+    Motor,
     Place,
     Robot,
     RobotBody,
@@ -157,3 +166,180 @@ def _tell_of_bodies(model: Any, compiled: Compiled, robot: Robot) -> None:
             robot.note(f"body '{model.body(i).name}'", "has gravity compensation, a control law; it is left out")
     for name in sorted(compiled.massless):
         robot.warn(f"body '{name}'", "has no mass; it is taken as massless")
+
+
+COMPILER: Final = {"fusestatic": "false", "discardvisual": "true", "balanceinertia": "false", "strippath": "true"}
+URDF_JOINTS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+PASSED_OVER: Final = {
+    "safety_controller": "is a rule of a controller; it is left out",
+    "calibration": "is left out",
+}
+SEVERAL_TURNS: Final = 10.0  # rad, above which a limit looks like degrees
+
+
+def read_urdf(root: ElementTree.Element, label: str) -> Robot:
+    """The robot of a URDF document.
+
+    Raises DeviceError  with all faults of the document, or what MuJoCo refuses
+    """
+    faults = list(_faults(root, label))
+    if faults:
+        raise DeviceError(faults)
+    name = root.get("name") or "robot"
+    robot_findings = Robot(name, label, [])
+    motors, followers = _motors(root, robot_findings), _followers(root)
+    _tell(root, robot_findings)
+    compiled = compile_mjcf(label, xml_text(_for_mujoco(root)))
+    robot = read_bodies(compiled, name, label, None)
+    robot.findings[:0] = robot_findings.findings
+    robot.motors, robot.followers = motors, followers
+    robot.bodies = [replace(body, joints=tuple(map(_with_effort(root), body.joints))) for body in robot.bodies]
+    return robot
+
+
+def _faults(root: ElementTree.Element, label: str) -> Iterator[Fault]:
+    """What makes a document no tree of links."""
+    links = [link.get("name", "") for link in root.findall("link")]
+    carried: dict[str, str] = {}
+    for name in sorted({name for name in links if links.count(name) > 1}):
+        yield Fault(label, f"link '{name}'", "is there twice; names must differ")
+    for joint in root.findall("joint"):
+        where = f"joint '{joint.get('name', '')}'"
+        kind = joint.get("type", "")
+        if kind not in URDF_JOINTS:
+            yield Fault(label, where, f"has the type '{kind}'; {suggestion(kind, URDF_JOINTS, 'types')}")
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            link = "" if element is None else element.get("link", "")
+            if link not in links:
+                yield Fault(
+                    label, where, f"names the {end} link '{link}'; {suggestion(link, set(links), 'links')}"
+                )
+            elif end == "child" and link in carried:
+                yield Fault(
+                    label,
+                    where,
+                    f"carries the link '{link}', which '{carried[link]}' carries already: a URDF is a tree. "
+                    "Leave one of the two joints out and close the loop in a file beside it, NAME.loops.toml, "
+                    "with [[loops]]",
+                )
+            elif end == "child":
+                carried[link] = joint.get("name", "")
+    roots = [name for name in dict.fromkeys(links) if name not in carried]
+    if not links:
+        yield Fault(label, "", "has no links; a URDF has <link> and <joint> elements")
+    elif not roots:
+        yield Fault(label, "", "has no link that nothing carries: its joints go round in a circle")
+    elif len(roots) > 1 and len(carried) == len(root.findall("joint")):
+        yield Fault(
+            label,
+            "",
+            f"has {len(roots)} links that nothing carries: {comma_list(roots, 6)}; join them by fixed joints",
+        )
+
+
+def _for_mujoco(root: ElementTree.Element) -> str:
+    """The document without what is only seen or touched, and without what is read here."""
+    kept = ElementTree.Element("robot", root.attrib)
+    settings = ElementTree.SubElement(ElementTree.SubElement(kept, "mujoco"), "compiler")
+    settings.attrib.update(COMPILER)
+    for element in root:
+        if element.tag not in ("link", "joint"):
+            continue
+        copy = ElementTree.SubElement(kept, element.tag, element.attrib)
+        copy.extend(inner for inner in element if inner.tag not in ("visual", "collision", "mimic"))
+    return ElementTree.tostring(kept, encoding="unicode")
+
+
+def _with_effort(root: ElementTree.Element) -> Callable[[RobotJoint], RobotJoint]:
+    """A function that gives a joint the effort that its limit states."""
+    efforts = {}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        effort = _number(limit, "effort", 0.0)
+        efforts[joint.get("name", "")] = effort if effort > 0.0 and math.isfinite(effort) else None
+
+    def with_effort(joint: RobotJoint) -> RobotJoint:
+        return replace(joint, effort=efforts.get(joint.name))
+
+    return with_effort
+
+
+def _number(element: ElementTree.Element | None, key: str, default: float) -> float:
+    """A number of an element, or of its text where key is empty; MuJoCo refuses what is none, where it reads
+    it."""
+    try:
+        return float((element.get(key) if key else element.text) or "") if element is not None else default
+    except ValueError:
+        return default
+
+
+def _followers(root: ElementTree.Element) -> list[Follower]:
+    found = []
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None:
+            name = joint.get("name", "")
+            ratio = _number(mimic, "multiplier", 1.0)
+            found.append(
+                Follower(
+                    f"joint '{name}', mimic", name, mimic.get("joint", ""), ratio, _number(mimic, "offset", 0.0)
+                )
+            )
+    return found
+
+
+def _motors(root: ElementTree.Element, robot: Robot) -> list[Motor] | None:
+    """The motors that transmissions name; None where there is none."""
+    kinds = {joint.get("name", ""): joint.get("type", "") for joint in root.findall("joint")}
+    efforts = {
+        joint.get("name", ""): _number(joint.find("limit"), "effort", 0.0) for joint in root.findall("joint")
+    }
+    motors: dict[str, Motor] = {}
+    for transmission in root.findall("transmission"):
+        name = transmission.get("name", "")
+        where = f"transmission '{name}'"
+        joints = [joint.get("name", "") for joint in transmission.findall("joint")]
+        actuators = transmission.findall("actuator")
+        if len(joints) != 1 or kinds.get(joints[0]) not in ("revolute", "continuous", "prismatic"):
+            robot.warn(where, "is not of one joint that turns or slides; it is left out")
+            continue
+        reduction = actuators[0].find("mechanicalReduction") if actuators else None
+        if reduction is None:
+            reduction = transmission.find("mechanicalReduction")
+        ratio = abs(_number(reduction, "", 0.0))
+        turns = {joints[0]: ratio} if ratio else {}
+        effort = efforts[joints[0]]
+        torque = effort / ratio if ratio and effort > 0.0 else None
+        label = actuators[0].get("name", "") if actuators else ""
+        motors.setdefault(joints[0], Motor(label or name or joints[0], joints[0], turns, None, torque))
+    return list(motors.values()) or None
+
+
+def _tell(root: ElementTree.Element, robot: Robot) -> None:
+    """What MuJoCo drops in silence, and numbers that look like another unit."""
+    for joint in root.findall("joint"):
+        where = f"joint '{joint.get('name', '')}'"
+        for tag, what in PASSED_OVER.items():
+            if joint.find(tag) is not None:
+                robot.note(f"{where}, {tag}", what)
+        limit = joint.find("limit")
+        if limit is not None and _number(limit, "velocity", 0.0) > 0.0:
+            robot.note(f"{where}, limit", "has a velocity; a device file has no place for it")
+        largest = max(abs(_number(limit, "lower", 0.0)), abs(_number(limit, "upper", 0.0)))
+        if joint.get("type") == "revolute" and SEVERAL_TURNS < largest < math.inf:
+            robot.warn(
+                f"{where}, limit",
+                f"is {largest:g} rad, several turns; if it is in degrees, write {math.radians(largest):.6g}",
+            )
+        origin = joint.find("origin")
+        angles = [abs(float(x)) for x in (origin.get("rpy") or "0").split()] if origin is not None else [0.0]
+        if max(angles, default=0.0) > 2.0 * math.pi:
+            robot.warn(
+                f"{where}, origin",
+                f"has an rpy of {max(angles):g} rad, more than a full turn; if it is in degrees, write "
+                f"{math.radians(max(angles)):.6g}",
+            )
+    for tag in ("gazebo", "sensor", "ros2_control"):
+        if root.find(tag) is not None:
+            robot.note(f"<{tag}>", "is no part of the mechanism; it is left out")

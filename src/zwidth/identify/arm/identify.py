@@ -18,26 +18,34 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, quote
-from zwidth.identify.arm.channels import Channels, Side, channels_of, check_mechanism, left_out
 from zwidth.identify.arm.checks import (
+    Channels,
+    Side,
     Survey,
+    channels_of,
+    check_mechanism,
+    left_out,
     motion_check,
     other_readings,
     sign_check,
     torque_check,
     velocity_check,
 )
-from zwidth.identify.arm.comparison import Compared, Comparison, UnreachedError
-from zwidth.identify.arm.consistent_links import ConsistentLinks, consistent_links
-from zwidth.identify.arm.effective_masses import EffectiveMass, effective_masses
 from zwidth.identify.arm.estimates import (
+    ConsistentLinks,
+    EffectiveMass,
     base_estimates,
+    consistent_links,
     delay_estimate,
+    effective_masses,
     friction_estimates,
     link_settings,
     mass_estimates,
 )
 from zwidth.identify.arm.fit_checks import (
+    Compared,
+    Comparison,
+    UnreachedError,
     consistency_check,
     excitation_check,
     gravity_check,
@@ -52,9 +60,8 @@ from zwidth.identify.arm.regression import Regression, regress
 from zwidth.identify.arm.smoothing import Band, choose_band
 from zwidth.identify.arm.stretches import Stretch, TorqueTiming, smoothed
 from zwidth.identify.identification import Check, Estimate, Identification, refused
-from zwidth.identify.plausible import check_mass_in_file, check_periods
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling, check_sampling
+from zwidth.identify.records.sampling import Sampling, check_mass_in_file, check_periods, check_sampling
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.progress import Progress

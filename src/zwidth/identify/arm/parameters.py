@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.model.closed_posture import moved_posture
+from zwidth.model.continuation import moved_posture
 from zwidth.model.inertia_regressor import PARAMETERS, inertia_regressor
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack

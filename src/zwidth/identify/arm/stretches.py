@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.identify.arm.channels import Channels
+from zwidth.identify.arm.checks import Channels
 from zwidth.identify.arm.smoothing import Band, convolved
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling

@@ -124,14 +124,14 @@ class DampingModel:
     def chart(self, device: Device, numbers: Floats) -> Chart:
         """Exact chart of a device like the model's own with these numbers. Raises ValueError."""
         from zwidth.chart.chart import stability_chart
-        from zwidth.chart.hysteretic import hysteretic_chart
+        from zwidth.chart.hysteretic_response import hysteretic_chart
 
         loop = self._loop(device, numbers)
         return hysteretic_chart(loop) if self.name == HYSTERETIC else stability_chart(loop, decay=False)
 
     def edge(self, device: Device, numbers: Floats, thinned: int) -> EdgeChords:
         """The edge of that chart, so many chords made one; with a loss factor see `chart.hysteretic_edge`."""
-        from zwidth.chart.hysteretic_edge import hysteretic_edge
+        from zwidth.chart.hysteretic_response import hysteretic_edge
 
         if self.name == HYSTERETIC:
             return hysteretic_edge(self._loop(device, numbers))

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.device.faults import comma_list
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import Record
+from zwidth.identify.records.record import Columns, Record
 
 STIFFNESS: Final = ("stiffness_N_per_m", "stiffness_Nm_per_rad")
 DAMPING: Final = ("damping_Ns_per_m", "damping_Nms_per_rad")

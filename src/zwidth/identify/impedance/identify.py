@@ -15,7 +15,6 @@ import numpy as np
 from zwidth.arrays import Complexes, Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, plural
-from zwidth.identify.excitation import LEAST_SHARED, shared_power
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.impedance.local_spectra import LocalSpectra, local_spectra, merged, segment_length
 from zwidth.identify.impedance.spectra import (
@@ -32,12 +31,11 @@ from zwidth.identify.impedance.spectra import (
     stretches_of,
     wall_states,
 )
-from zwidth.identify.plausible import check_periods
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling, check_sampling
+from zwidth.identify.records.record import Columns, Record
+from zwidth.identify.records.sampling import Sampling, check_periods, check_sampling
+from zwidth.identify.response.sweep_blocks import LEAST_SHARED, shared_power
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.encoder_step import encoder_step
+from zwidth.model.raw_sweep import encoder_step
 from zwidth.progress import Progress
 
 __all__ = ["COLUMNS", "identify_impedance"]

@@ -1,4 +1,9 @@
-"""Dry and viscous friction of one joint, from free, coasting or driven motion."""
+"""Dry and viscous friction of one joint, from free, coasting or driven motion.
+
+A measured force beside the commanded one: how much of it acts, and how late.
+
+Effective mass or inertia of one joint, from driven motion.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +17,14 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.identify.identification import Check, Estimate, Identification, refused
-from zwidth.identify.joint.command import ALIKE, compare_with_command
 from zwidth.identify.joint.fit import DELAY, DRIFTS, MASS, ONE, STIFFNESS
 from zwidth.identify.joint.identification import POOR, FittedJoint, fitted_joint
 from zwidth.identify.joint.joint import COLUMNS as COLUMNS
 from zwidth.identify.joint.joint import Joint
+from zwidth.identify.joint.record import Motion
 from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
-from zwidth.identify.plausible import check_mass_in_file
 from zwidth.identify.records.record import Record
+from zwidth.identify.records.sampling import check_mass_in_file
 from zwidth.progress import Progress
 
 ALIKE_SPEEDS: Final = 0.98  # correlation of dry and viscous friction from which one speed is seen
@@ -361,3 +366,78 @@ def _force_text(joint: Joint, name: str) -> str:
             f"{joint.measured} too to see them"
         )
     return f"used is {name} as measured"
+
+
+LATEST: Final = 50  # samples by which a measured force may lag
+ALIKE: Final = 0.5  # correlation below which the two are not the same force
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """measured(t) = gain command(t - lag), about their means.
+
+    gain;  lag [s];  correlation at that lag
+    """
+
+    gain: float
+    lag: float
+    correlation: float
+
+
+def compare_with_command(motion: Motion) -> Comparison | None:
+    """The comparison over all sections; None where only one of the two was recorded, or one does not change.
+
+    The lag is where the correlation of the two is largest, between samples by a parabola through three of them.
+    """
+    pairs = [(one.force, one.command) for one in motion.sections if len(one.command)]
+    if not motion.driven or not pairs:
+        return None
+    shifts = np.arange(-2, LATEST + 1)
+    measured = np.concatenate([force[LATEST:-2] for force, _ in pairs])
+    sums = np.zeros((len(shifts), 2))
+    for n, k in enumerate(shifts):
+        moved = np.concatenate([command[LATEST - k : len(command) - 2 - k] for _, command in pairs])
+        if len(moved) < 10 or np.std(moved) == 0.0 or np.std(measured) == 0.0:
+            return None
+        slope = float(np.cov(moved, measured)[0, 1])
+        sums[n] = slope / (np.std(moved) * np.std(measured)), slope / np.var(moved)
+    best = int(np.argmax(sums[:, 0]))
+    inner = min(max(best, 1), len(shifts) - 2)
+    before, here, after = sums[inner - 1 : inner + 2, 0]
+    bend = before - 2.0 * here + after
+    part = 0.5 * (before - after) / bend if bend < 0.0 and best == inner else 0.0
+    return Comparison(
+        float(sums[best, 1]), float((shifts[best] + part) * motion.sections[0].period), float(sums[best, 0])
+    )
+
+
+def identify_mass(
+    device: Device,
+    records: Sequence[Record],
+    *,
+    joint: str | int | None = None,
+    spring: bool | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Mass that resists a joint's acceleration; at a motor of rotor and links together.
+
+    The same fit as `friction.identify_friction`, whose columns and options these are; friction is told too. Where
+    friction or a delay hide the mass, so that its interval reaches 0, the data are refused.
+    Raises  DeviceError  as `identify_friction` does
+    """
+    checks, fitted = fitted_joint(device, records, joint, spring, False, progress)
+    if fitted is not None and not fitted.motion.driven:
+        reason = "free motion tells only ratios of friction to mass; record force_N, torque_Nm or current_A too"
+        checks += (Check("force", False, reason),)
+        fitted = None
+    elif fitted is not None:
+        checks += (
+            check_mass(fitted, needed=True),
+            *mass_in_file(fitted),
+            *check_drift(fitted),
+            *check_remainder(fitted),
+        )
+    nothing = refused("mass", device.label, checks)
+    if fitted is None or nothing is not None:
+        return nothing or Identification("mass", device.label, checks)
+    return identification("mass", device, fitted, checks, [*mass_estimates(fitted), *friction_estimates(fitted)])

@@ -12,7 +12,6 @@ from zwidth.arrays import Flags, Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import fail
 from zwidth.identify.identification import Check
-from zwidth.identify.joint.checks import check_dependence, checks_of, directions
 from zwidth.identify.joint.fit import (
     COUNT,
     DELAY,
@@ -28,14 +27,20 @@ from zwidth.identify.joint.fit import (
     fit_joint,
     predict,
 )
-from zwidth.identify.joint.force_balance import ForceBalance, force_balance
+from zwidth.identify.joint.force_balance import (
+    ForceBalance,
+    check_dependence,
+    checks_of,
+    directions,
+    force_balance,
+    groups_of,
+    reason_of_misfit,
+)
 from zwidth.identify.joint.joint import Joint, joint_of
 from zwidth.identify.joint.record import Motion, read_motion, windows_of
-from zwidth.identify.joint.reversed_sense import groups_of, reason_of_misfit
 from zwidth.identify.joint.start import first_starts, search_guess
-from zwidth.identify.plausible import check_periods
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling, check_sampling
+from zwidth.identify.records.sampling import Sampling, check_periods, check_sampling
 from zwidth.progress import Progress
 
 UNSEEN: Final = 3  # of so many windows one is kept for validation

@@ -8,12 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from zwidth.device.address import table
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, comma_list, dotted, fail, suggestion
 from zwidth.device.legs import Member, members
-from zwidth.device.toml_access import table
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import Record
+from zwidth.identify.records.record import Columns, Record
 
 COLUMNS: Final = Columns(
     ("time_s", ("position_m", "angle_rad")),

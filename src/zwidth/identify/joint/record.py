@@ -14,7 +14,7 @@ from zwidth.identify.joint.fit import Windows
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
-from zwidth.model.encoder_step import encoder_step
+from zwidth.model.raw_sweep import encoder_step
 
 MOST: Final = 300_000  # samples that are fitted or validated on; of a longer record sections all over it
 SECTIONS: Final = 48  # of a longer record

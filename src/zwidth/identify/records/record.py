@@ -1,21 +1,31 @@
-"""Records of measurements: columns of numbers from a file or from arrays, read in pieces where they are long."""
+"""Records of measurements: columns of numbers from a file or from arrays, read in pieces where they are long.
+
+Long records of slow motion, shortened by averaging rows that follow each other.
+
+A table's columns as numbers in a temporary file: written once, read often, in a memory that stays flat.
+
+Which columns a kind of measurement has, and what is wrong with those of a table.
+"""
 
 from __future__ import annotations
 
 import csv
 import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import SpooledTemporaryFile
+from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from zwidth.arrays import Ints
 from zwidth.device.faults import DeviceError, Fault, comma_list, fail, plural
-from zwidth.device.text_file import UnreadableFileError, decode, read_head
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.table_copy import TableCopy, TableWriter
+from zwidth.device.text_file import UnreadableFileError, decode, header_fault, read_head
 
 Piece = dict[str, NDArray[Any]]  # columns of numbers, and those of words
 
@@ -268,3 +278,269 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return cell.lower() in MISSING
     return "_" not in cell
+
+
+MOST_ROWS: Final = 1_000_000
+
+
+@dataclass(frozen=True)
+class AveragedRows:
+    """A record's columns, each value a mean over rows that follow each other.
+
+    columns   by name
+    together  how many rows each value is the mean of
+    left_out  rows with a cell without a number
+    """
+
+    columns: Piece
+    together: int
+    left_out: int
+
+
+def averaged_rows(record: Record, most: int = MOST_ROWS) -> AveragedRows:
+    """The columns of a record in at most so many rows; a record with columns of words keeps all of its rows.
+
+    Memory stays below that of 2 * `most` rows and one piece.
+    """
+    kept, rows, together, left_out = list[Piece](), 0, 1, 0
+    rest: Piece = {name: np.zeros(0) for name in record.names}
+    for piece in record.pieces():
+        whole = np.all([np.isfinite(v) for name, v in piece.items() if name not in record.text], axis=0)
+        left_out += int(np.count_nonzero(~whole))
+        piece = {
+            name: np.concatenate([rest[name], values[whole]]) if len(rest[name]) else values[whole]
+            for name, values in piece.items()
+        }
+        count = len(piece[record.names[0]]) // together * together
+        rest = {name: values[count:] for name, values in piece.items()}
+        kept.append(_averaged(piece, count, together))
+        rows += count // together
+        while rows > most and not record.text:
+            even = rows // 2 * 2
+            kept = [_averaged(_joined(kept, record.names), even, 2)]
+            rows, together = even // 2, 2 * together
+    return AveragedRows(_joined(kept, record.names), together, left_out)
+
+
+def _joined(pieces: list[Piece], names: Sequence[str]) -> Piece:
+    return {name: np.concatenate([one[name] for one in pieces] or [np.zeros(0)]) for name in names}
+
+
+def _averaged(piece: Piece, count: int, together: int) -> Piece:
+    """The first `count` rows in means of so many."""
+    if together == 1:
+        return {name: values[:count] for name, values in piece.items()}
+    return {name: values[:count].reshape(-1, together).mean(axis=1) for name, values in piece.items()}
+
+
+IN_MEMORY: Final = 4_000_000  # bytes up to which there is no file
+CELL: Final = 8  # bytes
+MOST_WORDS: Final = 100  # distinct ones in a column; states and joints are fewer
+
+
+class TableCopy:
+    """Rows of numbers one behind the other; a word is the number of its place in a list.
+
+    The file has no name, and is gone with this object or with the process.
+    """
+
+    def __init__(self, stream: Any, names: Sequence[str], words: Mapping[str, list[str]], rows: int) -> None:
+        self._stream, self._names, self._words, self._rows = stream, tuple(names), dict(words), rows
+
+    def pieces(self, rows: int) -> Iterator[dict[str, NDArray[Any]]]:
+        """The columns in pieces of so many rows, in their order."""
+        words = {name: np.array(listed, dtype=str) for name, listed in self._words.items()}
+        width = len(self._names)
+        for start in range(0, self._rows, rows):
+            count = min(rows, self._rows - start)
+            self._stream.seek(start * width * CELL)  # another pass may have read in between
+            block = np.frombuffer(self._stream.read(count * width * CELL)).reshape(count, width)
+            columns = dict(zip(self._names, np.ascontiguousarray(block.T), strict=True))
+            yield {
+                name: words[name][values.astype(np.int64)] if name in words else values
+                for name, values in columns.items()
+            }
+
+    def __del__(self) -> None:
+        self._stream.close()
+
+
+class TableWriter:
+    """Writes a `TableCopy` piece by piece. Where the disk is full there is none, which is no fault."""
+
+    def __init__(self, names: Sequence[str], text: Sequence[str]) -> None:
+        self._names, self._rows = tuple(names), 0
+        self._places: dict[str, dict[str, int]] = {name: {} for name in text}
+        self._stream: Any = SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115 - lives as long as the copy
+
+    def __enter__(self) -> TableWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Drop what was written, unless it was handed over."""
+        self._drop()
+
+    def add(self, piece: Mapping[str, NDArray[Any]]) -> None:
+        """Write the next rows."""
+        if self._stream is None:
+            return
+        block = np.empty((len(piece[self._names[0]]), len(self._names)))
+        for number, name in enumerate(self._names):
+            block[:, number] = self._numbers(name, piece[name]) if name in self._places else piece[name]
+        self._rows += len(block)
+        if any(len(known) > MOST_WORDS for known in self._places.values()):
+            self._drop()
+            return
+        try:
+            self._stream.write(block.data)
+        except OSError:
+            self._drop()
+
+    def copy(self) -> TableCopy | None:
+        """Hand over what was written; None where it could not be."""
+        stream, self._stream = self._stream, None
+        words = {name: list(known) for name, known in self._places.items()}
+        return None if stream is None else TableCopy(stream, self._names, words, self._rows)
+
+    def _numbers(self, name: str, values: NDArray[Any]) -> Ints:
+        """Places of words in the list, new ones put at its end, as long as they are few."""
+        known = self._places[name]
+        places = np.full(len(values), -1)
+        for word, place in known.items():
+            places[values == word] = place
+        while len(known) <= MOST_WORDS and len(left := np.flatnonzero(places < 0)):
+            word = str(values[left[0]])
+            known[word] = len(known)
+            places[left[values[left] == word]] = known[word]
+        return places
+
+    def _drop(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+
+
+BRACKETS: Final = re.compile(r"(?P<quantity>[^\[\](){}]+)[\[({](?P<unit>[^\[\](){}]+)[\])}]")
+EACH: Final = ".*"  # behind a name: of each part of the device that it is followed by
+
+# Unit that a column is named by -> units that people record it in, and by what they are multiplied.
+OTHER_UNITS: Final = {
+    "rad": {
+        "deg": "pi/180",
+        "degree": "pi/180",
+        "degrees": "pi/180",
+        "mrad": "0.001",
+        "rev": "2 pi",
+        "counts": "",
+    },
+    "m": {"mm": "0.001", "um": "1e-6", "cm": "0.01", "counts": ""},
+    "N": {"mN": "0.001", "kN": "1000", "V": ""},
+    "Nm": {"mNm": "0.001", "Nmm": "0.001", "mN_m": "0.001", "V": ""},
+    "s": {"ms": "0.001", "us": "1e-6", "min": "60"},
+    "A": {"mA": "0.001"},
+    "Hz": {"kHz": "1000", "rad_per_s": "1/(2 pi)"},
+    "N_per_m": {"N_per_mm": "1000"},
+    "Ns_per_m": {"Ns_per_mm": "1000"},
+}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns that a kind of measurement has.
+
+    needed    each of them, or one of several where they are alternatives: ("time_s", ("force_N", "torque_Nm")).
+              A name that ends in ".*" stands for all columns that begin so, one or more, each of another part of
+              the device: "angle_rad.*" for angle_rad.upper and angle_rad.lower; or for angle_rad alone, of a
+              device with one such part. Alternatives with ".*" may stand beside each other. MATLAB's names have no
+              dot: angle_rad_upper is read, too
+    optional  numbers that are read where they are there
+    text      the same, words or numbers: names of joints, of those who held the device
+    """
+
+    needed: tuple[str | tuple[str, ...], ...]
+    optional: tuple[str, ...] = ()
+    text: tuple[str, ...] = ()
+
+    @property
+    def listed(self) -> str:
+        """The needed columns as messages name them."""
+        return ", ".join(one if isinstance(one, str) else " or ".join(one) for one in self.needed)
+
+    def choose(self, names: Sequence[str]) -> tuple[list[str], str]:
+        """The columns to read of those that a table has, and what is wrong with them; "" if nothing."""
+        chosen, faults = list[str](), list[str]()
+        for one in self.needed:
+            choices = (one,) if isinstance(one, str) else one
+            several = any(choice.endswith(EACH) for choice in choices)
+            present = [name for choice in choices for name in _matching(choice, names)]
+            if len(present) > 1 and not several:
+                faults.append(f"columns {' and '.join(present)} are alternatives; keep one of them")
+            elif not present:
+                faults.append(f"column {' or '.join(choices)} is missing{self._other_unit(choices, names)}")
+            chosen += present if several else present[:1]
+        optional = [name for one in (*self.optional, *self.text) for name in _matching(one, names)]
+        if not optional:  # a force in another unit must not be taken for none
+            hints = {one: self._other_unit((one,), names) for one in self.optional}
+            faults += [f"column {one} is missing{hint}" for one, hint in hints.items() if hint]
+        chosen += optional
+        if twice := header_fault(names, [], chosen).partition(";")[0]:
+            faults.append(twice)
+        if faults and not any(" is there: " in fault for fault in faults):
+            separated = header_fault(names, chosen or ["?"]).partition(": ")[2] if len(names) == 1 else ""
+            faults.append(separated or _no_header(names) or f"needed are {self.listed}")
+        return chosen, "; ".join(faults)
+
+    @staticmethod
+    def _other_unit(choices: Sequence[str], names: Sequence[str]) -> str:
+        """A hint where a column of the same quantity is there, written otherwise or in another unit."""
+        written = {plain_name(name).lower(): name for name in reversed(names)}
+        plain = [plain_name(name) for name in names]
+        for choice in choices:
+            if not choice.endswith(EACH) and choice.lower() in written:
+                return f"; '{written[choice.lower()]}' is there: name it {choice}"
+            quantity, _, unit = choice.removesuffix(EACH).partition("_")
+            each = EACH if choice.endswith(EACH) else ""
+            for other, factor in OTHER_UNITS.get(unit, {}).items():
+                for there in _matching(f"{quantity}_{other}{each}", plain):
+                    by = f"multiply by {factor}" if factor else "multiply by the value of one"
+                    named = there.replace(f"{quantity}_{other}", f"{quantity}_{unit}", 1)
+                    return f"; {names[plain.index(there)]} is there: {by} and name it {named}"
+        return ""
+
+
+def plain_name(name: str) -> str:
+    """A column's name as this project writes it, of one with its unit in brackets; others stay as they are.
+
+    >>> [plain_name(name) for name in ("Time [s]", "torque (mN m)", "motor angle_rad")]
+    ['time_s', 'torque_mNm', 'motor angle_rad']
+    """
+    found = BRACKETS.fullmatch(name.strip())
+    if found is None:
+        return name
+    quantity, unit = found["quantity"].strip().lower(), re.sub(r"[\s*·.]", "", found["unit"])
+    return f"{quantity.replace(' ', '_')}_{unit.replace('/', '_per_')}"
+
+
+def _no_header(names: Sequence[str]) -> str:
+    """What stands where the names of columns should; "" where names do."""
+    if names and names[0].startswith(("#", "%", "//")):
+        return "the line is a comment; begin with the line that names the columns"
+    try:
+        [float(name) for name in names]
+    except ValueError:
+        return ""
+    return "the line holds numbers; write the names of the columns above them" if names else ""
+
+
+def _matching(wanted: str, names: Sequence[str]) -> list[str]:
+    """The columns that a wanted name stands for, in their order.
+
+    >>> _matching("angle_rad.*", ["time_s", "angle_rad.upper", "angle_rad_lower"])
+    ['angle_rad.upper', 'angle_rad_lower']
+    """
+    if not wanted.endswith(EACH):
+        return [wanted] if wanted in names else []
+    stem = wanted.removesuffix(EACH)
+    return [name for name in dict.fromkeys(names) if name == stem or name.startswith((f"{stem}.", f"{stem}_"))]

@@ -1,4 +1,9 @@
-"""The longest stretch of a record of a sweep without a gap, block by block, and what its checks want to know."""
+"""The longest stretch of a record of a sweep without a gap, block by block, and what its checks want to know.
+
+Whether both parts of a sweep excite the same frequencies.
+
+Whether two parts of a record excite the same frequencies, so that one can be predicted from the other.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import Sampling
-from zwidth.model.encoder_step import encoder_step
+from zwidth.model.raw_sweep import encoder_step
 
 FIRST: Final = 2**20  # samples from which the encoder's step is read
 
@@ -104,3 +109,39 @@ class SweepRange:
             low, high = least, most
         ends = list(zip(low.tolist(), high.tolist(), strict=True))
         return cls(ends[0], ends[1], at_high, at_low, levels, step)
+
+
+SEGMENTS: Final = 8  # in the shorter part, whose spectra are averaged
+
+
+def shared_excitation(sweep: SweepBlocks, cut: int) -> float:
+    """`shared_power` of the force in both parts of a sweep, by averaged Hann-windowed segments.
+
+    Of noise about 0.8; of one chirp that goes up, nearly 0.
+
+    cut  first sample of the second part
+    """
+    length = max(min(cut, len(sweep) - cut) // SEGMENTS, 1)
+    parts = [_spectrum(part, length) for part in (sweep.part(0, cut), sweep.part(cut, len(sweep)))]
+    return shared_power(*parts)
+
+
+def _spectrum(sweep: SweepBlocks, length: int) -> Floats:
+    """Summed spectra (k,) of the force without its mean."""
+    window, total = np.hanning(length + 2)[1:-1], np.zeros(length // 2 + 1)
+    for force, _ in sweep.blocks(length):
+        total += np.abs(np.fft.rfft(window * (force - np.mean(force)))) ** 2
+    return total
+
+
+LEAST_SHARED: Final = 0.2  # of the power, from which on one part tells of the other
+
+
+def shared_power(first: Floats, second: Floats) -> float:
+    """Share of two spectra (k,) of power that both have: the sum of the smaller one, each of sum 1; 0 if one is 0.
+
+    >>> shared_power(np.array([1.0, 1.0, 0.0]), np.array([0.0, 4.0, 4.0]))
+    0.5
+    """
+    sums = float(np.sum(first)), float(np.sum(second))
+    return float(np.sum(np.minimum(first / sums[0], second / sums[1]))) if min(sums) > 0.0 else 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from zwidth.arrays import Flags, Floats
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
-from zwidth.identify.stiffness.strokes import (
+from zwidth.identify.stiffness.spring_fit import (
     Resolution,
     Strokes,
     joined,

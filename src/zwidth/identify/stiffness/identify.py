@@ -2,11 +2,13 @@
 
 The link is blocked, the motor pulls at its transmission, slowly, up and down; or the motor is blocked and the link
 is loaded. The thesis measures its Table 3.3 so (section 3.1.3, Fig. 3.5).
+
+The drive of a mechanism that a measurement is of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, Final, Literal
@@ -14,15 +16,12 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from zwidth.device.device import Device
-from zwidth.device.faults import comma_list, fail, plural
-from zwidth.identify.drives import Drive, drive_named
+from zwidth.device.faults import comma_list, dotted, fail, plural, quote, suggestion
+from zwidth.device.legs import members, written
 from zwidth.identify.identification import Estimate, Identification, refused
-from zwidth.identify.records.averaged_rows import averaged_rows
-from zwidth.identify.records.columns import Columns
-from zwidth.identify.records.record import Record
+from zwidth.identify.records.record import Columns, Record, averaged_rows
 from zwidth.identify.stiffness.checks import Run, check_runs
-from zwidth.identify.stiffness.spring_fit import SpringFit, fit_spring
-from zwidth.identify.stiffness.strokes import Resolution, Strokes, joined, strokes_of
+from zwidth.identify.stiffness.spring_fit import Resolution, SpringFit, Strokes, fit_spring, joined, strokes_of
 from zwidth.progress import Progress
 
 COLUMNS: Final = Columns(("torque_Nm", "angle_rad"), text=("joint",))
@@ -274,3 +273,58 @@ def _together(parts: Sequence[Identification]) -> Identification:
         tuple(remark for part in parts for remark in part.remarks),
         curves,
     )
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive as the device file has it.
+
+    name   of the drive
+    joint  link whose joint it drives
+    path   of its table in the file
+    table  its keys and values
+    """
+
+    name: str
+    joint: str
+    path: str
+    table: Mapping[str, Any]
+
+
+def drives_of(device: Device) -> list[Drive]:
+    """The drives of a device in the order of the file, those of legs once each. Raises DeviceError for a device
+    without a mechanism."""
+    if device.mechanism is None:
+        raise fail(device.label, "mechanism", "is missing: this is identified of a mechanism's drives")
+    return [
+        Drive(entry["name"], entry["joint"], dotted(("mechanism", *path), device.document), entry)
+        for path, entry in written(device.document["mechanism"], "drives")
+    ]
+
+
+def drive_named(device: Device, name: str | None) -> Drive:
+    """The drive of this name, or on the joint of this link; of a leg also as one of its copies (arm-1); or counted
+    from 1 in the order of the file.
+
+    name    None: the only one
+    Raises  DeviceError  where there is none such, or several and none is named
+    """
+    drives = drives_of(device)
+    listed = comma_list([drive.name for drive in drives])
+    if not drives:
+        raise fail(device.label, "mechanism.drives", "holds no drive")
+    if name is None:
+        if len(drives) > 1:
+            raise fail(device.label, "joint", f"is not named, and the device has several drives: {listed}")
+        return drives[0]
+    for drive in drives:
+        if name in (drive.name, drive.joint):
+            return drive
+    for copy in members(device.document["mechanism"], "drives"):
+        if name in (copy.entry["name"], copy.entry["joint"]):
+            path = dotted(("mechanism", *copy.path), device.document)
+            return next(drive for drive in drives if drive.path == path)
+    if name.isdigit() and 1 <= int(name) <= len(drives):
+        return drives[int(name) - 1]
+    known = {word for drive in drives for word in (drive.name, drive.joint)}
+    raise fail(device.label, "joint", f"{quote(name)} is no drive or joint; {suggestion(name, known, 'drives')}")

@@ -7,8 +7,7 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.parameter_checks import LONGEST, check_period
+from zwidth.loop.estimator import LONGEST, Estimator, check_period
 from zwidth.model.design_axes import Number, stack_numbers
 
 

@@ -7,8 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.window import mean_difference
+from zwidth.loop.estimator import Estimator, mean_difference
 
 
 @dataclass(frozen=True)

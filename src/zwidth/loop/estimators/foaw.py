@@ -8,8 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.loop.estimator import Estimator, NonlinearError
-from zwidth.loop.estimators.parameter_checks import check_period, check_positive, check_whole
+from zwidth.loop.estimator import Estimator, NonlinearError, check_period, check_positive, check_whole
 
 Fit = Literal["end-fit", "best-fit"]
 

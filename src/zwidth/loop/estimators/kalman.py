@@ -7,9 +7,8 @@ from math import sqrt
 
 import numpy as np
 
-from zwidth.loop.estimator import Estimator
+from zwidth.loop.estimator import Estimator, check_period, check_positive, quantisation_noise
 from zwidth.loop.estimators.alpha_beta import AlphaBeta
-from zwidth.loop.estimators.parameter_checks import check_period, check_positive, quantisation_noise
 from zwidth.model.design_axes import Number
 
 # Tracking indices that make a usable filter. Below, it is late by eight hundred samples and more; above, it is the

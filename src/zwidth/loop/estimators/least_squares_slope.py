@@ -7,9 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.parameter_checks import LONGEST, check_whole
-from zwidth.loop.estimators.window import mean_difference
+from zwidth.loop.estimator import LONGEST, Estimator, check_whole, mean_difference
 
 
 @dataclass(frozen=True)

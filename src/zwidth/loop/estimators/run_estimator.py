@@ -7,11 +7,9 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled
-from zwidth.loop.estimator import Estimator
+from zwidth.loop.estimator import Estimator, check_period
 from zwidth.loop.estimators import Foaw, Levant, VelocityMethod
-from zwidth.loop.estimators.foaw_kernel import foaw_estimate
-from zwidth.loop.estimators.levant_kernel import levant_estimate
-from zwidth.loop.estimators.parameter_checks import check_period
+from zwidth.loop.estimators.kernels import foaw_estimate, levant_estimate
 from zwidth.model.argument_checks import wrong_type
 
 

@@ -10,9 +10,7 @@ from math import factorial, lcm
 
 import numpy as np
 
-from zwidth.loop.estimator import Estimator
-from zwidth.loop.estimators.parameter_checks import LONGEST, check_whole
-from zwidth.loop.estimators.window import mean_difference
+from zwidth.loop.estimator import LONGEST, Estimator, check_whole, mean_difference
 
 # Highest degree. Through eleven positions, the fewest for degree 10, the slope at the newest passes 67 times the
 # noise that the backward difference does.

@@ -21,8 +21,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats
-from zwidth.loop.measured.modal_terms import hold_response
-from zwidth.loop.measured.pole_fit import PathData, PoleModel, fit_poles
+from zwidth.loop.measured.pole_fit import PathData, PoleModel, fit_poles, hold_response
 from zwidth.model.response import (
     LEAST_COHERENCE,
     MeasuredHandle,

@@ -16,8 +16,17 @@ import numpy as np
 
 from zwidth.arrays import Complexes, Floats
 from zwidth.loop.measured.measured_port import path_data
-from zwidth.loop.measured.modal_terms import continuous_terms, sampled_free_mass, sampled_terms
-from zwidth.loop.measured.pole_fit import PATHS, PathData, PoleModel, fit_poles, mode_atoms, stacked
+from zwidth.loop.measured.pole_fit import (
+    PATHS,
+    PathData,
+    PoleModel,
+    continuous_terms,
+    fit_poles,
+    mode_atoms,
+    sampled_free_mass,
+    sampled_terms,
+    stacked,
+)
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response, ResponseError
 

@@ -25,7 +25,7 @@ from zwidth.show.app.request import (
 )
 from zwidth.show.cli.errors import BadInput, NoAnswer, explain, translate_errors
 from zwidth.show.cli.options import Question
-from zwidth.show.cli.process import BAD_INPUT, NO_ANSWER
+from zwidth.show.cli.progress import BAD_INPUT, NO_ANSWER
 
 Contents = tuple[dict[str, Any], Mapping[str, Any]]  # a head, and its arrays
 STATUS: Final = {NO_ANSWER: "no answer", BAD_INPUT: "bad input"}

@@ -1,4 +1,7 @@
-"""What is drawn while a number is dragged: the chart and all that can be switched on beside it."""
+"""What is drawn while a number is dragged: the chart and all that can be switched on beside it.
+
+Other faces of one wall: impedance over frequency, Nyquist plot with passivity disks, eigenvalues.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,75 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.nyquist import terms_along
+from zwidth.chart.verdict import eigenvalues
 from zwidth.device.device import Device
 from zwidth.device.read import DEVICES, OPERATORS, bundled, bundled_names
+from zwidth.guarantees.disks import response_disks
+from zwidth.guarantees.port import port
+from zwidth.guarantees.stable_alone import stable_alone
+from zwidth.loop.circle_factors import circle_factors
+from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_errors import MissingNumbersError
+from zwidth.loop.point_text import MissingNumbersError
 from zwidth.measures.catalogue import MEASURES
 from zwidth.model.operator import ABOUT_AN_AXIS
 from zwidth.model.posture_failure import OutOfReach
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
-from zwidth.show.app.request import State
-from zwidth.show.mass_chain import MassChain, as_chain
-from zwidth.show.mechanism_scene import mechanism_scene, stays_in_plane
-from zwidth.show.scene_rates import mode_strokes
+from zwidth.show.app.request import State, Wall
+from zwidth.show.mechanism_scene import MassChain, as_chain, mechanism_scene, mode_strokes, stays_in_plane
+
+LOWEST: Final = 1e-3  # rad, of the angles at which the Nyquist plot is computed
+ANGLES: Final = 1200
+DISKS: Final = 25  # of the angles, at which a disk is drawn
+
+
+def impedance(point: OperatingPoint, wall: Wall) -> Contents:
+    """What the hand feels of the wall over frequency, beside the commanded impedance and that of free motion."""
+    felt = point.felt(wall.stiffness, wall.damping)
+    arrays = {
+        "frequency": felt.frequency,
+        "commanded": np.abs(felt.commanded_impedance),
+        "free": np.abs(felt.free_motion_impedance),
+    }
+    if felt.felt_impedance is not None:
+        arrays["felt"] = np.abs(felt.felt_impedance)
+    return {"static_stiffness": felt.static_stiffness, "free_motion_mass": felt.free_motion_mass}, arrays
+
+
+def nyquist(point: OperatingPoint, wall: Wall) -> Contents:
+    """The open loop L = P (K + B w) over the upper half of the unit circle, (k, 3) with angles; the wall is stable
+    where it goes round -1 as often as it must. With every passive operator P fills a disk at each frequency, and
+    so does L: rows (real, imaginary, radius, frequency). In any passive hand it is stable if no disk holds -1.
+    """
+    loop = point.loop
+    angles = np.geomspace(LOWEST, np.pi - LOWEST, ANGLES)
+    A, AP, APw = terms_along(circle_factors(table_of_loops(loop)), angles).T
+    L = (wall.stiffness * AP + wall.damping * APw) / A
+    arrays: dict[str, Any] = {"open_loop": np.column_stack([L.real, L.imag, angles / (2.0 * np.pi * loop.period)])}
+    head: dict[str, Any] = {}
+    free = point.without_operator.loop
+    handle = free.plant.handle
+    if handle is None:
+        return {"no_disks": "the plant has no handle, at which an operator could hold it"}, arrays
+    alone = stable_alone(free)
+    if alone.fails or point.load_omissions:
+        return {"no_disks": alone.reason or point.load_omissions[0]}, arrays
+    every = angles[:: max(1, ANGLES // DISKS)]
+    disks = response_disks(free, port(free.plant, handle), every)
+    A, AP, APw = terms_along(circle_factors(table_of_loops(free)), every).T
+    law = (wall.stiffness * AP + wall.damping * APw) / AP
+    centre, radius = disks.centre * law, disks.radius * np.abs(law)
+    arrays["disks"] = np.column_stack([centre.real, centre.imag, radius, every / (2.0 * np.pi * loop.period)])
+    return head, arrays
+
+
+def eigenvalues_of(point: OperatingPoint, wall: Wall) -> Contents:
+    """The eigenvalues of the loop with the wall, rows (real, imaginary)."""
+    z = np.sort_complex(eigenvalues(point.loop, wall.stiffness, wall.damping).ravel())
+    return {}, {"z": np.column_stack([z.real, z.imag])}
+
 
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
@@ -340,18 +399,15 @@ def scene_rates(point: OperatingPoint) -> Contents:
     }
 
 
-def _face(name: str) -> Layer:
+def _face(draw: Callable[[OperatingPoint, Wall], Contents]) -> Layer:
     """One of the other faces of the state's wall."""
 
     def face(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
-        from zwidth.show.app import faces
-
         if state.wall is None:
             raise ValueError("choose a wall on the chart first")
         if point.response is not None:
             raise ValueError("there is no such picture of a measured response")
-        contents: Contents = getattr(faces, name)(point, state.wall)
-        return contents
+        return draw(point, state.wall)
 
     return face
 
@@ -364,7 +420,7 @@ def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 
 def touch_blocks(point: OperatingPoint, start_position: float = 0.0, start_velocity: float = 0.0) -> Contents:
     """The blocks of `touch_step` for the page, held by the point's hand. Raises ValueError: not covered."""
-    from zwidth.contact.touch_numbers import arm_spring, touch_numbers
+    from zwidth.contact.touch_step import arm_spring, touch_numbers
 
     made = touch_numbers(point.loop, start_position=start_position, start_velocity=start_velocity)
     arm = arm_spring(point.operator) if point.operator is not None else (0.0, 0.0)
@@ -395,9 +451,9 @@ LAYERS: dict[str, Layer] = {
     "hands": _hands,
     "guarantees": _guarantees,
     "bounds": _bounds,
-    "impedance": _face("impedance"),
-    "nyquist": _face("nyquist"),
-    "eigenvalues": _face("eigenvalues_of"),
+    "impedance": _face(impedance),
+    "nyquist": _face(nyquist),
+    "eigenvalues": _face(eigenvalues_of),
     "touch": _touch,
 }
 # In this order they are computed; these need the chart.

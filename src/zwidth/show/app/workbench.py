@@ -12,9 +12,8 @@ from zwidth.device.device import Device
 from zwidth.model.argument_checks import require
 from zwidth.show.app.opened import changes
 from zwidth.show.app.request import State
-from zwidth.show.app.run import address_of, listen, make_server
+from zwidth.show.app.run import address_of, listen, make_server, start_of_device
 from zwidth.show.app.server import Settings
-from zwidth.show.app.start import start_of_device
 
 HEIGHT: Final = 760  # css px of the page in a notebook
 LONGEST_START: Final = 20.0  # s

@@ -8,7 +8,7 @@ from typing import Any, Final
 import click
 
 from zwidth.show.cli.options import example
-from zwidth.show.cli.process import DONE, say
+from zwidth.show.cli.progress import DONE, say
 
 LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
 
@@ -41,8 +41,7 @@ def app(
     DEVICE is a bundled name or a file; left out: the page offers the bundled ones. Only this computer can connect,
     and no file is read but DEVICE and what it names. Ctrl-C ends it.
     """
-    from zwidth.show.app.run import serve
-    from zwidth.show.app.start import start_of
+    from zwidth.show.app.run import serve, start_of
 
     start: dict[str, Any] = start_of(device, settings)
     if host not in LOOPBACK and not token:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
     from zwidth.chart.decay import FastestDecay
     from zwidth.chart.measured.chart import MeasuredChart
-    from zwidth.chart.measured.usable_frequencies import UnusableRange
+    from zwidth.chart.measured.loop import UnusableRange
 
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0"
 SHOWN_STRETCHES: Final = 6  # stretches named on a terminal
@@ -136,7 +136,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
         yield "stable regions", f"{len(chart.regions)}"
     if chart.unobserved_modes:
         from zwidth.chart.chart import StabilityChart
-        from zwidth.loop.unobserved_instability import unobserved_instability
+        from zwidth.loop.loop import unobserved_instability
 
         names = ", ".join(listed_names(chart.unobserved_modes))
         warned = "; WARNING: this motion is unstable, whatever the wall"

@@ -16,15 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 
-from zwidth.show.cli.answer import Answer, deliver
+from zwidth.show.cli.answer import Answer, deliver, heading
 from zwidth.show.cli.errors import NoAnswer, translate_errors
 from zwidth.show.cli.first_use import announce_compiling
-from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.progress import show_progress
-from zwidth.show.moment_units import keys_of_moments, speaking_of_moments
 from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
-from zwidth.show.units import amount, percent, typed
+from zwidth.show.units import amount, keys_of_moments, percent, speaking_of_moments, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -268,7 +266,7 @@ class Command:
         reason = self.reason(case, result)
         document = self.circumstances(case) | self.document(case, result)
         if self.answers_by_fit and case.device.response is not None:
-            from zwidth.chart.measured.fit_check import fit_document
+            from zwidth.chart.measured.chart import fit_document
 
             document["fit"] = fit_document(case.point)
         document |= {"decided": True} if self.may_be_undecided and "decided" not in document else {}

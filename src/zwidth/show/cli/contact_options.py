@@ -133,7 +133,7 @@ def environment_from_options(
     parameters  of --parameter; the others are those that have an option of their own
     Raises      BadInput  for an unknown environment, a file that does not serve, or parameters that do not
     """
-    from zwidth.contact.contact_arguments import environment_with_values
+    from zwidth.contact.point_contact import environment_with_values
 
     with translate_contact_errors():
         return environment_with_values(
@@ -166,8 +166,7 @@ def translate_contact_errors() -> Iterator[None]:
     Raises  BadInput  for what `simulate_contact` does not take, under the options' names
             NoAnswer  where the environment gives no force
     """
-    from zwidth.contact.contact_arguments import ContactArgumentError
-    from zwidth.contact.simulate_contact import NoForceError
+    from zwidth.contact.point_contact import ContactArgumentError, NoForceError
     from zwidth.memory_limit import TooLarge
 
     try:

@@ -13,7 +13,7 @@ import click
 
 from zwidth.device.faults import SETTINGS, DeviceError, Fault
 from zwidth.processors import ProcessorError
-from zwidth.show.cli.process import BAD_INPUT, INTERNAL, INTERRUPTED
+from zwidth.show.cli.progress import BAD_INPUT, INTERNAL, INTERRUPTED
 from zwidth.show.output import OutputError, printable
 from zwidth.study.boundary.points_file import PointsError
 
@@ -55,7 +55,7 @@ def translate_errors(question: Question) -> Iterator[None]:
     """
     from zwidth.chart.edge_by_eigenvalues import ChartError
     from zwidth.loop.estimator import NonlinearError
-    from zwidth.loop.point_errors import MissingNumbersError
+    from zwidth.loop.point_text import MissingNumbersError
     from zwidth.loop.sections import HysteresisError, UnmovedError
     from zwidth.model.equilibrium import EquilibriumError, SidewaysForceError
     from zwidth.model.load import LoadError

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import two_columns
+from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
-from zwidth.show.cli.heading import omissions
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
 from zwidth.show.cli.resumable import (
@@ -27,7 +26,7 @@ from zwidth.show.units import amount
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
-    from zwidth.study.safe_walls.table import SafeWalls
+    from zwidth.study.wall_tables.table import SafeWalls
 
 HEADER: Final = ".h"
 ARRAY: Final = ".nc"
@@ -201,7 +200,7 @@ class ExportCommand(Command):
 
     def compute(self, case: CommandLine) -> SafeWalls:
         from zwidth.memory_limit import TooLarge
-        from zwidth.study.safe_walls.safe_walls import SafeWallsError, compute_table, safe_walls_job
+        from zwidth.study.wall_tables.safe_walls import SafeWallsError, compute_table, safe_walls_job
         from zwidth.study.workspace.plane_grid import PlaneError
 
         question, device = case.question, case.device
@@ -249,11 +248,11 @@ class ExportCommand(Command):
     def write(
         self, case: CommandLine, result: SafeWalls, document: dict[str, Any], reason: str | None
     ) -> str | None:
-        from zwidth.study.safe_walls.job import SafeWallsJob
+        from zwidth.study.wall_tables.safe_walls import SafeWallsJob
 
         assert case.path is not None
         if case.writes([HEADER]):
-            from zwidth.show.safe_walls.header import header_text
+            from zwidth.show.safe_walls_header import header_text
 
             write_text(case.path, header_text(result))
         elif case.writes([ARRAY]):
@@ -276,7 +275,7 @@ class ExportCommand(Command):
     def write_others(self, case: CommandLine, result: SafeWalls) -> dict[str, Path]:
         if case["arduino"] is None:
             return {}
-        from zwidth.show.safe_walls.header import write_sketch
+        from zwidth.show.safe_walls_header import write_sketch
 
         folder = Path(case["arduino"])
         write_sketch(folder, result)
@@ -306,7 +305,7 @@ def _check_folder(folder: Path) -> None:
 
 def _check_sketch(name: str, device: Device) -> None:
     """Raise BadInput for a device whose loop the sketch does not compute."""
-    from zwidth.show.safe_walls.header import sketch_obstacle
+    from zwidth.show.safe_walls_header import sketch_obstacle
 
     if obstacle := sketch_obstacle(device.controller):
         raise BadInput(f"--arduino: {printable(name)}: {obstacle}")

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import Final, NamedTuple
 
 from zwidth.compile_events import listening
-from zwidth.show.cli.process import say, time_text
+from zwidth.show.cli.progress import say, time_text
 
 GROUPS: Final = 2  # of kernels that have little in common, see compile_group
 SECONDS_BETWEEN: Final = 5.0  # lines that say what remains

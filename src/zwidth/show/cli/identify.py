@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
 
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import heading, table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import (
     Callback,
     Finite,
@@ -167,7 +166,7 @@ class IdentifyCommand(Command):
         """The device file with the numbers, where that is wanted and there are some."""
         if not case["write"] or result.not_written or not result.settings:
             return {}
-        from zwidth.device.edit_file import edited_text
+        from zwidth.device.address import edited_text
         from zwidth.identify.identification import interval, written_value
 
         case.device.with_(result.settings)  # what they make must be a device

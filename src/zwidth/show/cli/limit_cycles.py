@@ -93,7 +93,7 @@ class LimitCyclesCommand(Command):
         }
 
     def compute(self, case: CommandLine) -> LimitCyclePrediction:
-        from zwidth.contact.predict_limit_cycles import (
+        from zwidth.contact.wall_limit_cycles import (
             NoEncoderStepsError,
             NothingNonlinearError,
             amplitude_dependent,

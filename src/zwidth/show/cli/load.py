@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import heading, table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.heading import heading
 from zwidth.show.cli.options import Finite
-from zwidth.show.moment_units import spoken_unit
-from zwidth.show.units import amount, as_written, seconds, signed, typed, vector
+from zwidth.show.units import amount, as_written, seconds, signed, spoken_unit, typed, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.device.device import Device
-    from zwidth.study.load.load_path import LoadPath, PushedChart
+    from zwidth.study.load_path import LoadPath, PushedChart
 
 
 def _check_push(ctx: click.Context, param: click.Parameter, push: float) -> float:
@@ -154,7 +152,7 @@ def _of_push(case: CommandLine) -> tuple[str, ...]:
 
 def _unpushed(case: CommandLine) -> Device:
     """The device with what is kept of its load."""
-    from zwidth.study.load.load_path import without_push
+    from zwidth.study.load_path import without_push
 
     kept = without_push(case.device.load)
     return _bare(case) if kept is None else case.device.under(kept)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TextIO
 
-from zwidth.show.cli.process import BAD_INPUT, DONE, interrupted, say, stopped_in_a_kernel
+from zwidth.show.cli.progress import BAD_INPUT, DONE, interrupted, say, stopped_in_a_kernel
 
 
 def main() -> None:

@@ -1,4 +1,7 @@
-"""`zwidth map`: a measure over the workspace."""
+"""`zwidth map`: a measure over the workspace.
+
+Text page of `zwidth map`.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +11,30 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+import numpy as np
 
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.wanted import WANTED_NUMBERS, WantedNumber
+from zwidth.measures.definition import OK, STATUS, WANTED_NUMBERS, WantedNumber
+from zwidth.show.circumstances import computer_text, load_text
+from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, processor_option, refuse_empty
 from zwidth.show.cli.resumable import check_workers, report_kept_work, worker_options
-from zwidth.show.output import ARRAYS, DATA, FIGURES
+from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
+from zwidth.show.units import amount, area_text, percent, typed, vector
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from zwidth.device.device import Device
     from zwidth.measures.definition import Measure
-    from zwidth.study.designs.requirement import Requirement
+    from zwidth.study.designs.column import Requirement
     from zwidth.study.workspace.common_area import CommonArea
     from zwidth.study.workspace.plane_grid import PlaneGrid
+
 
 PLANES: Final = ("xy", "xz", "yz")
 
@@ -242,17 +251,17 @@ class MapCommand(Command):
         return MapResult(dataset, common_area(dataset, required) if required else None)
 
     def document(self, case: CommandLine, result: MapResult) -> dict[str, Any]:
-        from zwidth.study.workspace.map_data import map_document
+        from zwidth.study.workspace.map import map_document
 
         return map_document(result.dataset, case.device, result.area)
 
     def table(self, case: CommandLine, result: MapResult, document: Mapping[str, Any]) -> dict[str, Any]:
-        from zwidth.study.workspace.map_data import map_table
+        from zwidth.study.workspace.map import map_table
 
         return map_table(result.dataset)
 
     def reason(self, case: CommandLine, result: MapResult) -> str | None:
-        from zwidth.study.workspace.map_data import why_no_cell
+        from zwidth.study.workspace.map import why_no_cell
 
         return why_no_cell(result.dataset)
 
@@ -260,7 +269,6 @@ class MapCommand(Command):
         return ""  # the pages begin with the plane and its cells
 
     def pages(self, case: CommandLine, result: MapResult, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.cli.map_page import map_page
 
         return map_page(result.dataset, case.device, result.area, document)
 
@@ -290,8 +298,8 @@ def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
     """What to map, the first of them shown; and the requirements."""
     from zwidth.measures.catalogue import find_measure
     from zwidth.measures.user_measures import load_measures
-    from zwidth.study.designs.requirement import parse_requirement
-    from zwidth.study.workspace.direction_share import NAME, share_measure
+    from zwidth.study.designs.column import parse_requirement
+    from zwidth.study.workspace.extreme_direction import NAME, share_measure
 
     file, names = case["measures_file"], case["measures"]
     option = "--measures-file"
@@ -340,3 +348,77 @@ def _plane(case: CommandLine) -> PlaneGrid:
         pass
     ranges = case["x_range"], case["y_range"]
     return plane_of(device, case["plane"], case["through"], *ranges, case["cells"], assembly)
+
+
+def map_page(
+    dataset: xr.Dataset, device: Device, area: CommonArea | None, document: Mapping[str, Any]
+) -> Iterator[Any]:
+    """The map in a few numbers: what and where, each measure over the workspace, requirements, notes.
+
+    document  of the map, as `study.workspace.map_data.map_document` makes it
+    """
+    measures = document.get("measures") or {document["measure"]: document}
+    yield _heading(dataset, device, list(measures))
+    for name, one in measures.items():
+        yield f"\n{one['title']} ({name})"
+        yield two_columns(list(_rows(dataset, name, one["overall"])))
+    if area is not None:
+        yield "\nRequirements"
+        yield two_columns(list(_area_rows(area)))
+    yield from map(printable, document["notes"])
+
+
+def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
+    """Three lines at most: the map and the device; the computer; what is left out. Of what matters to no measure,
+    the direction or the linearity, nothing is said."""
+    about = dataset.attrs
+    towards = about["direction"]
+    way = f"along the {towards} direction of each cell" if isinstance(towards, str) else f"along {vector(towards)}"
+    along = any(dataset[name].attrs["along"] for name in names)
+    nx, ny = dataset.sizes["x_m"], dataset.sizes["y_m"]
+    plane = f"{nx} x {ny} cells of the plane {about['plane']}"
+    if about["plane"] not in ("xy", "xz", "yz"):
+        plane += f" along {vector(about['plane_axes'][:3])} and {vector(about['plane_axes'][3:])}"
+    plane += f" through {vector(about['plane_through_m'], 'm')}"
+    held = f", held by {printable(about['operator'])}" if about["operator"] != "none" else ""
+    if device.load is not None:
+        load = device.load.along_every_direction if isinstance(towards, str) else device.load
+        held += f", under {load_text(load)}"
+    which = f"{way + ', ' if along else ''}assembly {about['assembly']}, model {about['model']}{held}"
+    lines = [f"{printable(device.name)}: {plane}, {which}", computer_text(device.controller)]
+    linear = any(dataset[name].attrs["linear"] for name in names)
+    return "\n".join([*lines, *omissions(device, str(about["model"]), linear=linear)])
+
+
+def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    values, status = dataset[name].values, dataset[f"{name}_status"].values
+    unit, better = str(dataset[name].attrs.get("unit", "")), dataset[name].attrs["better"]
+    if (status == OK).any():
+        yield "average", _amount(overall["average"], unit)
+        low, high = (
+            ("worst", "best") if better == "higher" else ("best", "worst") if better else ("lowest", "highest")
+        )
+        for label, at in ((low, np.nanargmin(values)), (high, np.nanargmax(values))):
+            row, column = np.unravel_index(at, values.shape)
+            where = vector((dataset["x_m"].values[column], dataset["y_m"].values[row]), "m")
+            yield label, f"{_amount(values[row, column], unit)} at {where}"
+        yield "uniformity", f"{amount(overall['uniformity'])} (smallest over largest)"
+        for key, title in (("conditioning_index", "conditioning index"), ("isotropy_index", "isotropy index")):
+            if key in overall:
+                yield title, amount(overall[key])
+    counts = np.bincount(status.ravel(), minlength=256)
+    yield "cells", ", ".join(f"{counts[k]} {text}" for k, text in STATUS.items() if counts[k])
+
+
+def _amount(value: float, unit: str) -> str:
+    return "infinite" if value == np.inf else amount(value, unit.replace("N s", "Ns"))
+
+
+def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
+    for requirement, region in zip(area.requirements, area.regions, strict=True):
+        yield requirement.text, _area(region.area, region.share)
+    yield "common area", _area(area.common.area, area.common.share)
+
+
+def _area(area: float, share: float) -> str:
+    return f"{area_text(area).replace('²', '^2')}, {typed(percent(share))} of the reachable area"

@@ -1,10 +1,16 @@
-"""`zwidth move`: a whole mechanism in motion."""
+"""`zwidth move`: a whole mechanism in motion.
+
+Text page of a whole mechanism's motion.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any, Final
 
+from zwidth.show.circumstances import computer_text
+from zwidth.show.cli.answer import Row, table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
 from zwidth.show.cli.move_options import (
@@ -15,11 +21,16 @@ from zwidth.show.cli.move_options import (
     surface_option,
     wall_of,
 )
+from zwidth.show.cli.simulate import environment_words
+from zwidth.show.output import printable
+from zwidth.show.units import HEADINGS, amount, energy_rows, percent, typed, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.contact.mechanism.motion import MechanismMotion
+    from zwidth.show.cli.command import CommandLine
+
 
 OPERATOR: Final = "the operator"
 AS_TEXT: Final = 6  # numbers' worth of memory that one takes as text
@@ -93,7 +104,7 @@ class MoveCommand(Command):
 
     def compute(self, case: CommandLine) -> MechanismMotion:
         from zwidth.contact.mechanism.motion_inputs import MotionError
-        from zwidth.contact.mechanism.surface_reach import SurfaceOutOfReach
+        from zwidth.contact.mechanism.simulate_mechanism import SurfaceOutOfReach
         from zwidth.memory_limit import TooLarge
 
         device, name = case.device, case.question.name
@@ -135,7 +146,6 @@ class MoveCommand(Command):
         return ""  # the pages begin with where it starts
 
     def pages(self, case: CommandLine, result: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.cli.move_page import move_page
 
         return move_page(case, result, document)
 
@@ -154,3 +164,155 @@ def _check_memory(case: CommandLine) -> None:
     samples = case["duration"] / case.device.controller.sampling_period
     numbers = NUMBERS_PER_SAMPLE[0] + NUMBERS_PER_SAMPLE[1] * len(case.point.drives.names)
     check_memory((1 + AS_TEXT) * samples * numbers, f"{samples:.4g} samples", "move for a shorter time")
+
+
+FINE: Final = 4  # substeps that friction asks for, which switches within a step
+ROUNDING_SHARE: Final = 1e-13  # share of the motion's size below which a length is rounding
+NO_WAY: Final = 1e-9  # share of the largest motion below which there is none
+ENCODER_EFFECTS: Final = ("encoder steps", "noise")
+
+
+def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Any]:
+    """The page of a motion: its input, how it ended, its numbers and energies, and remarks."""
+    start = vector(motion.start.position, "m")
+    yield f"{printable(case.device.name)}: the whole mechanism from {start}, assembly {document['assembly']}"
+    yield computer_text(case.device.controller)
+    yield _status(document)
+    yield two_columns([*_circumstances(case, motion), *_results(motion, document)])
+    yield table(HEADINGS, list(_energies(document["energy_book_J"])))
+    yield from _remarks(case, motion, document)
+
+
+def _status(document: Mapping[str, Any]) -> str:
+    if document["ended_because"] is None:
+        return f"moved for {amount(document['duration_s'], 's')}"
+    return f"ended early: {document['ended_because']}"
+
+
+def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
+    yield "surface", _surface(motion, named=case["environment"] is not None)
+    moving = f"with {vector(motion.start_velocity, 'm/s')}" if motion.start_velocity.any() else "at rest"
+    yield "start", moving
+    yield "hand", f"pushes with {vector(motion.push[0], 'N')}" if motion.push.any() else "does not push"
+    if motion.gravity.any():
+        yield "gravity", vector(motion.gravity, "m/s²")
+    steps = "step" if motion.substeps == 1 else "steps"
+    samples = "sample" if len(motion.time) == 1 else "samples"
+    length = f"{amount(float(motion.time[-1]), 's')}, {len(motion.time)} {samples}"
+    yield "simulated", f"{length}, {motion.substeps} {steps} between them"
+
+
+def _surface(motion: MechanismMotion, named: bool) -> str:
+    """The surface, and what is rendered there; named: by --environment."""
+    from zwidth.contact.mechanism.surfaces import Plane, Sphere
+
+    surface, environment = motion.surface, motion.environment
+    if surface is None or environment is None:
+        return "none: the motors are off"
+    if isinstance(surface, Plane):
+        sides = "two-sided plane" if motion.two_sided else "plane"
+        place = f"{sides} through {vector(surface.point, 'm')}, normal {vector(surface.normal)}"
+    else:
+        hollow = "hollow " if surface.hollow else ""
+        if isinstance(surface, Sphere):
+            place = f"{hollow}sphere round {vector(surface.center, 'm')}, radius {amount(surface.radius, 'm')}"
+        else:
+            sizes = vector(surface.half_sizes, "m")
+            place = f"{hollow}box round {vector(surface.center, 'm')}, half sizes {sizes}"
+    parameters = motion.parameters
+    if named:
+        return f"{place}; {environment_words(environment, parameters)}"
+    pulls = ", never pulls" if parameters.get("no_pull") else ""
+    return f"{place}; {amount(parameters['stiffness'], 'N/m')}, {amount(parameters['damping'], 'Ns/m')}{pulls}"
+
+
+def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Row]:
+    import numpy as np
+
+    if motion.surface is not None:
+        yield "largest penetration", _when(document["largest_penetration_m"], "m", motion.penetration, motion.time)
+        yield "largest force", _when(document["largest_force_N"], "N", motion.force_size, motion.time)
+        yield "in contact", f"{typed(percent(document['contact_share']))} of the samples"
+        yield "torque limits", _limits(motion)
+        if isfinite(motion.point.controller.force_limit):
+            yield "force limit", _share(document["force_limit_share"])
+    size = float(np.max(np.abs(motion.position)))
+    yield "handle at the end", vector(_without_rounding(motion.position[-1], size), "m")
+    path = float(np.sum(np.linalg.norm(np.diff(motion.position, axis=0), axis=1)))
+    yield "path length", amount(path if path > ROUNDING_SHARE * size else 0.0, "m")
+
+
+def _without_rounding(position: Any, size: float) -> Any:
+    import numpy as np
+
+    return np.where(np.abs(position) > ROUNDING_SHARE * size, position, 0.0)
+
+
+def _when(value: float, unit: str, course: Any, time: Any) -> str:
+    if not value > 0.0:
+        return amount(0.0, unit)
+    return f"{amount(value, unit)}, after {amount(float(time[course.argmax()]), 's')}"
+
+
+def _limits(motion: MechanismMotion) -> str:
+    limits = motion.mechanism.drives.torque_limit
+    shares = [
+        f"{printable(name)} {_share(share)}"
+        for (name, share), limit in zip(motion.torque_limit_share.items(), limits, strict=True)
+        if isfinite(limit)
+    ]
+    return "; ".join(shares) or "none in the file"
+
+
+def _share(share: float) -> str:
+    return f"reached in {typed(percent(share))} of the samples" if share > 0.0 else "not reached"
+
+
+def _energies(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
+    """The motion and bending of the drives last, as in simulated contacts; what is not known, by difference."""
+    own = {"hand": book["hand"], "motors": book["motors"], "gravity": book["gravity"]}
+    own["dry friction"] = book["friction"]
+    if isnan(own["motors"]):
+        known = own["hand"] + own["gravity"] + own["dry friction"]
+        own = {"motors and dampers, by difference" if name == "motors" else name: x for name, x in own.items()}
+        own["motors and dampers, by difference"] = book["stored"] - known
+    else:
+        own["dampers, by difference"] = book["dampers"]
+    return energy_rows(own, book["stored"])
+
+
+def _remarks(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[str]:
+    import numpy as np
+
+    travel = float(np.max(np.ptp(motion.position, axis=0)))
+    still = not travel > ROUNDING_SHARE * float(np.max(np.abs(motion.position)))
+    if motion.surface is not None and motion.started_inside:
+        side = f"behind the {document['surface']['kind']}" if motion.two_sided else "inside the wall"
+        yield f"starts {amount(float(motion.depth[0]), 'm')} {side}"
+    effects = [name for name in case.device.linear_omissions if motion.counted or name not in ENCODER_EFFECTS]
+    if effects:
+        yield f"includes what a chart leaves out: {', '.join(effects)}"
+    if "dry friction" in effects and motion.substeps < FINE:
+        yield f"friction switches within a step: use --substeps {FINE} or more"
+    if document["left_out"]:
+        yield f"leaves out {', '.join(document['left_out'])}: the hand is only the push"
+    if ineffective := _ineffective_push(motion):
+        yield (
+            f"{amount(ineffective, 'N')} of the push act at right angles to every motion of the handle, and have "
+            "no effect"
+        )
+    if not (motion.push.any() or motion.start_velocity.any() or motion.gravity.any()) and still:
+        yield "nothing moves the handle: give --push, --start-velocity or --gravity"
+    elif motion.surface is not None and not document["contact_share"]:
+        yield "the handle never touches the surface"
+
+
+def _ineffective_push(motion: MechanismMotion) -> float:
+    """How much of the push lies across all directions in which the handle can go [N]; 0 where none does."""
+    import numpy as np
+
+    push = motion.push[0]
+    along, sizes, _ = np.linalg.svd(motion.start.jacobian)
+    ways = along[:, : len(sizes)][:, sizes > NO_WAY * sizes.max()]
+    across = float(np.linalg.norm(push - ways @ (ways.T @ push)))
+    return across if across > NO_WAY * float(np.linalg.norm(push)) else 0.0

@@ -22,8 +22,8 @@ from zwidth.study.boundary.points_file import LARGEST_WALL
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from zwidth.contact.mechanism.simulate_mechanism import SurfaceRendering
     from zwidth.contact.mechanism.surfaces import Surface
-    from zwidth.contact.mechanism.walls import SurfaceRendering
     from zwidth.device.device import Device
     from zwidth.show.cli.options import Question
 
@@ -123,7 +123,7 @@ def surface_of(options: Mapping[str, Any], device: Device) -> Surface | None:
 
 def wall_of(options: Mapping[str, Any]) -> SurfaceRendering | None:
     """What the computer renders at the surface. Raises BadInput for an environment that cannot be."""
-    from zwidth.contact.mechanism.walls import SurfaceEnvironment, SurfaceWall
+    from zwidth.contact.mechanism.simulate_mechanism import SurfaceEnvironment, SurfaceWall
 
     gains = {name: options[name] for name in ("stiffness", "damping", "no_pull")}
     if options["environment"] is not None:

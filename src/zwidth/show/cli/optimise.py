@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.study.designs.study import Study
-    from zwidth.study.optimise.optimisation import Optimisation
+    from zwidth.study.optimisation.optimisation import Optimisation
 
 PAGES: Final = (".html", ".htm")
 
@@ -77,7 +77,7 @@ class OptimiseCommand(Command):
     def compute(self, case: CommandLine) -> Optimisation:
         from zwidth.measures.definition import MeasureError
         from zwidth.memory_limit import TooLarge
-        from zwidth.study.optimise.optimise import optimise_by
+        from zwidth.study.optimisation.optimise import optimise_by
 
         question = case.question
         assert isinstance(question, StudyQuestion)
@@ -96,7 +96,7 @@ class OptimiseCommand(Command):
         return ""
 
     def pages(self, case: CommandLine, result: Optimisation, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.report.optimisation_text import sentences
+        from zwidth.show.report.optimisation import sentences
 
         said = [printable(typed(sentence)) for sentence in sentences(result)]
         yield f"{printable(document['name'])}: {said[0]}"
@@ -126,7 +126,7 @@ class OptimiseCommand(Command):
             with suppress(OSError):  # it holds something else
                 Path(case["designs"]).rmdir()
             return {}
-        from zwidth.study.optimise.device_files import device_files, files_there
+        from zwidth.study.optimisation.optimise import device_files, files_there
 
         folder = Path(case["designs"])
         written = set[Path]()
@@ -154,7 +154,7 @@ class OptimiseCommand(Command):
 def _check_designs(folder: Path, study: Study) -> None:
     """Make the folder of designs before anything is computed. Raises BadInput where it cannot be, and for files in
     it, not of this study, that the designs would stand among or take the place of."""
-    from zwidth.study.optimise.device_files import files_there
+    from zwidth.study.optimisation.optimise import files_there
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -175,9 +175,9 @@ def _check_designs(folder: Path, study: Study) -> None:
 
 def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
     """Headings, and a row for the device as it is and for each design of the front."""
-    from zwidth.show.report.optimisation_text import short_names
+    from zwidth.show.report.optimisation import short_names
     from zwidth.study.designs.sweep_data import axis_value_text
-    from zwidth.study.optimise.optimise import own_values
+    from zwidth.study.optimisation.optimise import own_values
 
     problem = found.problem
     headings = ["", *short_names([axis.key for axis in problem.variables])]

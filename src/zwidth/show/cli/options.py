@@ -12,7 +12,12 @@ import click
 
 from zwidth.processors import PROCESSORS
 from zwidth.show.circumstances import AS_GIVEN
+from zwidth.show.cli.errors import BadInput
 from zwidth.study.boundary.points_file import wall_number
+
+if TYPE_CHECKING:
+    from zwidth.loop.operating_point import OperatingPoint
+
 
 if TYPE_CHECKING:
     from zwidth.arrays import Floats
@@ -78,8 +83,7 @@ class Question:
 
     def refuse_unsupported(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
-        from zwidth.loop.point_errors import SeveralDirectionsError, check_several_directions
-        from zwidth.show.cli.errors import BadInput
+        from zwidth.loop.point_text import SeveralDirectionsError, check_several_directions
 
         instead = {
             "an operator": "use --operator none",

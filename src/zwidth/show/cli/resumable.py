@@ -12,7 +12,7 @@ import click
 
 from zwidth.show.cli.errors import BadInput, UnfinishedRun, as_option
 from zwidth.show.cli.options import Callback, Finite, refuse_empty
-from zwidth.show.cli.process import say, stopped_in_a_kernel
+from zwidth.show.cli.progress import say, stopped_in_a_kernel
 from zwidth.show.output import printable
 
 if TYPE_CHECKING:
@@ -148,8 +148,8 @@ def remove_series(case: CommandLine) -> None:
 @contextmanager
 def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Iterator[None]:
     from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
-    from zwidth.study.jobs.recovery import CannotStart, WorkerLost
     from zwidth.study.jobs.store import StoreError
+    from zwidth.study.jobs.workers import CannotStart, WorkerLost
 
     goes_on = (
         ""

@@ -11,12 +11,11 @@ import click
 from zwidth.device.read import LARGEST_FILE
 from zwidth.device.text_file import UnreadableFileError, read_text
 from zwidth.loop.motion_names import listed_names
-from zwidth.show.circumstances import operator_text
+from zwidth.show.circumstances import member_text, operator_text, value_text
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, NoAnswer
 from zwidth.show.cli.options import refuse_empty
-from zwidth.show.member_text import member_text, value_text
 from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
@@ -254,7 +253,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
 def _member(study: RobustStudy, member: int) -> str:
     """A member by its operator, where members differ in nothing else; otherwise by its number."""
     from zwidth.device.operator_choice import NOBODY
-    from zwidth.study.robust.measured_family import MEAN
+    from zwidth.study.robust.family import MEAN
 
     values = study.members[member]
     if list(values) == ["sweep"]:

@@ -15,7 +15,7 @@ from zwidth.show.units import amount, as_written, signed, typed
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from zwidth.study.sensitivity.goal_result import Goal, GoalNumber
+    from zwidth.study.sensitivity.goal import Goal, GoalNumber
     from zwidth.study.sensitivity.result import Sensitivities, Sensitivity
 
 # Kind of optimum (see `study.sensitivity.optimum`) -> where on the edge the stiffest wall lies.

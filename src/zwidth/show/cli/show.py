@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import DATA, json_value
-from zwidth.show.units import NONE, amount, percent, typed
+from zwidth.show.units import NONE, amount, percent, speaking_of_moments, typed
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device

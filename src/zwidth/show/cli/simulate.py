@@ -1,13 +1,18 @@
-"""`zwidth simulate`: what happens on contact."""
+"""`zwidth simulate`: what happens on contact.
+
+What people read of a simulated contact.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.show.cli.answer import ROUNDING, Row, table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import (
     LARGEST_SEED,
@@ -20,11 +25,15 @@ from zwidth.show.cli.contact_options import (
 )
 from zwidth.show.cli.options import ParamType
 from zwidth.show.output import DATA, FIGURES
+from zwidth.show.units import HEADINGS, amount, as_written, energy_rows, percent, signed, typed, uncertain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.contact.contact_simulation import ContactSimulation
+    from zwidth.contact.environments import Environment
+    from zwidth.contact.hand import Hand
+
 
 SOUND: Final = (".wav",)
 LONGEST: Final = 1e9  # s
@@ -152,7 +161,7 @@ class SimulateCommand(Command):
                 raise usage_error(f"--{name.replace('_', '-')} belongs to a sound; add --output FILE.wav")
 
     def compute(self, case: CommandLine) -> ContactSimulation:
-        from zwidth.contact.simulate_contact import simulate_contact
+        from zwidth.contact.point_contact import simulate_contact
         from zwidth.show.sound import seconds_to_hear
 
         run_options = ("duration", "substeps", "seed", "passivity_damping")
@@ -174,7 +183,6 @@ class SimulateCommand(Command):
         return simulation
 
     def pages(self, case: CommandLine, result: ContactSimulation, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.cli.simulation_page import simulation_page
 
         yield from simulation_page(result, document.get("sound"))
 
@@ -215,3 +223,170 @@ def _check_memory(case: CommandLine) -> None:
     sound = NUMBERS_OF_SOUND * case["duration"] / pitch if isinstance(pitch, float) else 0.0
     numbers = samples * (AS_TEXT + NUMBERS_PER_SAMPLE * runs) + sound
     check_memory(numbers, f"{samples:.4g} samples", "simulate a shorter time")
+
+
+BEHAVIOUR_VERDICTS: Final = {
+    "converged": "stable: it comes to rest",
+    "decaying": "stable: the vibration dies away",
+    "drifting": "stable: it moves on steadily under the push, as no stiffness holds a position",
+    "growing": "not stable: the vibration grows",
+    "limit cycle": "not stable: a limit cycle, which neither grows nor dies away",
+    "bouncing": "not stable: it bounces in and out without an end",
+    "lost contact": "not stable: contact is lost, and does not come back",
+    "forced": "undecided: it follows the hand's tremor; leave out --tremor to see what the wall does by itself",
+    "undecided": "undecided: this run does not tell; try a longer --duration",
+}
+NEAR_NYQUIST: Final = 0.9
+
+
+def simulation_page(simulation: ContactSimulation, sound: Mapping[str, Any] | None) -> Iterator[Any]:
+    """The verdict, the circumstances, the numbers, the energies, what is worth a remark, and a sound if one was
+    written."""
+    yield _verdict(simulation)
+    yield two_columns([*_circumstances(simulation), *_results(simulation)])
+    yield table(HEADINGS, list(energy_rows(simulation.ledger, float(simulation.energy[-1]))))
+    yield from _remarks(simulation)
+    if sound is not None:
+        yield from _sound(sound)
+
+
+def _verdict(simulation: ContactSimulation) -> str:
+    if simulation.behaviour == "undecided" and simulation.range_exit is not None:
+        return "undecided: the motion leaves the range of the handle before the run decides"
+    return BEHAVIOUR_VERDICTS[simulation.behaviour]
+
+
+def _circumstances(simulation: ContactSimulation) -> Iterator[Row]:
+    place = f", at {amount(simulation.wall_position, 'm')}" if simulation.wall_position else ""
+    yield "environment", f"{environment_words(simulation.environment, simulation.parameters)}{place}"
+    yield "start", _start(simulation)
+    yield "hand", _hand(simulation.hand)
+    why = f" ({simulation.length.reason})"
+    yield "simulated", f"{amount(float(simulation.time[-1]), 's')}, {len(simulation.time)} samples{why}"
+
+
+def environment_words(environment: Environment, values: Mapping[str, float]) -> str:
+    """An environment and its parameters: "slot: width 5 mm, stiffness 1 kN/m, damping 0 Ns/m"."""
+    units = {p.name: p.unit for p in environment.parameters if not p.switch}
+    texts = [f"{name.replace('_', ' ')} {_number(values[name], unit)}" for name, unit in units.items()]
+    texts += [name.replace("_", " ") for name, on in values.items() if name not in units and on]
+    name = "two-sided wall" if environment.name == "wall" else environment.name
+    return f"{name}: {', '.join(texts)}" if texts else name
+
+
+def _number(value: float, unit: str) -> str:
+    """A parameter with its unit; inf is one, too."""
+    return amount(value, unit.replace("N s", "Ns")) if isfinite(value) else "inf"
+
+
+def _start(simulation: ContactSimulation) -> str:
+    depth = simulation.start_position - simulation.wall_position
+    where = f"{amount(abs(depth), 'm')} {'inside' if depth > 0.0 else 'outside'}" if depth else "at its position"
+    beside = simulation.distance_from_path or 0.0
+    path = f", {amount(beside, 'm')} beside the handle's path" if beside > ROUNDING else ""
+    moving = (
+        f"at {typed(as_written(simulation.start_velocity, 'm/s'))}" if simulation.start_velocity else "at rest"
+    )
+    return f"{where}, {moving}{path}"
+
+
+def _hand(hand: Hand) -> str:
+    texts = []
+    if hand.push:
+        ramp = f", growing over {amount(hand.ramp, 's')}" if hand.ramp else ""
+        texts.append(f"pushes with {amount(hand.push, 'N')}{ramp}")
+    if hand.reach:
+        texts.append(f"reaches by {amount(hand.reach.distance, 'm')} in {amount(hand.reach.duration, 's')}")
+    if hand.tremor:
+        trembling = f"{amount(hand.tremor.amplitude, 'N')} at {amount(hand.tremor.frequency, 'Hz')}"
+        texts.append(f"trembles with {trembling}")
+    if hand.reflex:
+        stiffer = amount(hand.reflex.arm_stiffness, "N/m")
+        texts.append(f"stiffens by {stiffer} above {amount(hand.reflex.threshold, 'N')}")
+    return ", ".join(texts) or "does not push"
+
+
+def _results(simulation: ContactSimulation) -> Iterator[Row]:
+    yield "amplitude at the end", amount(simulation.amplitude, "m")
+    if isfinite(simulation.dominant_frequency):
+        yield "dominant frequency", amount(simulation.dominant_frequency, "Hz")
+    none = "too fast to determine" if simulation.given_up else "no motion is left"
+    growth = f"{typed(signed(simulation.growth))} per sample" if isfinite(simulation.growth) else none
+    if simulation.predicted_growth is not None:
+        left = simulation.loop.plant.nonlinear.kinds
+        linear = " of the linear loop" if left or isfinite(simulation.force_limit) else ""
+        growth += f"; by the eigenvalues{linear} {typed(signed(simulation.predicted_growth))}"
+    yield "growth", growth
+    if simulation.environment.surface:
+        yield "in contact", f"{typed(percent(simulation.contact_share))} of the second half"
+    if simulation.limited_share > 0.0:
+        share = f"{typed(percent(simulation.limited_share))} of the samples"
+        yield "at the force limit", f"{share}, {amount(simulation.force_limit, 'N')}"
+    if simulation.passivity is not None:
+        yield "rendered stiffness", amount(simulation.passivity.rendered_stiffness, "N/m")
+        other = amount(simulation.passivity.uncontrolled_stiffness, "N/m")
+        yield "without controller", f"{other}; {BEHAVIOUR_VERDICTS[simulation.passivity.uncontrolled.behaviour]}"
+
+
+def _remarks(simulation: ContactSimulation) -> Iterator[str]:
+    import numpy as np
+
+    if simulation.environment.surface and simulation.starts_inside:
+        yield "starts inside the wall"
+    if not np.ptp(simulation.handle) > 0.0 and _rubs(simulation):
+        largest = amount(float(np.max(np.abs(simulation.force))), "N")
+        yield f"dry friction holds it: the wall's force, {largest}, and the hand's do not overcome it"
+    elif not np.ptp(simulation.handle) > 0.0:
+        yield "nothing moves the handle: give --push, --start-velocity or --start-position"
+    if simulation.given_up:
+        yield "stopped early: the device was farther from the wall than any device moves"
+    if (beyond := simulation.range_exit) is not None:
+        back, forth = amount(beyond.backward, "m"), amount(beyond.forward, "m")
+        yield (
+            f"from {amount(beyond.time, 's')} on the run is not valid for this device: along this direction "
+            f"its handle gets from {back} to {forth}, and the model knows no end of the way; `zwidth move` does"
+        )
+    if simulation.response.quantum > 2.0 * simulation.amplitude > 0.0:
+        yield f"the motion is smaller than the encoder's step of {amount(simulation.response.quantum, 'm')}"
+    if simulation.dominant_frequency > NEAR_NYQUIST * 0.5 / simulation.loop.period:
+        yield "the vibration is close to half the sampling rate: it alternates from sample to sample"
+    if simulation.environment.surface and abs(simulation.hand.push) > simulation.force_limit:
+        yield "the hand pushes harder than the force limit"
+    if simulation.loop.plant.handle is None:
+        yield "the plant names no handle: it is assumed to be at the sensor"
+    if simulation.response.imbalance > 1e-6:
+        missing = typed(uncertain(100.0 * simulation.response.imbalance))
+        yield f"the energies do not add up: the error is {missing} % of the largest"
+
+
+def _rubs(simulation: ContactSimulation) -> bool:
+    """Whether dry friction acts against the force."""
+    import numpy as np
+
+    pushed = bool(np.any(simulation.force != 0.0)) or simulation.hand.push != 0.0
+    return pushed and "dry friction" in simulation.loop.plant.nonlinear.kinds
+
+
+def _sound(sound: Mapping[str, Any]) -> Iterator[str]:
+    """How long, how fast and how loud the sound is; and a pitch at which a loudspeaker renders more of it."""
+    speed, frequency = sound["speed"], sound["frequency_Hz"]
+    text = f"sound: {amount(sound['seconds'], 's')}"
+    if speed != 1.0:
+        how = f"{speed:g} times faster" if speed > 1.0 else f"{1.0 / speed:g} times slower"
+        text += f", {how}: {amount(frequency / speed, 'Hz')} sounds as {amount(frequency, 'Hz')}"
+    else:
+        text += f", {amount(frequency, 'Hz')}"
+    if sound["repeats"] > 1:
+        text += f"; the run {sound['repeats']} times over"
+    level = sound["peak_dBFS"]
+    where = f"{abs(level):.1f} dB {'above' if level > 0.0 else 'below'} it"
+    text += f"; full scale is {amount(sound['full_scale_m_per_s'], 'm/s')}, the peak {where}"
+    if sound["clipped_share"] > 0.0:
+        text += f", {typed(percent(sound['clipped_share']))} of the samples clipped"
+    yield text
+    if sound["suggested_pitch"] is not None:
+        low = typed(percent(sound["share_below_200_Hz"]))
+        yield (
+            f"{low} of its energy is below 200 Hz, of which small loudspeakers render little; "
+            f"try --sound-pitch {sound['suggested_pitch']:g}"
+        )

@@ -16,9 +16,8 @@ from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, processor_option, refuse_empty
 from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
-from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
-from zwidth.show.units import number, printed, typed
+from zwidth.show.units import keys_of_moments, number, printed, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +48,7 @@ class StudyQuestion(Question):
 
         try:
             if self.bounds:
-                from zwidth.study.optimise.problem import read_study_to_optimise
+                from zwidth.study.optimisation.problem import read_study_to_optimise
 
                 return read_study_to_optimise(self.name)
             return read_study(self.name)
@@ -198,8 +197,7 @@ class SweepCommand(Command):
         yield from _reasons(result)
 
     def write(self, case: CommandLine, result: Sweep, document: dict[str, Any], reason: str | None) -> str | None:
-        from zwidth.show.dataset import write_dataset
-        from zwidth.show.sweep_files import write_sweep_csv, write_sweep_zarr
+        from zwidth.show.dataset import write_dataset, write_sweep_csv, write_sweep_zarr
 
         assert case.path is not None
         if case.writes(FOLDERS):

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from zwidth.arrays import Floats
 from zwidth.contact.time_response import SOURCES, TimeResponse
-from zwidth.show.energies import energy_label
 from zwidth.show.figures.style import BLACK, BLUE, GREY, LINES, VERMILION, context, figure, label, legend_above
-from zwidth.show.units import quantity
+from zwidth.show.units import energy_label, quantity
 
 LONGEST_LINE: Final = 6000  # samples drawn as lines; above, what they sweep over is drawn instead
 BETWEEN: Final = 4  # points of the handle's line for each of these

@@ -13,7 +13,7 @@ from zwidth.chart.chart import StabilityChart
 from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, STABLE, VERMILION, legend_above
 from zwidth.study.boundary.measured_boundary import MeasuredPoint
-from zwidth.study.boundary.user_points import UserPoint
+from zwidth.study.boundary.points_file import UserPoint
 
 EDGE_STYLES = {"lower": (VERMILION, "o"), "upper": (BLUE, "s"), "tip": (GREEN, "^")}
 TITLES = {

@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from zwidth.arrays import Complexes, Floats
-from zwidth.measures.felt import LIMIT_HEADINGS
-from zwidth.measures.felt_chart import FeltChart
+from zwidth.measures.felt import LIMIT_HEADINGS, FeltChart
 from zwidth.show.figures.style import (
     BLACK,
     GREY,

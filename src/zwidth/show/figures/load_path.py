@@ -13,8 +13,8 @@ from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from zwidth.arrays import Floats
+from zwidth.chart.arcs import window_of
 from zwidth.chart.chart import StabilityChart
-from zwidth.chart.rings import window_of
 from zwidth.chart.tracer import tracer_of
 from zwidth.show.figures.stability import Window, edges_of, frame
 from zwidth.show.figures.style import (
@@ -28,9 +28,8 @@ from zwidth.show.figures.style import (
     label,
     legend_above,
 )
-from zwidth.show.moment_units import spoken_unit
-from zwidth.show.units import as_written, quantity
-from zwidth.study.load.load_path import LoadPath, PushedChart
+from zwidth.show.units import as_written, quantity, spoken_unit
+from zwidth.study.load_path import LoadPath, PushedChart
 
 # From blue over black to vermilion: the farther from no push the lighter, either side in its own colour.
 COLOURS: Final = LinearSegmentedColormap.from_list(

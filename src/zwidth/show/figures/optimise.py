@@ -24,8 +24,7 @@ from zwidth.show.figures.style import (
 )
 from zwidth.show.units import printed
 from zwidth.study.designs.column import Column
-from zwidth.study.optimise.front import undominated
-from zwidth.study.optimise.optimisation import Optimisation
+from zwidth.study.optimisation.optimisation import Optimisation, undominated
 
 MOST_PANELS: Final = 3  # pairs of objectives that are drawn
 MOST_POINTS: Final = 4000  # designs that are drawn of those tried; a vector file holds each of them

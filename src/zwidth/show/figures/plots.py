@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from zwidth.show.figures.caption import caption_of_result, write_caption
 from zwidth.show.figures.style import BLACK, GREY, VERMILION, context, figure, inline_svg, label
-from zwidth.show.moment_units import speaking_of_moments
+from zwidth.show.units import speaking_of_moments
 
 Window = tuple[float, float, float, float]
 Draw = Callable[[Axes, Any], None]
@@ -66,7 +66,7 @@ def drawing_of(result: Any) -> Draw:
 def draw_any_chart(ax: Axes, chart: Any, window: Window | None = None) -> None:
     """The chart of one direction, of several, or by a frequency response."""
     if type(chart).__name__ == "MeasuredChart":
-        from zwidth.show.figures.measured_chart import draw_measured_chart
+        from zwidth.show.figures.stability import draw_measured_chart
 
         draw_measured_chart(ax, chart, window=window)
         return
@@ -76,13 +76,13 @@ def draw_any_chart(ax: Axes, chart: Any, window: Window | None = None) -> None:
 
 
 def _robust(ax: Axes, chart: Any) -> None:
-    from zwidth.show.figures.robust import draw_robust
+    from zwidth.show.figures.stability import draw_robust
 
     draw_robust(ax, chart)
 
 
 def _robust_study(ax: Axes, study: Any) -> None:
-    from zwidth.show.figures.robust import draw_robust
+    from zwidth.show.figures.stability import draw_robust
 
     draw_robust(ax, study.chart, study.members)
 
@@ -233,13 +233,13 @@ def _region(ax: Axes, region: Any) -> None:
 
 
 def _eigenvalue_paths(ax: Axes, result: Any) -> None:
-    from zwidth.show.figures.eigenvalues import draw_eigenvalue_paths
+    from zwidth.show.figures.stability import draw_eigenvalue_paths
 
     draw_eigenvalue_paths(ax, result)
 
 
 def _validity(ax: Axes, result: Any) -> None:
-    from zwidth.show.figures.validity import draw_validity
+    from zwidth.show.figures.sensitivity import draw_validity
 
     draw_validity(ax, result)
 
@@ -289,7 +289,7 @@ def _optimisation(ax: Axes, result: Any) -> None:
 
 
 def _safe_walls(ax: Axes, result: Any) -> None:
-    from zwidth.show.figures.safe_walls import draw_safe_walls
+    from zwidth.show.figures.map import draw_safe_walls
 
     draw_safe_walls(ax, result)
 

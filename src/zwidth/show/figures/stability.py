@@ -1,18 +1,53 @@
-"""The stability chart: which walls are stable, and the same for several models laid over each other."""
+"""The stability chart: which walls are stable, and the same for several models laid over each other.
+
+How fast the vibrations of stable walls decay: contours of equal spectral radius (thesis Fig. 5.10).
+
+The frequency of the vibration along the edge of the stable set (thesis Fig. 3.8).
+
+A robust chart: the walls stable for every member, and which member sets each part of the limit.
+
+The chart of a measured device: measured points on the edge, the band in doubt, what cannot be relied on.
+
+Paths of eigenvalues in the z-plane, with the unit circle.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isnan
+from math import inf, isnan, log
+from textwrap import wrap
+from typing import Any, Final
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.patches import Polygon
 
 from zwidth.arrays import Floats
-from zwidth.chart.chart import StabilityChart
+from zwidth.chart.chart import StabilityChart, stability_chart
+from zwidth.chart.chart_base import BoundaryArc
+from zwidth.chart.decay import FastestDecay
+from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.measured.chart import MeasuredChart
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, VERMILION, draw_empty, label, legend_above
+from zwidth.chart.measured.loop import UnusableRange
+from zwidth.chart.robust.common_chart import CommonChart
+from zwidth.loop.loop import Loop
+from zwidth.measures.root_paths import EigenvaluePaths
+from zwidth.model.modes import natural_frequencies
+from zwidth.show.circumstances import value_text
+from zwidth.show.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LINES,
+    ORANGE,
+    STABLE,
+    VERMILION,
+    draw_empty,
+    label,
+    legend_above,
+)
 from zwidth.show.units import quantity
 
 # KMIN, KMAX [N/m], BMIN, BMAX [N s/m]
@@ -107,3 +142,342 @@ def frame(ax: Axes, window: Window, *, empty: bool) -> None:
     label(ax.yaxis, "Virtual damping B", "Ns/m")
     if empty:
         draw_empty(ax)
+
+
+def draw_decay_contours(
+    ax: Axes,
+    loop: Loop,
+    radii: Sequence[float] | None = None,
+    window: Window | None = None,
+    chart: StabilityChart | None = None,
+) -> None:
+    """Walls whose slowest motion shrinks by the same factor per sample, and the fastest-decaying wall.
+
+    radii  factors per sample, each below 1; left out: some round ones between 1 and the smallest there is
+    chart  the loop's stability chart, where it is at hand
+    """
+    chart = chart or stability_chart(loop)
+    best = chart.fastest_decay
+    levels = round_radii(best.spectral_radius) if radii is None and best else list(radii or ())
+    draw_level(ax, chart, "1 (edge of stability)", 0, 1)
+    for n, radius in enumerate(levels):
+        try:
+            level = stability_chart(loop, radius, decay=False).drawn()
+        except ChartError:  # a sliver too fine to close: this level is left out of the drawing, and its legend
+            continue
+        draw_level(ax, level, _meaning(radius, loop.period), n + 1, len(levels) + 1)
+    buildable = chart.fastest_decay_in_first_quadrant
+    _star(ax, buildable, f"fastest{' with K, B ≥ 0' * (best != buildable)}", loop.period, VERMILION)
+    if best != buildable:
+        _star(ax, best, "fastest of all", loop.period, "white")
+    frame(ax, window or chart.box, empty=not chart.regions)
+    legend_above(ax, columns=2, title="Slowest motion: factor per sample (time until a tenth is left)")
+
+
+def _star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour: str) -> None:
+    """A star at the wall, if there is one; its name and what its radius means stand in the legend."""
+    if wall:
+        title = f"{name}: {_meaning(wall.spectral_radius, period)}"
+        (star,) = ax.plot([wall.stiffness], [wall.damping], "*", color=VERMILION, markersize=11.0, label=title)
+        star.set(markerfacecolor=colour, zorder=5.0)
+
+
+def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int) -> None:
+    """One contour; the smaller the radius the lighter."""
+    colour = colormaps["viridis"](0.75 * rank / max(count - 1, 1)) if rank else BLACK
+    for k, ring in enumerate(edges_of(chart.regions)):
+        dashes = LINES[rank % len(LINES)][1]
+        ax.plot(*ring.T, color=colour, linestyle=dashes, label="" if k else text, linewidth=1.2)
+
+
+def round_radii(smallest: float, most: int = 5) -> list[float]:
+    """At most `most` round numbers strictly between the smallest radius and 1, descending."""
+    for step in (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005, 0.0002, 0.0001, 1e-5, 1e-6):
+        count = int(np.ceil((1.0 - smallest) / step - 1e-3)) - 1
+        if count >= min(3, most):
+            every = -(-count // most)
+            return [round(1.0 - step * k, 9) for k in range(every, count + 1, every)]
+    return []
+
+
+def tenfold_time(radius: float, period: float) -> float:
+    """Time after which a motion that shrinks by this factor per sample has shrunk to a tenth [s]."""
+    if radius <= 0.0:
+        return 0.0
+    return inf if radius >= 1.0 else period * log(10.0) / -log(radius)
+
+
+def _meaning(radius: float, period: float) -> str:
+    return f"{radius:.4g} ({quantity(tenfold_time(radius, period), 's')})"
+
+
+# Ends of arcs closer than this share of the edge's extent are one corner; it is far coarser than their rounding.
+SAME_WALL = 1e-6
+
+
+def draw_frequency(ax: Axes, chart: StabilityChart) -> None:
+    """Frequency against stiffness along the edge, for walls with K >= 0 and B >= 0.
+
+    Where two arcs meet in a corner the wall vibrates at two frequencies; both are ringed. The device's natural
+    frequencies are drawn across.
+    """
+    width = max((float(np.max(np.abs(arc.stiffness))) for arc in chart.boundary), default=1.0)
+    for n, arc in enumerate(chart.boundary):
+        inside = (arc.stiffness >= -SAME_WALL * width) & (arc.damping >= 0.0)
+        K, f = np.where(inside, arc.stiffness, np.nan), np.where(inside, arc.frequency, np.nan)
+        ax.plot(K, f, color=BLUE, label="" if n else "along the edge of stability")
+    for n, (at, _, low, high) in enumerate(corners(chart)):
+        text = f"corner: {quantity(low, 'Hz')} and {quantity(high, 'Hz')}"
+        ax.plot([at, at], [low, high], color=VERMILION, linewidth=0.8, linestyle=":")
+        ax.plot(
+            [at, at],
+            [low, high],
+            marker="o",
+            markersize=6.0,
+            markerfacecolor="white",
+            markeredgecolor=VERMILION,
+            markeredgewidth=1.4,
+            linestyle="none",
+            zorder=4.0,
+            label=text if n < 3 else "",
+        )
+    _natural_frequencies(ax, chart)
+    ax.set_xlim(left=0.0)
+    ax.set_ylim(bottom=0.0)
+    label(ax.xaxis, "Virtual stiffness K", "N/m")
+    label(ax.yaxis, "Frequency of the vibration", "Hz")
+    legend_above(ax)
+
+
+def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
+    """Walls with K > 0, B >= 0 at which two arcs meet, with both frequencies: (K, B, lower, higher)."""
+    ends = [end for arc in chart.boundary for end in _ends(arc)]
+    if not ends:
+        return []
+    K, B, f = np.array(ends).T
+    near = SAME_WALL * np.max(
+        [np.ptp(np.vstack([arc.stiffness, arc.damping]), axis=1) for arc in chart.boundary], 0
+    )
+    nyquist = 0.5 / chart.loop.period
+    pairs = []
+    for i in range(len(ends)):
+        for j in range(i + 1, len(ends)):
+            together = abs(K[i] - K[j]) <= near[0] and abs(B[i] - B[j]) <= near[1]
+            if together and abs(f[i] - f[j]) > 1e-6 * nyquist and K[i] > 1e3 * near[0] and B[i] >= 0.0:
+                low, high = sorted((float(f[i]), float(f[j])))
+                pairs.append((float(K[i]), float(B[i]), low, high))
+    return sorted(pairs, reverse=True)
+
+
+def _ends(arc: BoundaryArc) -> list[tuple[float, float, float]]:
+    return [(float(arc.stiffness[k]), float(arc.damping[k]), float(arc.frequency[k])) for k in (0, -1)]
+
+
+def _natural_frequencies(ax: Axes, chart: StabilityChart) -> None:
+    """The flexible modes below half the sampling frequency, as lines across."""
+    natural = natural_frequencies(chart.loop.plant)
+    shown = [f for f in natural if 0.0 < f < 0.5 / chart.loop.period][:8]
+    for n, f in enumerate(shown):
+        numbers = ", ".join(quantity(x, "Hz") for x in shown)
+        text = f"natural frequenc{'ies' if len(shown) > 1 else 'y'}: {numbers}"
+        ax.axhline(f, color=GREY, linestyle=(0, (6, 3)), linewidth=0.8, label="" if n else text)
+
+
+NAMED: Final = len(LINES) - 1  # binding members with a line of their own; the last line is for the rest
+DRAWN_MEMBERS: Final = 200  # members' outlines at most
+LIGHT: Final = "#B8B8B8"
+LONGEST: Final = 60  # signs in a line of the legend
+SHORTEST: Final = 0.02  # share of the window that a named member binds
+NO_BREAK: Final = "\u00a0"
+
+
+def draw_robust(
+    ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]] = (), window: Window | None = None
+) -> None:
+    """The robust set filled, its edge by binding member; behind it all members' outlines, the best one's dashed.
+
+    members  path -> value of each, for the legend
+    window   what to show; left out: the box of all outlines' part with K >= 0 and B >= 0, and 5 %
+    """
+    view = window or _box(chart)
+    outlines = [outline for index in list(chart.outlines)[:DRAWN_MEMBERS] for outline in chart.outlines[index]]
+    ax.add_collection(LineCollection(outlines, colors=LIGHT, linewidths=0.4, zorder=1.2, label="a member's edge"))
+    for n, ring in enumerate(chart.regions):
+        text = "" if n else _claim(chart)
+        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=text, zorder=1.1))
+    for n, outline in enumerate(chart.outlines[chart.best_by_area]):
+        text = "" if n else f"best member by area: {_words(members, chart.best_by_area)}"
+        ax.plot(*outline.T, color=GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
+    _draw_edge(ax, chart, members, view)
+    frame(ax, view, empty=not chart.regions)
+    legend_above(ax)
+
+
+def _claim(chart: CommonChart) -> str:
+    """What the filled set is, for the legend."""
+    if chart.failed:
+        known = len(chart.charted)
+        return f"stable for {known} of {known + chart.unknown_members} members; of the others nothing is known"
+    return "stable for every member" + (" (in doubt)" if chart.doubt else "")
+
+
+def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:
+    """The edge's arcs; those who bind most of what is seen are named."""
+    K0, K1, B0, B1 = view
+    lengths: dict[int, float] = {}
+    for arc in chart.boundary:
+        x, y = (arc.stiffness - K0) / (K1 - K0), (arc.damping - B0) / (B1 - B0)
+        inside = (x > 0.0) & (x < 1.0) & (y > 0.0) & (y < 1.0)
+        length = float(np.sum(np.hypot(np.diff(x), np.diff(y))[inside[1:] & inside[:-1]]))
+        lengths[arc.member] = lengths.get(arc.member, 0.0) + length
+    ranked = sorted(lengths, key=lambda member: -lengths[member])
+    named = [member for member in ranked if lengths[member] > SHORTEST][:NAMED]
+    drawn: set[str] = set()
+    for arc in chart.boundary:
+        place = named.index(arc.member) if arc.member in named else NAMED
+        colour, dashes = LINES[place]
+        text = f"limited by {_words(members, arc.member)}" if place < NAMED else "limited by others"
+        ax.plot(
+            arc.stiffness,
+            arc.damping,
+            color=colour,
+            linestyle=dashes,
+            linewidth=2.0,
+            label="" if text in drawn or lengths[arc.member] == 0.0 else text,
+            zorder=3.0,
+        )
+        drawn |= {text} if lengths[arc.member] > 0.0 else set()
+
+
+def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
+    """A member's values in words, on two lines at most: the last step of each path, where that is clear."""
+    if index >= len(members) or not members[index]:
+        return f"member {index}"
+    values = members[index]
+    last = [path.rsplit(".", 1)[-1] for path in values]
+    names = [name if last.count(name) == 1 else path for name, path in zip(last, values, strict=True)]
+    pairs = zip(names, values.values(), strict=True)
+    lines = wrap(
+        ", ".join(f"{name} = {value_text(value)}".replace(" ", NO_BREAK) for name, value in pairs), LONGEST
+    )
+    if len(lines) > 2:
+        lines = [lines[0], f"{lines[1]} … (member {index})"]
+    return "\n".join(lines)
+
+
+def _box(chart: CommonChart) -> Window:
+    walls = [outline for outlines in chart.outlines.values() for outline in outlines]
+    if isnan(chart.stiffness_max) or not walls:
+        return (0.0, 1.0, 0.0, 1.0)
+    K, B = np.maximum(np.vstack(walls).max(axis=0), 0.0)
+    reach = np.vstack(chart.regions).max(axis=0)
+    # a member that allows many times more would press the robust set into a corner
+    K1, B1 = min(K, 2.5 * reach[0]), min(B, 2.5 * reach[1])
+    return -0.04 * float(K1), 1.05 * float(K1), -0.05 * float(B1), 1.05 * float(B1)
+
+
+LONGEST_LIST = 3  # stretches named in the legend
+
+
+def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = None) -> None:
+    """The stable walls filled, the interpolated edge, the measured points on it, and the band of the error.
+
+    Walls, edge and points are nominal. Marked are the stiffest wall that is certain, and the nominal one.
+
+    window  what to show; left out: the regions' box and 5 %
+    """
+    for n, ring in enumerate(chart.regions):
+        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable walls"))
+    if chart.band is not None:
+        for n, ring in enumerate(chart.band.regions):
+            ax.add_patch(
+                Polygon(
+                    ring,
+                    facecolor=ORANGE,
+                    edgecolor="none",
+                    alpha=0.45,
+                    zorder=1.8,
+                    label="" if n else f"in doubt: {chart.band.meaning}",
+                )
+            )
+    for ring in edges_of(chart.regions):
+        ax.plot(*ring.T, color=BLACK, linewidth=0.9)
+    for n, arc in enumerate(chart.boundary):
+        if 0.0 < arc.frequency[0] < 0.5 / chart.loop.period * (1.0 - 1e-9):
+            ax.plot(
+                arc.stiffness,
+                arc.damping,
+                color=BLUE,
+                marker=".",
+                markersize=3.0,
+                linestyle="none",
+                label="" if n else "measured",
+            )
+    _unusable(ax, chart)
+    if chart.stiffness_max == chart.stiffness_max:
+        mark_stiffest(ax, chart)
+    if chart.band is not None and chart.stiffness_max_nominal == chart.stiffness_max_nominal:
+        ax.plot(
+            [chart.stiffness_max_nominal],
+            [chart.damping_at_stiffness_max_nominal],
+            color=BLACK,
+            marker="x",
+            linestyle="none",
+            zorder=4.9,
+            label=f"stiffest as measured: {quantity(chart.stiffness_max_nominal, 'N/m')}",
+        )
+    frame(ax, window or chart.box, empty=not chart.regions)
+    legend_above(ax)
+
+
+def _unusable(ax: Axes, chart: MeasuredChart) -> None:
+    """The edge within unusable stretches, dashed; each stretch a line of the legend."""
+    edge = chart.edge
+    f = edge.angles / (2.0 * np.pi * chart.loop.period)
+    for n, stretch in enumerate(chart.unusable[:LONGEST_LIST]):
+        inside = (f >= stretch.low) & (f <= stretch.high)
+        K, B = np.where(inside, edge.walls[:, 0], np.nan), np.where(inside, edge.walls[:, 1], np.nan)
+        shown = stretch.on_edge and np.any(inside)
+        ax.plot(
+            K if shown else [],
+            B if shown else [],
+            color=VERMILION if shown else GREY,
+            linestyle=((0, (1.2, 1.2)), (0, (4, 1.5)), (0, (6, 1.5, 1.2, 1.5)))[n],
+            linewidth=2.2,
+            label=_stretch_text(stretch),
+        )
+    if len(chart.unusable) > LONGEST_LIST:
+        ax.plot([], [], linestyle="none", label=f"and {len(chart.unusable) - LONGEST_LIST} more stretches")
+
+
+def _stretch_text(stretch: UnusableRange) -> str:
+    why = stretch.reason.partition(",")[0].partition(";")[0]
+    why = why if len(why) <= 44 else "uncertain between frequencies"
+    return f"unusable: {quantity(stretch.low, 'Hz')} to {quantity(stretch.high, 'Hz')}, {why}"
+
+
+ROOM: Final = 1.08  # radius shown, over that of what is drawn
+CIRCLE: Final = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361))
+
+
+def draw_eigenvalue_paths(ax: Axes, paths: EigenvaluePaths) -> None:
+    """Each path in its own colour from a circle to a square; crosses where it passes through the unit circle."""
+    ax.plot(CIRCLE.real, CIRCLE.imag, color=GREY, linewidth=0.8, label="unit circle", zorder=1.0)
+    for n, z in enumerate(paths.eigenvalues.T):
+        colour, dashes = LINES[n % len(LINES)]
+        ax.plot(z.real, z.imag, color=colour, linestyle=dashes, zorder=2.0)
+    for row, marker, value in ((0, "o", paths.values[0]), (-1, "s", paths.values[-1])):
+        z = paths.eigenvalues[row]
+        ax.plot(
+            z.real, z.imag, marker, color=BLACK, markerfacecolor="white", markersize=4.5, label=f"at {value:g}"
+        )
+    if paths.crossings:
+        z = np.array([crossing.eigenvalue for crossing in paths.crossings])
+        ax.plot(z.real, z.imag, "x", color=VERMILION, markersize=7.0, zorder=3.0, label="crosses the unit circle")
+    radius = ROOM * max(1.0, float(np.abs(paths.eigenvalues).max()))
+    ax.set_xlim(-radius, radius)
+    ax.set_ylim(-radius, radius)
+    ax.set_aspect("equal")
+    ax.set_xlabel("Real part of z")
+    ax.set_ylabel("Imaginary part of z")
+    legend_above(ax, columns=4)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from math import inf, isfinite, isnan
 
-from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.report.facts import Facts
 from zwidth.show.report.sentences import hertz, join_words
-from zwidth.show.units import NONE, SPACE, as_written, percent, quantity
-from zwidth.study.load.bending import DAMPING, Bending, BendingNumbers
+from zwidth.show.units import NONE, SPACE, as_written, percent, quantity, speaking_of_moments
+from zwidth.study.bending import DAMPING, Bending, BendingNumbers
 
 Row = tuple[str, ...]
 

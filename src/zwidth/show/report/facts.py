@@ -12,19 +12,18 @@ from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.conditions import Bound
 from zwidth.conditions.comparison import bounds_of
 from zwidth.device.device import Device
-from zwidth.loop.loop import Loop
+from zwidth.loop.loop import Loop, unobserved_instability
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unobserved_instability import unobserved_instability
-from zwidth.measures.felt_chart import FeltChart, felt_chart
-from zwidth.model.effective_parameters import EffectiveParameters
+from zwidth.measures.felt import FeltChart, felt_chart
+from zwidth.model.effective_mass import EffectiveParameters
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
-from zwidth.study.load.bending import Bending, bending
-from zwidth.study.load.load_path import PUSH, LoadPath, load_path
+from zwidth.study.bending import Bending, bending
+from zwidth.study.load_path import PUSH, LoadPath, load_path
+from zwidth.study.model_validity import Validity, validity
 from zwidth.study.sensitivity.result import Sensitivities
 from zwidth.study.sensitivity.sensitivities import sensitivities
 from zwidth.study.sensitivity.what_if import BASE, Variant, find_variant, what_if
-from zwidth.study.validity import Validity, validity
 
 PUSHES: Final = 5  # charts along the path of pushes
 

@@ -10,21 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from zwidth.chart.chart import StabilityChart
-from zwidth.measures.felt_chart import FeltChart
+from zwidth.measures.felt import FeltChart
 from zwidth.show.figures.caption import caption_of_facts, caption_of_result, facts_of_point, write_caption
-from zwidth.show.figures.decay import draw_decay_contours
 from zwidth.show.figures.felt import draw_felt_chart
-from zwidth.show.figures.frequency import draw_frequency
 from zwidth.show.figures.load_path import load_path_figure
-from zwidth.show.figures.mechanism import draw_mechanism
-from zwidth.show.figures.plant import draw_chain
-from zwidth.show.figures.sensitivity import draw_sensitivities
-from zwidth.show.figures.stability import draw_chart, draw_models
+from zwidth.show.figures.mechanism_motion import draw_chain, draw_mechanism
+from zwidth.show.figures.sensitivity import draw_sensitivities, draw_validity
+from zwidth.show.figures.stability import draw_chart, draw_decay_contours, draw_frequency, draw_models
 from zwidth.show.figures.style import context, figure, inline_svg
-from zwidth.show.figures.validity import draw_validity
-from zwidth.show.mass_chain import as_chain
+from zwidth.show.mechanism_scene import as_chain
 from zwidth.show.report.facts import Facts
-from zwidth.study.validity import Validity
+from zwidth.study.model_validity import Validity
 
 TOP = 10  # bars of sensitivities
 WIDTHS: Final = {"wide": 6.2, "narrow": 3.75}  # class of the page's style sheet -> width [inches]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from zwidth.loop.sideways import SidewaysMotion
+from zwidth.loop.loop import SidewaysMotion
 from zwidth.measures.load_effect import NoWallError, load_change
 from zwidth.model.load import Load
 from zwidth.show.circumstances import load_text

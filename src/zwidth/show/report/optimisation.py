@@ -1,7 +1,11 @@
-"""The report on an optimisation: before and after side by side, the front, and how it was found."""
+"""The report on an optimisation: before and after side by side, the front, and how it was found.
+
+What an optimisation found, in sentences.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -11,20 +15,19 @@ from matplotlib.figure import Figure
 from zwidth._version import __version__
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.device.faults import DeviceError
+from zwidth.device.faults import DeviceError, comma_list, plural
+from zwidth.measures.definition import FAILED, OUT_OF_TIME
 from zwidth.show.figures.caption import caption_of_facts, facts_of_point, facts_of_study
 from zwidth.show.figures.optimise import front_figure
 from zwidth.show.figures.stability import draw_models
 from zwidth.show.figures.style import context, figure
-from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.report.figures import both_drawings
-from zwidth.show.report.optimisation_text import sentences, short_names
 from zwidth.show.report.report import page_template
-from zwidth.show.units import percent, printed, quantity
+from zwidth.show.units import percent, printed, quantity, speaking_of_moments
 from zwidth.study.designs.sweep_data import axis_value_text
-from zwidth.study.optimise.optimisation import Optimisation
-from zwidth.study.optimise.optimise import own_values
-from zwidth.study.optimise.recheck import worst_point
+from zwidth.study.optimisation.evaluation import margins
+from zwidth.study.optimisation.optimisation import Optimisation, worst_point
+from zwidth.study.optimisation.optimise import own_values
 
 NONE: Final = "–"
 
@@ -133,3 +136,137 @@ def _charts(found: Optimisation) -> str:
         return made
 
     return both_drawings("charts", "Stability charts before and after", draw, caption)
+
+
+WITHOUT: Final = {FAILED: "failed", OUT_OF_TIME: "ran out of time"}
+SMALL: Final = 5e-4  # share of a value that is said to be no change
+
+
+def sentences(found: Optimisation) -> list[str]:
+    """Sentences on the front: how it was found, what the chosen design gains, what it is conditional on, and
+    what a finer grid and simulation say. Where no design keeps the demands, why not."""
+    tried = plural(len(found.shares), "design")
+    if not len(found.front):
+        return [f"{tried} tried: {found.reason}", *_not_judged(found)]
+    said = [
+        _how_found(found, tried),
+        _gain(found),
+        *_not_judged(found),
+        *(premise["reason"] for premise in found.premises),
+        *_finer(found),
+        *_produced(found),
+        *_contacts(found),
+    ]
+    return [sentence for sentence in said if sentence]
+
+
+def _how_found(found: Optimisation, tried: str) -> str:
+    if len(found.problem.objectives) == 1:
+        return f"the best found of {tried} tried"
+    return f"{plural(len(found.front), 'design')} of the front, of {tried} tried"
+
+
+def _gain(found: Optimisation) -> str:
+    """The chosen design beside the device as it is."""
+    problem, knee = found.problem, found.knee
+    assert knee is not None
+    chosen = "the best design found" if len(problem.objectives) == 1 else "the knee"
+    parts = []
+    for objective in problem.objectives:
+        one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
+        part = f"{one.name} {quantity(value, printed(one.unit))}"
+        if found.baseline is not None and np.isfinite(own := float(found.baseline.values[0, objective.column])):
+            part += f" instead of {quantity(own, printed(one.unit))}"
+        parts.append(part)
+    return f"{chosen} has {comma_list(parts)}"
+
+
+def _not_judged(found: Optimisation) -> list[str]:
+    """How many designs failed or ran out of time, and why, unless that is why there is no front; and whether the
+    device as it is did."""
+    said = [
+        f"{one.designs} of {plural(len(found.shares), 'design')} {WITHOUT[one.status]}"
+        + (f": {one.reason}" if one.reason else "")
+        for one in found.not_judged
+        if not one.reason or one.reason not in (found.reason or "")
+    ]
+    own = [] if found.baseline is None else found.baseline.status[0].tolist()
+    return said + [f"the device as it is {verb}" for status, verb in WITHOUT.items() if status in own]
+
+
+def _finer(found: Optimisation) -> list[str]:
+    """What the worst values become on a finer grid."""
+    if found.finer is None:
+        return []
+    problem, said = found.problem, []
+    for n, one in enumerate(problem.columns):
+        fine, coarse = found.finer.values[:, n], found.values[:, n]
+        if np.isnan(fine).any():
+            lost = plural(int(np.isnan(fine).sum()), "design")
+            said.append(f"on a grid twice as fine {one.name} has no value in {lost}")
+            continue
+        change = float(np.max(np.abs(fine - coarse) / np.maximum(np.abs(coarse), 1e-300)))
+        if change > SMALL:
+            said.append(f"on a grid twice as fine {one.name} changes by at most {percent(change)}")
+    for demand in problem.demands:
+        with np.errstate(invalid="ignore"):
+            kept = margins(found.finer.values[:, demand.column], demand.bound, demand.at_least) >= 0.0
+        if broken := int((~kept).sum()):
+            verb = "breaks" if broken == 1 else "break"
+            said.append(f"on a grid twice as fine {plural(broken, 'design')} {verb} {demand.text}")
+    return said or ["a grid twice as fine gives the same values"]
+
+
+def _produced(found: Optimisation) -> list[str]:
+    """What tolerances make of the chosen design, and of the objectives over the front."""
+    bars, knee, problem = found.bars, found.knee, found.problem
+    if bars is None or knee is None:
+        return []
+    chosen = "the best design found" if len(problem.objectives) == 1 else "the knee"
+    kept = percent(float(bars.kept[knee]))
+    said = [f"{kept} of {bars.devices} devices within the tolerances of {chosen} keep all demands"]
+    if not problem.demands:
+        said = [f"{bars.devices} devices were drawn within the tolerances of {chosen}"]
+    for objective in problem.objectives:
+        one = problem.columns[objective.column]
+        low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
+        if np.isfinite(low):
+            span = f"{quantity(low, printed(one.unit))} to {quantity(high, printed(one.unit))}"
+            said.append(f"90 % of them have {one.name} {span}")
+    return said
+
+
+def _contacts(found: Optimisation) -> list[str]:
+    """What nonlinear simulation says of the walls."""
+    done = [one for one in found.contacts if not one.reason]
+    said = []
+    if done:
+        stable = sum(one.stable is True for one in done)
+        share = (
+            "the wanted wall"
+            if found.study.wall.stiffness is not None
+            else "a wall of 90 % of the largest stiffness"
+        )
+        said.append(
+            f"{share}, simulated with friction, encoder steps and limits where the design is worst, is stable in "
+            f"{stable} of {plural(len(done), 'design')}"
+        )
+    missed = [one for one in found.contacts if one.reason]
+    if missed:
+        said.append(f"{plural(len(missed), 'design')} could not be simulated: {missed[0].reason}")
+    return said
+
+
+def short_names(paths: Sequence[str]) -> list[str]:
+    """The shortest end of each path that begins with a name and tells it from the others.
+
+    >>> short_names(["links.a.length_m", "links.b.length_m", "loop.delay_s", "plant.mass_kg.0.1"])
+    ['a.length_m', 'b.length_m', 'delay_s', 'mass_kg.0.1']
+    """
+    names = []
+    for path in paths:
+        steps = path.split(".")
+        ends = (".".join(steps[-n:]) for n in range(1, len(steps) + 1) if not steps[-n].isdigit())
+        others = [other for other in paths if other != path]
+        names.append(next((end for end in ends if not any(f".{one}".endswith(f".{end}") for one in others)), path))
+    return names

@@ -14,12 +14,11 @@ from zwidth._version import __version__
 from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.progress import Progress
-from zwidth.show.moment_units import speaking_of_moments
 from zwidth.show.output import write_text
 from zwidth.show.report import bending, load, sentences, tables
 from zwidth.show.report.facts import Facts, gather
 from zwidth.show.report.figures import svg_figures
-from zwidth.show.units import SPACE
+from zwidth.show.units import SPACE, speaking_of_moments
 
 PARTS: Final = 5  # the facts, three of them at length, and the page
 BLANK_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Hz|N|J|s|m|g)|Ns|samples?)(?![\w-]))")

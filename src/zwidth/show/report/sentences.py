@@ -20,12 +20,11 @@ from zwidth.loop.controller import Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference
 from zwidth.loop.motion_names import listed_names
 from zwidth.show.circumstances import load_text
-from zwidth.show.figures.decay import tenfold_time
-from zwidth.show.moment_units import speaks_of_moments
+from zwidth.show.figures.stability import tenfold_time
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, way
+from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, speaks_of_moments, way
+from zwidth.study.model_validity import Fit, Interval, Validity
 from zwidth.study.sensitivity.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
-from zwidth.study.validity import Fit, Interval, Validity
 
 # Gains of the actuator and the sensor are scales of the description, not parts to be changed.
 SCALES: Final = ("plant.actuator", "plant.sensor", "plant.handle")

@@ -7,11 +7,10 @@ from math import isnan
 from typing import Any
 
 from zwidth.conditions import Bound
-from zwidth.show.moment_units import keys_of_moments
 from zwidth.show.output import json_value
 from zwidth.show.report import sentences
 from zwidth.show.report.facts import Facts
-from zwidth.show.units import NONE, SPACE, UNKNOWN, number, quantity
+from zwidth.show.units import NONE, SPACE, UNKNOWN, keys_of_moments, number, quantity
 from zwidth.study.sensitivity.what_if import Variant
 
 Row = tuple[str, ...]

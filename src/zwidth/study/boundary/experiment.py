@@ -21,7 +21,7 @@ from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_crossings import EdgeKind, exact_edge
-from zwidth.conditions.friction_and_resolution import reading_noise, reading_step
+from zwidth.conditions.traits import reading_noise, reading_step
 from zwidth.contact.boundary_experiment import (
     TIP_SHARE,
     EdgePoint,
@@ -41,9 +41,8 @@ from zwidth.loop.unsupported_feedback import refuse_load
 from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator, attach
 from zwidth.progress import Progress
-from zwidth.study.boundary.experiment_plan import Plan
-from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint
-from zwidth.study.boundary.user_points import UserPoint, compare_points
+from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint, Plan
+from zwidth.study.boundary.points_file import UserPoint, compare_points
 from zwidth.study.jobs.journal import Journal, fingerprint
 
 EXPLAINED: Final = 3  # number of stiffnesses at which the edges are measured again to find causes

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device import address
+from zwidth.device.address import is_number, tables
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, plural, quote, suggestion
 from zwidth.device.schema import device_file as schema
-from zwidth.device.toml_access import is_number, tables
-from zwidth.measures.wanted import WANTED_BY_KEY
+from zwidth.measures.definition import WANTED_BY_KEY
 from zwidth.model.reduction import MODELS
-from zwidth.study.designs.catalogue import CatalogueError, read_catalogue
-from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, Tie, spread
+from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, CatalogueError, Tie, read_catalogue, spread
 
 UNITS: Final = {key: one.unit for key, one in WANTED_BY_KEY.items()}
 NUMBER: Final = ("number", "integer")

@@ -1,4 +1,9 @@
-"""Columns of a study: a measure at each design's operating point, or a statistic of it over the workspace."""
+"""Columns of a study: a measure at each design's operating point, or a statistic of it over the workspace.
+
+`Requirement`: a lower or an upper bound on a measure.
+
+Summary of a map: averages and extremes over the workspace.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +13,69 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from zwidth.arrays import Floats
+from zwidth.arrays import Flags, Floats
+from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, nearest
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import FAILED, NO_VALUE, OK, Better, Measure, MeasureValues
-from zwidth.measures.overall import global_conditioning_index, global_isotropy_index, overall
+from zwidth.measures.workspace_statistics import global_conditioning_index, global_isotropy_index, overall
 from zwidth.model.argument_checks import wrong_type
-from zwidth.study.workspace.workspace_summary import CONDITIONS
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from zwidth.loop.operating_point import OperatingPoint
+
+
+# Condition numbers, of which Gosselin and Angeles average the reciprocals.
+CONDITIONS: Final = ("isotropy", "isotropy_frobenius", "dynamic_isotropy", "handle_mass_isotropy")
+
+
+def over_the_workspace(dataset: xr.Dataset, name: str, device: Device | None = None) -> dict[str, float]:
+    """Average, worst, best, uniformity and so on of one measure of a map (`measures.overall.Overall`).
+
+    Averages are integrals by the trapezoidal rule: points on the rim of the grid stand for half as much. Condition
+    numbers have Gosselin and Angeles's `conditioning_index`, and `isotropy` Stocco's `isotropy_index`, for which
+    the device's postures are solved again; without a device it is left out.
+    """
+    values, status = dataset[name].values, dataset[f"{name}_status"].values
+    weights = areas(dataset["x_m"].values, dataset["y_m"].values)
+    better = dataset[name].attrs["better"] or None
+    summary = dict(vars(overall(values, status, weights, better)))
+    if name in CONDITIONS:
+        summary["conditioning_index"] = global_conditioning_index(values, status, weights)
+    if name == "isotropy" and device is not None and device.mechanism is not None:
+        from zwidth.model.posture import solve_posture
+
+        posture = solve_posture(device.mechanism, positions(dataset), dataset.attrs["assembly"])
+        freedoms = len(device.mechanism.drives.names)
+        summary["isotropy_index"] = global_isotropy_index(posture.jacobian, status, freedoms)
+    return summary
+
+
+def positions(dataset: xr.Dataset) -> Floats:
+    """Handle positions (ny, nx, 3) of a map's cells in the base frame [m]."""
+    axes = np.asarray(dataset.attrs["plane_axes"], dtype=np.float64).reshape(2, 3)
+    through = np.asarray(dataset.attrs["plane_through_m"], dtype=np.float64)
+    x, y = dataset["x_m"].values, dataset["y_m"].values
+    return np.asarray(through + x[None, :, None] * axes[0] + y[:, None, None] * axes[1])
+
+
+def areas(x: Floats, y: Floats) -> Floats:
+    """Area [m^2] that belongs to each point (ny, nx) of a grid by the trapezoidal rule.
+
+    >>> areas(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0])).tolist()
+    [[0.5, 1.0, 0.5], [0.5, 1.0, 0.5]]
+    """
+    return np.outer(_trapezoids(y), _trapezoids(x))
+
+
+def _trapezoids(x: Floats) -> Floats:
+    step = np.diff(x)
+    return np.asarray(0.5 * (np.append(step, 0.0) + np.append(0.0, step)))
+
 
 # Statistics over a workspace -> name in a figure, and whether the result has the measure's unit.
 STATISTICS: Final[dict[str, tuple[str, bool]]] = {
@@ -181,3 +238,61 @@ def unit_attributes(unit: str) -> dict[str, str]:
     xarray labels the axes of its plots by either attribute, and would write [] for an empty one.
     """
     return {"unit": unit, "units": unit} if unit else {}
+
+
+_FORM: Final = re.compile(r"\s*(?P<name>[^<>=\s]*)\s*(?P<sign>[<>=]*)\s*(?P<value>.*?)\s*")
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A bound on a measure.
+
+    at_least  True: the measure must be `value` or more; False: or less
+    """
+
+    measure: Measure
+    at_least: bool
+    value: float
+
+    @property
+    def text(self) -> str:
+        """The requirement as a user types it: "stiffness_max>=5000"."""
+        return f"{self.measure.name}{'>=' if self.at_least else '<='}{self.value:g}"
+
+    def margin(self, values: ArrayLike) -> Floats:
+        """Margin by which values meet the bound, in the measure's unit; negative where they do not.
+
+        >>> from zwidth.measures.catalogue import MEASURES
+        >>> Requirement(MEASURES["isotropy"], False, 1.5).margin([1.25, 2.0]).tolist()
+        [0.25, -0.5]
+        """
+        beyond = np.asarray(values, dtype=np.float64) - self.value
+        return beyond if self.at_least else -beyond
+
+    def met(self, values: ArrayLike) -> Flags:
+        """Which values meet the bound; nan does not."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.margin(values) >= 0.0)
+
+
+def parse_requirement(text: str, user_measures: Mapping[str, Measure] | None = None) -> Requirement:
+    """The requirement written as NAME>=VALUE or NAME<=VALUE, in the measure's unit.
+
+    user_measures  measures of a user's own, by name; a name may carry its unit, stiffness_max_N_per_m
+    Raises         ValueError  for another form, a measure that does not exist (the nearest is named), no finite
+                   number
+
+    >>> parse_requirement("isotropy <= 1.5").text
+    'isotropy<=1.5'
+    """
+    form = _FORM.fullmatch(text)
+    name, sign, number = form.groups() if form else ("", "", "")
+    if sign not in ("<=", ">=") or not name:
+        raise ValueError(f"{text!r} is not a requirement; write NAME>=VALUE or NAME<=VALUE, such as isotropy<=1.5")
+    try:
+        value = float(number)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise ValueError(f"{text!r}: the bound must be a finite number, got {number!r}")
+    return Requirement(find_measure(name, user_measures), sign == ">=", value)

@@ -1,12 +1,15 @@
 """Designs of a study that are built and measured together: those that consist of the same parts.
 
 Which designs are computed together never changes a design's result: every step looks at its own numbers alone.
+
+Designs of a study that are built together at one operating point, and their loops.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +20,10 @@ from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
 from zwidth.device.faults import DeviceError, KeyPath
 from zwidth.device.load import check
 from zwidth.device.operator_choice import with_operator
+from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_loops import table_of_points
+from zwidth.model.posture import OK, PostureError
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
 
 Rows = Ints
@@ -167,3 +174,42 @@ def _holds(document: Any, steps: KeyPath) -> bool:
             return False
         document = document[step]  # type: ignore[index]
     return True
+
+
+@dataclass(frozen=True)
+class BuiltDesigns:
+    """Designs of the same parts, built together.
+
+    rows   (P,)  their numbers in the study
+    point  (P,)  where they are
+    """
+
+    rows: Rows
+    point: OperatingPoint
+
+    @cached_property
+    def table(self) -> LoopTable | None:
+        """Their loops; one without sections, and all where this is None, are to be built alone."""
+        return table_of_points(self.point)
+
+
+def build_at_point(groups: Iterable[DesignGroup], point: OperatingPoint) -> Iterator[BuiltDesigns]:
+    """The designs of each group at the operating point of a single device, as `Device.at_point` puts each of them.
+
+    A design that is in none is to be built alone: it is not certain to be valid, it differs from no other of its
+    group, its posture is out of reach, does not lie straight ahead or is given by joint angles, or the point has a
+    response or several directions.
+    """
+    by_angles = isinstance(point.requested_position, Mapping)
+    if by_angles or point.response is not None or point.direction_count > 1:
+        return
+    for group in groups:
+        if not group.batch.differs:
+            continue
+        try:
+            built, alone = group.batch.at_point(point)
+        except (PostureError, DeviceError):
+            continue  # each design alone says why
+        kept = np.flatnonzero(group.valid & ~alone & (built.status == OK))
+        if len(kept):
+            yield BuiltDesigns(group.rows[kept], built[kept])

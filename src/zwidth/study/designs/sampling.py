@@ -1,18 +1,38 @@
-"""Axes of a study, the numbers tied to them, and the designs they span."""
+"""Axes of a study, the numbers tied to them, and the designs they span.
+
+Catalogues: tables of parts, such as motors or tubes, from which an axis of a study chooses one a design.
+
+A CSV file with a line of headings. One column holds the names of the parts, the others their numbers.
+
+Latin hypercubes whose designs are computed one by one, by their number: no design needs another's.
+
+Each axis is cut into n equal parts, and each part has one design, at a random place in it (McKay, Beckman and
+Conover 1979, known at second hand). Which part a design has is a permutation of the numbers below n that is
+computed for any of them: the number is written as two digits of mixed base, which change each other in turn by the
+hash of a key (a generalised Feistel network), until the result lies below n (Black and Rogaway 2002, "Ciphers with
+arbitrary finite domains", known at second hand). The hash is the output function of SplitMix64 (Steele, Lea and
+Flood 2014, known at second hand); the place in the part is its hash of the design's number. Of few designs the
+parts are in the order of hashes, which is simply random: a network of two small digits is not quite.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, log, prod
-from typing import Any, Final
+from functools import lru_cache
+from math import exp, isnan, isqrt, log, prod
+from pathlib import Path
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
-from zwidth.measures.wanted import WANTED_BY_KEY
-from zwidth.study.designs.catalogue import Part
-from zwidth.study.designs.latin_hypercube import share, shares
+from zwidth.device.faults import comma_list
+from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, read_text
+from zwidth.measures.definition import WANTED_BY_KEY
 
 WANTED: Final = tuple(WANTED_BY_KEY)
 CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)
@@ -207,3 +227,148 @@ def settings(axes: tuple[Axis, ...], values: tuple[Any, ...]) -> Iterator[tuple[
     """Path and value of each number that a design changes, tied numbers after those they are tied to."""
     for axis, value in zip(axes, values, strict=True):
         yield from ((key, one) for key, (one,) in axis.columns([value]))
+
+
+NAMES: Final = "name"  # heading of the column of names
+Part: TypeAlias = tuple[tuple[str, float], ...]  # path of the device file -> number
+
+
+class CatalogueError(ValueError):
+    """A catalogue that cannot be used; the text says why, and what to do."""
+
+
+def read_catalogue(path: Path, columns: Mapping[str, str]) -> dict[str, Part]:
+    """The parts of a catalogue by name, each with the numbers that it sets.
+
+    columns  path of the device file -> heading of the column that holds its number
+    Raises   CatalogueError  with all that is wrong, a line for each
+    """
+    try:
+        text = read_text(path, LARGEST_TABLE)
+    except UnreadableFileError as error:
+        raise CatalogueError(str(error)) from None
+    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+    if not rows:
+        raise CatalogueError("is empty; write a line of headings, one of them 'name', and a line for each part")
+    headings = [heading.strip() for heading in rows[0]]
+    if len(headings) == 1 and ";" in headings[0]:
+        raise CatalogueError("separates its columns by ';'; save it with commas, and numbers with decimal points")
+    absent = [heading for heading in dict.fromkeys([NAMES, *columns.values()]) if heading not in headings]
+    if absent:
+        has = comma_list([repr(heading) for heading in headings])
+        raise CatalogueError("\n".join(f"has no column {heading!r}; it has {has}" for heading in absent))
+    twice = [heading for heading in dict.fromkeys(headings) if headings.count(heading) > 1]
+    if twice:
+        raise CatalogueError(f"has several columns {twice[0]!r}; give each a name of its own")
+    return _parts(headings, rows[1:], columns)
+
+
+def _parts(headings: list[str], rows: list[list[str]], columns: Mapping[str, str]) -> dict[str, Part]:
+    parts: dict[str, Part] = {}
+    wrong: list[str] = []
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(headings):
+            wrong.append(f"part {number} has {len(row)} cells, the line of headings {len(headings)}")
+            continue
+        cells = {heading: cell.strip() for heading, cell in zip(headings, row, strict=True)}
+        name = cells[NAMES]
+        if not name or name in parts:
+            what = f"is called {name!r}, as one before it" if name else "has no name"
+            wrong.append(f"part {number} {what}; give it a name of its own")
+            continue
+        numbers: list[tuple[str, float]] = []
+        for path, heading in columns.items():
+            value = _number(cells[heading])
+            if value is None:
+                wrong.append(f"part {name!r}: {heading} must be a number, got {cells[heading]!r}")
+            else:
+                numbers.append((path, value))
+        parts[name] = tuple(numbers)
+    if wrong:
+        raise CatalogueError("\n".join(wrong))
+    if not parts:
+        raise CatalogueError("holds no part; write a line for each below the headings")
+    return parts
+
+
+def _number(text: str) -> float | None:
+    """A cell's number; None where it holds none."""
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return None if isnan(value) else value
+
+
+ROUNDS: Final = 10  # of the network; four make it random for large n, small n need more
+FEW: Final = 4096  # designs that are put in order
+BLOCK: Final = 1024  # designs that are computed at once where one is asked for
+_GAMMA: Final = np.uint64(0x9E3779B97F4A7C15)
+_BELOW_ONE: Final = float(np.nextafter(1.0, 0.0))
+
+Words = NDArray[np.uint64]
+
+
+def shares(seed: int, axis: int, size: int, first: int, last: int) -> Floats:
+    """How far along an axis designs first to last - 1 lie, from 0 to below 1, (last - first,).
+
+    seed  of the random numbers;   axis  number of the axis;   size  number of all designs
+
+    >>> sorted(int(5 * share) for share in shares(1, 0, 5, 0, 5))
+    [0, 1, 2, 3, 4]
+    """
+    keys = _keys(seed, axis)
+    designs = np.arange(first, last, dtype=np.uint64)
+    places = (_hash(designs * _GAMMA + keys[ROUNDS]) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    order = _ordered(seed, axis, size)[first:last] if size <= FEW else _permuted(designs, size, keys)
+    parts = order.astype(np.float64)
+    # the division may round up to 1
+    return np.minimum((parts + places) / size, _BELOW_ONE)
+
+
+def share(seed: int, axis: int, size: int, design: int) -> float:
+    """How far along an axis one design lies; see `shares`."""
+    return float(_block(seed, axis, size, design // BLOCK)[design % BLOCK])
+
+
+@lru_cache(maxsize=64)
+def _block(seed: int, axis: int, size: int, number: int) -> Floats:
+    return shares(seed, axis, size, number * BLOCK, min((number + 1) * BLOCK, size))
+
+
+@lru_cache(maxsize=64)
+def _keys(seed: int, axis: int) -> Words:
+    return np.random.SeedSequence((seed, axis)).generate_state(ROUNDS + 1, np.uint64).astype(np.uint64)
+
+
+@lru_cache(maxsize=64)
+def _ordered(seed: int, axis: int, size: int) -> Ints:
+    """A permutation of the numbers below `size`, by sorting."""
+    hashes = _hash(np.arange(size, dtype=np.uint64) * _GAMMA + _keys(seed, axis)[0])
+    return np.argsort(hashes, kind="stable")
+
+
+def _permuted(numbers: Words, size: int, keys: Words) -> Words:
+    """Images of numbers below `size` under a permutation of them."""
+    low = isqrt(size - 1) + 1  # bases of the two digits; their product is hardly above the size
+    high = -(-size // low)
+    images = _network(numbers, np.uint64(low), np.uint64(high), keys)
+    while len(outside := np.flatnonzero(images >= size)):
+        images[outside] = _network(images[outside], np.uint64(low), np.uint64(high), keys)
+    return images
+
+
+def _network(numbers: Words, low: np.uint64, high: np.uint64, keys: Words) -> Words:
+    """Images under a permutation of the numbers below low * high."""
+    left, right = numbers // low, numbers % low
+    for n in range(0, ROUNDS, 2):
+        left = (left + _hash(right + keys[n]) % high) % high
+        right = (right + _hash(left + keys[n + 1]) % low) % low
+    return left * low + right
+
+
+def _hash(words: Words) -> Words:
+    """The output function of SplitMix64: each bit of a word changes about half of the others."""
+    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return words ^ (words >> np.uint64(31))

@@ -10,12 +10,11 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from zwidth.device.address import is_number, table, tables
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, KeyPath, nearest, plural
-from zwidth.device.toml_access import is_number, table, tables
 from zwidth.device.validation_messages import validation_messages
-from zwidth.measures.definition import Measure, Spelling, WantedWall
-from zwidth.measures.wanted import WANTED_NUMBERS
+from zwidth.measures.definition import WANTED_NUMBERS, Measure, Spelling, WantedWall
 from zwidth.memory_limit import TooLarge
 from zwidth.study.designs.axis_tables import TableFaults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named

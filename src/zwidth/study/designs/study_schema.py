@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
+from zwidth.device.address import is_number
 from zwidth.device.faults import KeyPath, quote, suggestion
 from zwidth.device.schema.value_types import (
     VERSION,
@@ -18,7 +19,6 @@ from zwidth.device.schema.value_types import (
     WholeNumber,
     documented_key,
 )
-from zwidth.device.toml_access import is_number
 from zwidth.model.reduction import Model
 
 MOST: Final = 10**9  # designs along one axis, and in all; a larger number is a typing error

@@ -21,17 +21,17 @@ from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.designs.sampling import settings
 from zwidth.study.designs.study import Study
-from zwidth.study.designs.study_arguments import study_over
-from zwidth.study.designs.study_file import read_study
+from zwidth.study.designs.study_file import read_study, study_over
 from zwidth.study.designs.sweep_data import (
+    ColumnSummary,
     as_dataset,
     check_listing,
     note_sentences,
+    summaries,
     sweep_document,
     sweep_table,
 )
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
-from zwidth.study.designs.sweep_summary import ColumnSummary, summaries
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.executor_interface import Executor
 from zwidth.study.jobs.job import Cells

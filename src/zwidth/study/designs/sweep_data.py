@@ -1,22 +1,28 @@
 """A study's results as labelled arrays, as a document, and as a table.
 
 These list every design, and so must fit into memory. `table_pieces` gives one piece after the other.
+
+What a study's designs come to, found in one pass over them: extremes, and how many there are of each status.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import plural
-from zwidth.measures.definition import STATUS, Note
+from zwidth.measures.definition import OK, STATUS, Note
 from zwidth.memory_limit import check_memory
 from zwidth.study.designs.axis_tables import unit_of
 from zwidth.study.designs.column import unit_attributes
 from zwidth.study.designs.sampling import Axis
+from zwidth.study.jobs.job import Cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +30,7 @@ if TYPE_CHECKING:
     from zwidth.study.designs.sweep import Sweep
     from zwidth.study.designs.sweep_job import SweepJob
     from zwidth.study.jobs.job import CellValues
+
 
 PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy while the table is made
 PER_AXIS: Final = 12  # numbers of memory for each axis of a design, whose values are kept as they are written
@@ -229,3 +236,48 @@ def dataset_attributes(sweep: Sweep) -> dict[str, Any]:
         **({} if device.load is None else {"load": device.load.text("N m" if sweep.study.turns else "N")}),
         "zwidth": __version__,
     }
+
+
+@dataclass
+class ColumnSummary:
+    """One column of a study.
+
+    lowest, highest  value and number of the first design that has it; None where no design has a value
+    counts           (256,)  number of designs by status
+    """
+
+    lowest: tuple[float, int] | None = None
+    highest: tuple[float, int] | None = None
+    counts: Ints = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
+
+    def add(self, first: int, values: Floats, status: NDArray[np.uint8]) -> None:
+        """Add consecutive designs, the first of them by its number, in ascending order."""
+        self.counts += np.bincount(status, minlength=256)
+        there = np.flatnonzero(status == OK)
+        if not len(there):
+            return
+        low, high = int(there[np.argmin(values[there])]), int(there[np.argmax(values[there])])
+        if self.lowest is None or values[low] < self.lowest[0]:
+            self.lowest = float(values[low]), first + low
+        if self.highest is None or values[high] > self.highest[0]:
+            self.highest = float(values[high]), first + high
+
+    @property
+    def by_status(self) -> Iterator[tuple[int, int]]:
+        """Each status that there is, and the number of its designs."""
+        return ((int(status), int(self.counts[status])) for status in np.flatnonzero(self.counts))
+
+
+def summaries(cells: Cells, columns: int) -> tuple[ColumnSummary, ...]:
+    """The summary of each column; of stored cells one piece after the other is in memory.
+
+    >>> from zwidth.study.jobs.job import CellValues
+    >>> cells = CellValues(np.array([[3.0], [1.0]]), np.zeros((2, 1), np.uint8), ((),))
+    >>> summaries(cells, 1)[0].lowest
+    (1.0, 1)
+    """
+    found = tuple(ColumnSummary() for _ in range(columns))
+    for first, piece in cells.pieces():
+        for n, one in enumerate(found):
+            one.add(first, piece.values[:, n], piece.status[:, n])
+    return found

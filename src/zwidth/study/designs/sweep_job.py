@@ -16,7 +16,7 @@ import numpy as np
 
 from zwidth.arrays import Floats, Ints
 from zwidth.device import address
-from zwidth.device.compiled_mechanism_check import masses_moved
+from zwidth.device.design_checks import masses_moved
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError, plural
 from zwidth.device.load import from_document
@@ -30,6 +30,7 @@ from zwidth.measures.definition import (
     OK,
     OUT_OF_REACH,
     SINGULAR,
+    WANTED_BY_NAME,
     Measure,
     MeasureError,
     MeasureValues,
@@ -38,18 +39,16 @@ from zwidth.measures.definition import (
     WantedWall,
     WantedWalls,
 )
-from zwidth.measures.evaluate import evaluate, evaluate_safely, measured_together
-from zwidth.measures.wanted import WANTED_BY_NAME
+from zwidth.measures.evaluation import evaluate, evaluate_safely, measured_together
 from zwidth.model.equilibrium import EquilibriumError
 from zwidth.model.load import LoadError
 from zwidth.model.posture import BeyondLimit, OutOfReach, PostureError, Singular
-from zwidth.study.designs.column import Column
+from zwidth.study.designs.column import Column, areas
 from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling, settings
 from zwidth.study.designs.study import KEYS, Study, as_key
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
-from zwidth.study.workspace.workspace_summary import areas
 
 if TYPE_CHECKING:
     pass

@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Floats
+from zwidth.device.address import is_number, table
 from zwidth.device.device import Device
 from zwidth.device.faults import DeviceError
-from zwidth.device.toml_access import is_number, table
 from zwidth.measures.definition import MeasureError
 from zwidth.model.posture import PostureError, handle_motions
 from zwidth.study.workspace.extreme_direction import sphere

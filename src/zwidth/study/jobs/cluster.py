@@ -17,9 +17,16 @@ from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.study.jobs.cluster_worker import compute_on_worker, different, end_processes, versions
-from zwidth.study.jobs.recovery import Batch
-from zwidth.study.jobs.workers import CellRange, PackedJob, cores
+from zwidth.study.jobs.workers import (
+    Batch,
+    CellRange,
+    PackedJob,
+    compute_on_worker,
+    cores,
+    different,
+    end_processes,
+    versions,
+)
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -332,7 +339,7 @@ def _versions_there() -> Callable[[], dict[str, str]]:
 
     def ask() -> dict[str, str]:
         try:
-            from zwidth.study.jobs.cluster_worker import versions
+            from zwidth.study.jobs.workers import versions
         except ImportError:
             try:
                 from zwidth._version import __version__

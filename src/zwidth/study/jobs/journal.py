@@ -4,6 +4,8 @@ The first line holds the fingerprint of the question and the version of the form
 is emptied and begun again; one of a newer version is refused. Numbers are read back exactly. Each line has a
 checksum: one that a crash or a disk has damaged is dropped with those behind it, and computed again. A journal of
 version 1 has none; its lines are taken as they are, and get theirs.
+
+Lines of JSON that carry a checksum, so that one which a crash or a disk has damaged is not read.
 """
 
 from __future__ import annotations
@@ -11,15 +13,16 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable
+import re
+import zlib
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from zwidth.device.format_version import STORE_VERSION, newer_version_message, without_checksums
-from zwidth.study.jobs.checked_lines import checked_line, read_checked_line
+from zwidth.device.text_file import STORE_VERSION, newer_version_message, without_checksums
 
 
 def fingerprint(*parts: object) -> str:
@@ -129,4 +132,33 @@ def _entry(line: bytes) -> dict[str, Any]:
         entry = json.loads(line)
     except ValueError:
         return {}
+    return entry if isinstance(entry, dict) else {}
+
+
+CHECKED: Final = re.compile(rb'(.*), "crc32": (\d+)\}\n?', re.DOTALL)
+
+
+def checked_line(entry: Mapping[str, Any]) -> bytes:
+    r"""A line that holds an entry and the CRC-32 of its text.
+
+    >>> checked_line({"name": "one"})
+    b'{"name": "one", "crc32": 4065295285}\n'
+    """
+    text = json.dumps(entry)
+    return f'{text[:-1]}, "crc32": {zlib.crc32(text.encode())}}}\n'.encode()
+
+
+def read_checked_line(line: bytes) -> dict[str, Any]:
+    r"""The entry of a line, without its checksum; {} where the line is not what was written.
+
+    >>> read_checked_line(checked_line({"name": "one"})), read_checked_line(b'{"name": "one"}\n')
+    ({'name': 'one'}, {})
+    """
+    found = CHECKED.fullmatch(line)
+    if found is None:
+        return {}
+    text = found[1] + b"}"
+    if zlib.crc32(text) != int(found[2]):
+        return {}
+    entry = json.loads(text)
     return entry if isinstance(entry, dict) else {}

@@ -24,15 +24,14 @@ from types import TracebackType
 from typing import Final
 
 from zwidth._version import __version__
-from zwidth.device.format_version import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.progress import Progress
 from zwidth.study.jobs.executor import SMALL, run
 from zwidth.study.jobs.executor_interface import Executor, open_executor
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.journal import fingerprint
-from zwidth.study.jobs.store import KeptForAnother, Store, StoreError, whose_work
-from zwidth.study.jobs.store_lock import FILE as LOCK
-from zwidth.study.jobs.store_lock import FolderLock, owner_of
+from zwidth.study.jobs.store import FILE as LOCK
+from zwidth.study.jobs.store import FolderLock, KeptForAnother, Store, StoreError, owner_of, whose_work
 from zwidth.study.jobs.workers import cores
 
 HEADER: Final = "series.json"

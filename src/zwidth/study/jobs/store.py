@@ -12,6 +12,10 @@ one file of values and one of status, each written whole or not at all, the stat
 Every file can be told from a damaged one: chunks and lines of notes have checksums, the arrays' descriptions
 digests in the group's attributes, and these a digest of their own. A damaged batch is not done, and is computed
 again; a store with damaged descriptions is refused.
+
+A lock on a folder that ends with the process that holds it, however that ends.
+
+Notes of a store's batches: a file of lines, of which only their places are kept in memory.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ import json
 import os
 import secrets
 import shutil
+import socket
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -34,14 +39,11 @@ from numpy.typing import NDArray
 
 from zwidth._version import __version__
 from zwidth.arrays import Flags, Floats
-from zwidth.device.format_version import STORE_VERSION, newer_version_message, unchecked_version_message
-from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS
+from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS, Note
 from zwidth.memory_limit import check_memory
-from zwidth.study.jobs.job import CellValues, Job, Notes
-from zwidth.study.jobs.journal import fingerprint
-from zwidth.study.jobs.notes import NoteSummary
-from zwidth.study.jobs.store_lock import FolderLock, owner_of
-from zwidth.study.jobs.store_notes import NotesFile
+from zwidth.study.jobs.job import CellValues, Job, Notes, NoteSummary
+from zwidth.study.jobs.journal import checked_line, fingerprint, read_checked_line
 
 KIND: Final = "cells"
 NOTES: Final = "notes.jsonl"
@@ -373,3 +375,133 @@ class StoredCells:
 def store_for(job: Job, store: Store | str | os.PathLike[str] | None) -> Store | None:
     """A job's store: the one given, or one in the folder of that name; None for None. Raises what `Store` does."""
     return Store(Path(store), job) if isinstance(store, str | os.PathLike) else store
+
+
+FILE: Final = "lock"
+
+
+class FolderLock:
+    """The lock of one folder, a file in it that the operating system locks.
+
+    The file may stay behind: it is the process's hold on it that counts.
+    """
+
+    def __init__(self) -> None:
+        self._file: int | None = None
+
+    @property
+    def held(self) -> bool:
+        """Whether this object holds it."""
+        return self._file is not None
+
+    def acquire(self, folder: Path) -> bool:
+        """Take the lock. Returns whether nobody else holds it. Raises OSError where the file cannot be written."""
+        if self._file is not None:
+            return True
+        file = os.open(folder / FILE, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            if not _lock(file):
+                return False
+            owner = json.dumps({"process": os.getpid(), "host": socket.gethostname()}).encode()
+            os.ftruncate(file, 0)
+            os.pwrite(file, owner, 0) if hasattr(os, "pwrite") else os.write(file, owner)
+            self._file, file = file, -1
+            return True
+        finally:
+            if file >= 0:
+                os.close(file)
+
+    def release(self) -> None:
+        """Let others have it."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def __del__(self) -> None:
+        self.release()
+
+
+def owner_of(folder: Path) -> str:
+    """The process that has last locked a folder, in words.
+
+    >>> owner_of(Path("nowhere"))
+    'another process'
+    """
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        owner = json.loads((folder / FILE).read_text())
+        return f"process {int(owner['process'])} on {str(owner['host'])[:60]}"
+    return "another process"
+
+
+def _lock(file: int) -> bool:
+    """Lock an open file. Returns whether nobody else has."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        try:
+            os.lseek(file, 1 << 20, os.SEEK_SET)  # beyond the text, which others may read
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+        except OSError:
+            return False
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+class NotesFile:
+    """Why cells have no value, and the digest of the batch's numbers: a line for each batch, with a checksum. The
+    first line holds the version and the fingerprint.
+
+    A damaged line is passed over, and one cut short by a crash or a full disk written over: their batches have no
+    notes, and are computed again. So no line need be forced to the disk before the next.
+
+    header  first line
+    Raises  OSError     where the file cannot be read or written
+            ValueError  where it begins with another line
+    """
+
+    def __init__(self, path: Path, header: str) -> None:
+        self.path = path
+        self._places: dict[int, int] = {}  # first cell of a batch -> where its last line begins
+        first = header.encode() + b"\n"
+        if not path.exists() or not path.stat().st_size:
+            path.write_bytes(first)
+        with open(path, "rb") as file:
+            if file.readline() != first:
+                raise ValueError(f"{path.name} begins with another line")
+            self._end = file.tell()
+            while (line := file.readline()).endswith(b"\n"):
+                if (entry := read_checked_line(line)).get("name") is not None:
+                    self._places[int(entry["name"])] = self._end
+                self._end = file.tell()
+
+    def write(self, first: int, notes: Notes, digest: int) -> None:
+        """Write the notes of the batch that begins with a cell, and the digest of its numbers. Raises OSError."""
+        value = [[[one.status, one.reason, one.count, list(one.first)] for one in notes_of] for notes_of in notes]
+        line = checked_line({"name": str(first), "digest": digest, "value": value})
+        with open(self.path, "r+b") as file:
+            file.truncate(self._end)
+            file.seek(self._end)
+            file.write(line)
+        self._places[first] = self._end
+        self._end += len(line)
+
+    def read(self, first: int, digest: int) -> Notes:
+        """The notes of the batch that begins with a cell. Raises ValueError where none are written, and where they
+        are those of other numbers."""
+        place = self._places.get(first)
+        if place is None:
+            raise ValueError(f"{self.path.name} has no line of the batch at {first}")
+        with open(self.path, "rb") as file:
+            file.seek(place)
+            entry = read_checked_line(file.readline())
+        if entry.get("digest") != digest:
+            raise ValueError(f"{self.path.name} tells of other numbers in the batch at {first}")
+        return tuple(
+            tuple(Note(s, reason, n, tuple(at)) for s, reason, n, at in notes) for notes in entry["value"]
+        )

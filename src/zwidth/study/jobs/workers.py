@@ -4,6 +4,16 @@ It is a new interpreter (a forked one would inherit numba's threads and crash) w
 for linear algebra, fed through pipes. The caller's main script is not run in it, so that a script or a notebook
 needs no guard. Ctrl-C does not reach it: the process that started it ends it, and if that one is killed, the
 system ends it, even amid compiled code.
+
+What a worker of a dask cluster does: it hands each range to a process of its own, as on a single computer.
+
+So a cell that ends its process, or never ends, is treated alike in both, and numba and linear algebra have one
+thread for each range.
+
+Compute a range of cells although some of them raise, end their process or never end.
+
+A range that fails is cut into pieces, and these again, down to the cells that cannot be computed. These become
+data: a status and a reason. All others get their values, the same as in any other division of the job.
 """
 
 from __future__ import annotations
@@ -15,16 +25,24 @@ import pickle
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from threading import Timer
+from functools import cache, partial
+from itertools import pairwise
+from threading import Lock, Timer
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.study.jobs.recovery import CannotStart, OutOfTime, WorkerLost
+import numpy as np
+
+from zwidth.device.faults import DeviceError
+from zwidth.measures.definition import FAILED, OUT_OF_TIME, MeasureError, Note
+from zwidth.study.jobs.job import CellValues, merge_notes
 
 if TYPE_CHECKING:
     from zwidth.study.jobs.job import CellValues, Job
+
 
 CellRange = tuple[int, int]
 
@@ -346,3 +364,208 @@ def _pickled(kind: str, content: Any) -> bytes:
     except Exception:
         return pickle.dumps((kind, RuntimeError(f"{type(content).__name__}: {content}")))
     return data
+
+
+MOST_ENDED: Final = 1000  # runs that are remembered as ended
+FORGOTTEN: Final = 60.0  # s; the processes of a run that was killed are ended when another comes, after this time
+_lock = Lock()
+_idle: dict[str, list[WorkerProcess]] = {}  # by run
+_busy: dict[str, list[WorkerProcess]] = {}
+_used: dict[str, float] = {}  # when a process of the run was last taken or given back
+_ended: list[str] = []
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Releases of what results depend on; they are to be the same on all computers of a cluster."""
+    import sys
+    from importlib.metadata import version
+
+    from zwidth._version import __version__
+
+    own = {name: version(name) for name in ("numpy", "scipy", "numba")}
+    return {"zwidth": __version__, "python": ".".join(map(str, sys.version_info[:2])), **own}
+
+
+def compute_on_worker(
+    job: PackedJob, first: int, last: int, run: str, time_limit: float | None, expected: dict[str, str]
+) -> Batch:
+    """Compute cells first to last - 1 of a job, in a process that is kept for the next range of the run.
+
+    run       name of the run, with which `end_processes` ends its processes
+    expected  releases that this worker must have: it may have joined after the others were asked
+    Raises    CannotStart  where it has others, and what `compute_range` raises
+    """
+    if (own := versions()) != expected:
+        raise CannotStart(f"a worker that joined the cluster has {different(own, expected)}")
+    if run not in _used:
+        _end_forgotten()
+    with _lock:
+        if run in _ended:
+            raise CannotStart("the run was ended")
+        _used[run] = monotonic()
+        idle = _idle.setdefault(run, [])
+        worker = idle.pop() if idle else WorkerProcess(time_limit)
+        _busy.setdefault(run, []).append(worker)
+    try:
+        return compute_range(partial(worker.compute, job), job.measures, first, last)
+    finally:
+        with _lock:
+            ended = run in _ended
+            if not ended:
+                _busy[run].remove(worker)
+                _idle[run].append(worker)
+                _used[run] = monotonic()
+        if ended:
+            worker.end()
+
+
+def end_processes(run: str) -> None:
+    """End all processes of a run on this worker."""
+    with _lock:
+        _ended.append(run)
+        del _ended[:-MOST_ENDED]
+        _used.pop(run, None)
+        workers = [*_idle.pop(run, []), *_busy.pop(run, [])]
+    for worker in workers:
+        worker.end()
+
+
+def _end_forgotten() -> None:
+    """End the processes of runs that have gone without a word: they were killed, or their connection was lost."""
+    with _lock:
+        since = monotonic() - FORGOTTEN
+        forgotten = [run for run, used in _used.items() if used < since and not _busy.get(run)]
+    for run in forgotten:
+        end_processes(run)
+
+
+def different(own: dict[str, str], expected: dict[str, str]) -> str:
+    """The releases that are known and differ, in words.
+
+    >>> different({"zwidth": "0.1", "numpy": "2.1"}, {"zwidth": "0.2", "numpy": "2.1"})
+    'zwidth 0.1 instead of 0.2'
+    """
+    wrong = (name for name, release in own.items() if expected.get(name) != release)
+    return ", ".join(f"{name} {own[name]} instead of {expected.get(name)}" for name in wrong)
+
+
+PIECES: Final = 8  # into which a range that failed is cut
+TRIES: Final = 2  # of a range that ended its process: another program may have ended it, or a lack of memory
+TRIES_ALONE: Final = 3  # of a single cell
+UNLIMITED: Final = 10**12
+
+Attempt = Callable[[int, int], CellValues]
+
+
+class WorkerLost(RuntimeError):
+    """A worker process ended before its task was done: killed, or out of memory."""
+
+
+class OutOfTime(RuntimeError):
+    """Cells took longer than their time limit; the process that computed them was ended."""
+
+
+class CannotStart(RuntimeError):
+    """A worker process does not get as far as computing its first task."""
+
+
+ENDING: Final = (MeasureError, DeviceError, CannotStart)  # say that no cell can be computed
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Computed cells, and what happened on the way.
+
+    events  a sentence for each process that ended and had to be replaced
+    error   what every cell raised when computed alone, with the same text; None where cells differ in that
+    """
+
+    cells: CellValues
+    events: tuple[str, ...] = ()
+    error: Exception | None = None
+
+
+def compute_range(attempt: Attempt, measures: int, first: int, last: int) -> Batch:
+    """Compute cells first to last - 1, those that fail apart from the others.
+
+    attempt   computes some cells; after a WorkerLost or OutOfTime it can be called again
+    measures  number of columns of a cell
+    Raises    MeasureError, DeviceError, CannotStart as the attempt does; they are about all cells
+
+    >>> def attempt(first, last):
+    ...     if first <= 2 < last:
+    ...         raise ZeroDivisionError("no reciprocal")
+    ...     return CellValues(np.ones((last - first, 1)), np.zeros((last - first, 1), np.uint8), ((),))
+    >>> compute_range(attempt, 1, 0, 4).cells.notes
+    ((Note(status=5, reason='raised ZeroDivisionError: no reciprocal', count=1, first=(2,)),),)
+    """
+    events: list[str] = []
+    parts: list[CellValues] = []
+    errors: list[Exception | None] = []
+    ranges = [(first, last)]
+    while ranges:
+        begin, end = ranges.pop()
+        found = _attempt(attempt, begin, end, events)
+        if isinstance(found, CellValues):
+            parts.append(found)
+            errors.append(None)
+        elif end - begin > 1:
+            ranges += reversed(_cut(begin, end))
+        else:
+            status, reason, error = found
+            none = np.full((1, measures), np.nan), np.full((1, measures), status, dtype=np.uint8)
+            parts.append(CellValues(*none, ((Note(status, reason, 1, (begin,)),),) * measures))
+            errors.append(error)
+    same = len({str(error) for error in errors}) == 1
+    return Batch(_join(parts, measures), tuple(events), errors[0] if same else None)
+
+
+def _attempt(
+    attempt: Attempt, first: int, last: int, events: list[str]
+) -> CellValues | tuple[int, str, Exception | None]:
+    """The cells, or the status and the reason why there are none, and the error that says so."""
+    tries = TRIES if last - first > 1 else TRIES_ALONE
+    for left in reversed(range(tries)):
+        try:
+            return attempt(first, last)
+        except ENDING:
+            raise
+        except WorkerLost as error:
+            again = "computed again" if left or last - first > 1 else "left out"
+            events.append(f"{error}; {_cells(first, last)} {again}")
+            lost = error
+        except OutOfTime as error:
+            return OUT_OF_TIME, str(error), None
+        except Exception as error:
+            if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
+                raise  # ctrl-C during a call of compiled code
+            return FAILED, f"raised {type(error).__name__}: {_first_line(error)}", error
+    return FAILED, f"{lost}, {TRIES_ALONE} times", lost
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0] if str(error) else "without a message"
+
+
+def _cells(first: int, last: int) -> str:
+    return f"number {first} is" if last - first == 1 else f"numbers {first} to {last - 1} are"
+
+
+def _cut(first: int, last: int) -> list[tuple[int, int]]:
+    """Pieces of about equal size, none empty.
+
+    >>> _cut(0, 3)
+    [(0, 1), (1, 2), (2, 3)]
+    """
+    pieces = min(PIECES, last - first)
+    ends = [first + (last - first) * n // pieces for n in range(pieces + 1)]
+    return list(pairwise(ends))
+
+
+def _join(parts: list[CellValues], measures: int) -> CellValues:
+    if len(parts) == 1:
+        return parts[0]
+    notes = (merge_notes([note for part in parts for note in part.notes[m]], UNLIMITED) for m in range(measures))
+    values, status = (np.concatenate([getattr(part, name) for part in parts]) for name in ("values", "status"))
+    return CellValues(values, status, tuple(notes))

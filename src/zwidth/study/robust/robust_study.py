@@ -27,8 +27,13 @@ from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.robust.family import Family, FamilyMember, RangeError, build_together
-from zwidth.study.robust.unseen_members import Violation, sample_walls, try_unseen_members
-from zwidth.study.robust.violation_search import MemberRadii, violating_members
+from zwidth.study.robust.unseen_members import (
+    MemberRadii,
+    Violation,
+    sample_walls,
+    try_unseen_members,
+    violating_members,
+)
 
 __all__ = ["RobustError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
 
@@ -300,8 +305,8 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
     Of ranges, random members join one by one, the one first that runs deepest into the robust walls (see
     `unseen_measured`), until none of them does; then as many others are tried.
     """
-    from zwidth.study.robust.measured_family import MeasuredFamily, MeasuredMember, MeasuredMembers
-    from zwidth.study.robust.unseen_measured import (
+    from zwidth.study.robust.family import MeasuredFamily, MeasuredMember, MeasuredMembers
+    from zwidth.study.robust.unseen_members import (
         DEPTH,
         intrusions,
         random_measured_members,

@@ -1,25 +1,42 @@
-"""Random members of a family, not used for its robust chart, tried on the robust walls."""
+"""Random members of a family, not used for its robust chart, tried on the robust walls.
+
+Random members of a measured family tried on the robust walls, without a chart of each.
+
+Within the ranges of a family one member changes into another without a jump, and so do its roots. A wall that is
+stable for one and not for the other has a root on the circle for some member between them. A random member
+therefore speaks against the robust walls where the curve of its own walls with a root on the circle runs inside of
+them.
+
+The search of a family for members that find a wall of the robust edge unstable.
+
+From members that bind at a wall a pattern search climbs to the largest spectral radius. Searches climb beside each
+other, and the members that they can try next are built together.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from math import nan
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import shapely
 
 from zwidth.arrays import Floats, Ints
+from zwidth.chart.measured.boundary import coarse_angles, real_root
+from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.robust.chart import RobustChart
 from zwidth.chart.robust.instability import softenings, unstable_walls
+from zwidth.chart.robust.measured import MeasuredRobustChart
 from zwidth.chart.table_radii import spectral_radii
 from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
 from zwidth.progress import Progress
-from zwidth.study.robust.family import Family, FamilyMember, build_together
+from zwidth.study.robust.family import Family, FamilyMember, MeasuredFamily, MeasuredMember, build_together
 
 EDGE_WALLS: Final = 200  # walls along the edge that random members are tried on
 RASTER: Final = 12  # walls inside, per axis
@@ -170,3 +187,269 @@ def sample_walls(chart: RobustChart) -> Floats:
 
 def _lengths(K: Floats, B: Floats, size: Floats) -> Floats:
     return np.asarray(np.hypot(np.diff(K) / size[0], np.diff(B) / size[1]))
+
+
+MEASURED_DEPTH: Final = 1e-3  # share of the set's size by which a curve may run inside, since it is polygons
+LINE_WALLS: Final = 200  # on each line of real roots
+DENSER: Final = 4  # angles on the curve for each of a coarse chord
+
+
+@dataclass(frozen=True)
+class Intrusion:
+    """How far a member's curve runs into the robust walls.
+
+    depth    distance from their edge, in shares of their size; 0 where it stays outside
+    softer   the largest stiffness [N/m] by which a robust wall (K > 0, B >= 0) must be softened, at its damping,
+             to be outside the curve
+    """
+
+    depth: float
+    softer: float
+
+
+def random_measured_members(
+    family: MeasuredFamily, count: int, seed: Sequence[int], at_ends: float = 0.0
+) -> Iterator[MeasuredMember]:
+    """Random members, each of a random operator and sweep.
+
+    at_ends  probability of each number to lie at an end of its range: those that cut most often do
+    """
+    random, own = np.random.default_rng(seed), family.family
+    for _ in range(count):
+        operator = int(random.integers(max(len(own.operators), 1)))
+        sweep = family.sweeps[int(random.integers(len(family.sweeps)))]
+        shares = random.random(len(own.free))
+        shares = np.where(random.random(len(own.free)) < at_ends, np.round(shares), shares)
+        yield MeasuredMember(own.member(operator, shares), sweep)
+
+
+def curve_of_walls(loop: MeasuredLoop, box: tuple[float, float, float, float]) -> Floats:
+    """Walls (n, 2) of [K, B] with a root on the circle: on the curve, and on the lines of real roots in a box.
+
+    box  KMIN, BMIN, KMAX, BMAX
+    """
+    coarse = coarse_angles(loop)
+    share = np.arange(DENSER) / DENSER
+    theta = (coarse[:-1, None] + share * np.diff(coarse)[:, None]).ravel()
+    K, B, _ = loop.walls(theta)
+    pieces = [np.column_stack([K, B])]
+    for kind in (-1, -2):
+        h, w = real_root(loop, kind)
+        if not np.isfinite(h):
+            continue
+        if w == 0.0:
+            on_line = np.linspace(box[1], box[3], LINE_WALLS)
+            pieces.append(np.column_stack([np.full(LINE_WALLS, h), on_line]))
+        else:
+            stiffness = np.linspace(box[0], box[2], LINE_WALLS)
+            pieces.append(np.column_stack([stiffness, (h - stiffness) / w]))
+    walls = np.vstack(pieces)
+    return np.asarray(walls[np.all(np.isfinite(walls), axis=1)])
+
+
+class RobustWalls:
+    """The robust walls of a chart, against which curves of other members are held."""
+
+    def __init__(self, chart: MeasuredRobustChart) -> None:
+        whole = shapely.union_all([shapely.Polygon(ring) for ring in chart.regions])
+        self.box = whole.bounds
+        self.size = np.array([self.box[2] - self.box[0], self.box[3] - self.box[1]])
+        self.shape = shapely.transform(whole, lambda xy: xy / self.size)
+        self.edge = self.shape.boundary
+        shapely.prepare(self.shape)
+
+    def intrusion(self, loop: MeasuredLoop) -> Intrusion:
+        """How far a member's curve runs inside."""
+        walls = curve_of_walls(loop, self.box) / self.size
+        inside = walls[shapely.contains_xy(self.shape, *walls.T)]
+        if not len(inside):
+            return Intrusion(0.0, 0.0)
+        away = shapely.distance(self.edge, shapely.points(inside))
+        buildable = inside[(inside[:, 0] > 0.0) & (inside[:, 1] >= 0.0) & (away > MEASURED_DEPTH)]
+        softer = max((self._above(*wall) for wall in buildable), default=0.0)
+        return Intrusion(float(away.max()), softer)
+
+    def _above(self, K: float, B: float) -> float:
+        """Distance [N/m] of a wall from the stiffest robust one of its damping."""
+        right = self.shape.bounds[2]
+        line = shapely.intersection(self.shape, shapely.LineString([(K, B), (right, B)]))
+        return float((line.bounds[2] - K) * self.size[0]) if not line.is_empty else 0.0
+
+
+def intrusions(
+    family: MeasuredFamily, chart: MeasuredRobustChart, members: Sequence[MeasuredMember], progress: Progress
+) -> dict[int, Intrusion]:
+    """How far each of several members runs into the robust walls, by its place; one without a response is left
+    out."""
+    walls, result = RobustWalls(chart), {}
+    for place, one in enumerate(members):
+        progress(STAGE, place, len(members))
+        with suppress(ValueError, np.linalg.LinAlgError):
+            result[place] = walls.intrusion(MeasuredLoop(*family.member(one)))
+    progress(STAGE, len(members), len(members))
+    return result
+
+
+def violation_of_measured(
+    family: MeasuredFamily, chart: MeasuredRobustChart, unseen: int, seed: int, progress: Progress
+) -> Violation:
+    """What random members say of the robust walls. Spectral radii are not known of a response: nan."""
+    members = list(random_measured_members(family, unseen, [seed, 1]))
+    tried = intrusions(family, chart, members, progress)
+    violating = [place for place, one in tried.items() if one.depth > MEASURED_DEPTH]
+    if not violating:
+        return Violation(len(tried), 0, nan, 0.0, {}, len(members) - len(tried))
+    worst = max(violating, key=lambda place: (tried[place].softer, tried[place].depth))
+    share = tried[worst].softer / chart.stiffness_max if chart.stiffness_max > 0.0 else 0.0
+    return Violation(
+        len(tried), len(violating), nan, share, family.values(members[worst]), len(members) - len(tried)
+    )
+
+
+Wall: TypeAlias = tuple[float, float]  # K [N/m], B [N s/m]
+
+SEARCHED: Final = 12  # number of walls of the edge at which each round searches for a worse member
+FIRST_STEP, LAST_STEP = 0.25, 1e-3  # step of the pattern search, in shares of the ranges
+EXCEEDS: Final = 1e-7  # excess of the spectral radius over 1 that makes a member join
+
+
+class MemberRadii:
+    """Spectral radii of walls for members of a family, each computed once."""
+
+    def __init__(self, family: Family) -> None:
+        self.family = family
+        self._radii: dict[tuple[FamilyMember, Wall], float] = {}
+        self._loops: dict[FamilyMember, Loop | None] = {}
+
+    def prepare(self, wanted: Sequence[tuple[FamilyMember, Wall]]) -> None:
+        """Compute those of all members that can be built together; the rest waits until it is needed."""
+        pairs = [pair for pair in dict.fromkeys(wanted) if pair not in self._radii]
+        number = {member: n for n, member in enumerate(dict.fromkeys(member for member, _ in pairs))}
+        member_of = np.array([number[member] for member, _ in pairs], dtype=np.int64)
+        walls = np.array([wall for _, wall in pairs]).reshape(-1, 2)
+        for built in build_together(self.family, list(number)):
+            if built.table is None:
+                continue
+            row = np.full(len(number), -1)
+            row[built.rows] = np.arange(len(built.rows))
+            own = np.flatnonzero(row[member_of] >= 0)
+            radii = spectral_radii(built.table, row[member_of[own]], *walls[own].T)
+            self._radii.update(
+                (pairs[n], float(radius)) for n, radius in zip(own, radii, strict=True) if np.isfinite(radius)
+            )
+
+    def radius(self, member: FamilyMember, wall: Wall) -> float:
+        """Spectral radius of a wall for a member; -1 for one that cannot be built."""
+        if (member, wall) not in self._radii:
+            loop = self._loop(member)
+            radius = -1.0 if loop is None else np.abs(np.linalg.eigvals(loop.transition_matrix(*wall))).max()
+            self._radii[member, wall] = float(radius)
+        return self._radii[member, wall]
+
+    @property
+    def met_unknown(self) -> bool:
+        """Whether some of the members looked at cannot be built."""
+        return any(loop is None for loop in self._loops.values())
+
+    def _loop(self, member: FamilyMember) -> Loop | None:
+        if member not in self._loops:
+            try:
+                self._loops[member] = self.family.loop(member)
+            except (ValueError, np.linalg.LinAlgError):
+                self._loops[member] = None
+        return self._loops[member]
+
+
+def violating_members(
+    radii: MemberRadii, charted: Sequence[FamilyMember], chart: RobustChart
+) -> list[FamilyMember]:
+    """Members found by the search for which a wall of the edge is unstable, the largest spectral radius first.
+
+    charted  the members of the chart, which are not looked for
+    """
+    free, found = radii.family.free, dict[FamilyMember, float]()
+    starts = [(charted[start], wall) for wall, binding in _searched_walls(chart) for start in binding]
+    for member, radius in _worst_members(radii, starts):
+        if radius > 1.0 + EXCEEDS and member not in charted:
+            rounded = radii.family.member(member.operator, np.round([member.shares[k] for k in free], 6))
+            found[rounded] = max(radius, found.get(rounded, 0.0))
+    return sorted(found, key=lambda member: -found[member])
+
+
+def _searched_walls(chart: RobustChart) -> list[tuple[Wall, tuple[int, ...]]]:
+    """Walls of the edge to search from, with the members that bind there: the stiffest, where the binding member
+    changes, and the middles of the longest arcs."""
+    walls: list[tuple[Wall, tuple[int, ...]]] = []
+    if chart.members_at_stiffness_max:
+        walls.append(((chart.stiffness_max, chart.damping_at_stiffness_max), chart.members_at_stiffness_max))
+    arcs = chart.boundary
+    for arc, following in zip(arcs, (*arcs[1:], *arcs[:1]), strict=True):
+        if arc.member != following.member:
+            corner = float(arc.stiffness[-1]), float(arc.damping[-1])
+            walls.append((corner, (arc.member, following.member)))
+    longest = sorted(arcs, key=lambda arc: -len(arc.stiffness))
+    for share in (0.5, 0.25, 0.75):
+        for arc in longest[:4]:
+            k = int(share * (len(arc.stiffness) - 1))
+            K, B = (float((x[k] + x[k + 1]) / 2.0) for x in (arc.stiffness, arc.damping))
+            walls.append(((K, B), (arc.member,)))
+    return walls[:SEARCHED]
+
+
+def _worst_members(
+    radii: MemberRadii, starts: Sequence[tuple[FamilyMember, Wall]]
+) -> list[tuple[FamilyMember, float]]:
+    """The member and the radius that each search comes to, from a member at a wall."""
+    found: dict[int, tuple[FamilyMember, float]] = {}
+    climbing = {n: _climb(radii, *start) for n, start in enumerate(starts)}
+    while climbing:
+        wanted: list[tuple[FamilyMember, Wall]] = []
+        for n, search in list(climbing.items()):
+            try:
+                wanted += [(member, starts[n][1]) for member in next(search)]
+            except StopIteration as end:
+                found[n] = end.value
+                del climbing[n]
+        radii.prepare(wanted)
+    return [found[n] for n in range(len(starts))]
+
+
+def _climb(
+    radii: MemberRadii, start: FamilyMember, wall: Wall
+) -> Generator[list[FamilyMember], None, tuple[FamilyMember, float]]:
+    """Pattern search from a member for the largest spectral radius at a wall: one range at a time, the step halved
+    when no range gives a larger one.
+
+    Yields   members, some of which are tried next
+    Returns  the member found, and its radius
+    """
+    best, step, free = start, FIRST_STEP, radii.family.free
+    yield [start, *_around(start, free, step)]
+    radius = radii.radius(start, wall)
+    while step >= LAST_STEP:
+        gained = False
+        for k in free:
+            for sign in (-1.0, 1.0):
+                neighbour = _neighbour(best, k, sign * step)
+                new_radius = radii.radius(neighbour, wall) if neighbour != best else -1.0
+                if new_radius > radius:
+                    best, radius, gained = neighbour, new_radius, True
+                    yield list(_around(best, free, step))
+        if not gained:
+            step *= 0.5
+    return best, radius
+
+
+def _around(member: FamilyMember, free: Sequence[int], step: float) -> Iterator[FamilyMember]:
+    """The neighbours that a search tries if none of them is worse, at this step and all smaller ones."""
+    while step >= LAST_STEP:
+        for k in free:
+            yield _neighbour(member, k, -step)
+            yield _neighbour(member, k, step)
+        step *= 0.5
+
+
+def _neighbour(member: FamilyMember, k: int, step: float) -> FamilyMember:
+    """The member with another share of range k, at most to the range's end."""
+    share = min(max(member.shares[k] + step, 0.0), 1.0)
+    return FamilyMember(member.operator, (*member.shares[:k], share, *member.shares[k + 1 :]))

@@ -6,38 +6,40 @@ K_max need not grow or fall with a number all the way: a stiffer drive may help 
 outwards to both sides on a grid, to where there is no such device; the charts of all numbers together.
 The crossing of the goal next to the device's own value is refined. Every value that is returned has been charted
 exactly; a sensitivity, the slope at the device's own value, would only tell where to look.
+
+What each number of a device would have to be for a wanted largest stiffness: the result.
+
+The largest stiffness of a device with one number changed, by its exact chart: for many values at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf, isfinite, isnan, log, nan
-from typing import Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
+from zwidth.chart.chart_batch import STIFFEST, chart_numbers
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_memory import DOUBTFUL
+from zwidth.device import address
+from zwidth.device.design_batch import takes_arrays
 from zwidth.device.device import Device
-from zwidth.device.faults import KeyPath, fail
-from zwidth.device.load import device_of_point
-from zwidth.device.number_range import number_limits, typical_size
+from zwidth.device.faults import DeviceError, KeyPath, dotted, fail
+from zwidth.device.load import device_of_point, from_document
+from zwidth.device.numbers import number_limits, typical_size
 from zwidth.device.schema.device_file import key_unit
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
-from zwidth.study.sensitivity.changed_stiffness import ChangedStiffness
-from zwidth.study.sensitivity.goal_result import (
-    NO_INFLUENCE,
-    ORDER,
-    OUT_OF_RANGE,
-    REACHED,
-    Goal,
-    GoalNumber,
-    Status,
-)
-from zwidth.study.sensitivity.number_text import number_obstacle
+from zwidth.result import Result
+from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping, build_at_point
+from zwidth.study.sensitivity.result import number_obstacle
 from zwidth.study.sensitivity.sensitivities import moved_places, property_numbers
 
 WIDEST: Final = 10.0  # factor up and down within which a number is searched
@@ -255,3 +257,170 @@ def _number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
     factor = value / one.own if one.own else nan
     stiffness = goal * float(np.exp(one.samples[best]))
     return GoalNumber(one.path, one.own, key_unit(one.steps), value, factor, stiffness, status, reason)
+
+
+Status = Literal["reached", "out of range", "no influence"]
+REACHED: Final = "reached"
+OUT_OF_RANGE: Final = "out of range"
+NO_INFLUENCE: Final = "no influence"
+ORDER: Final = (REACHED, OUT_OF_RANGE, NO_INFLUENCE)
+COLUMNS: Final = ("path", "value_now", "unit", "value", "factor", "stiffness_max_N_per_m", "status", "reason")
+
+
+@dataclass(frozen=True)
+class GoalNumber:
+    """What one number would have to be.
+
+    path           of the number in the device file; an element of a symmetric matrix moves with its mirror image
+    now            its value in the device
+    unit           as the schema names it; "" if it has none
+    value          the value nearest to that with which the goal is reached; where it is out of range the one that
+                   comes nearest to the goal; nan where the number has no influence, or cannot be varied
+    factor         value over now; nan where that is 0, or where there is no value
+    stiffness_max  largest stiffness with this value [N/m]
+    status         "reached", "out of range" or "no influence"
+    reason         what keeps the goal from being reached; "" where it is
+    """
+
+    path: str
+    now: float
+    unit: str
+    value: float
+    factor: float
+    stiffness_max: float
+    status: Status
+    reason: str = ""
+
+    @property
+    def distance(self) -> float:
+        """|ln factor|; inf where there is none."""
+        return abs(log(self.factor)) if isfinite(self.factor) and self.factor > 0.0 else float("inf")
+
+
+@dataclass(frozen=True, repr=False)
+class Goal(Result):
+    """What each number of a device would have to be, the others as they are, for a wanted largest stiffness.
+
+    goal           the wanted largest stiffness [N/m]
+    stiffness_max  that of the device as it is [N/m]; 0 where no wall with K > 0 and B >= 0 is stable
+    numbers        those that reach it first, the smallest change before the others
+    """
+
+    goal: float
+    stiffness_max: float
+    numbers: tuple[GoalNumber, ...]
+
+    @property
+    def reached(self) -> tuple[GoalNumber, ...]:
+        """The numbers with which alone the goal can be reached."""
+        return tuple(one for one in self.numbers if one.status == REACHED)
+
+    def entries(self) -> list[dict[str, Any]]:
+        """Each number as a document."""
+        return [
+            {
+                "path": one.path,
+                "value_now": one.now,
+                "unit": one.unit or None,
+                "value": one.value,
+                "factor": one.factor,
+                "stiffness_max_N_per_m": one.stiffness_max,
+                "status": one.status,
+                "reason": one.reason or None,
+            }
+            for one in self.numbers
+        ]
+
+    def document(self) -> dict[str, Any]:
+        """The numbers by key and unit, with the goal and the largest stiffness as it is."""
+        return {
+            "goal_N_per_m": self.goal,
+            "stiffness_max_N_per_m": self.stiffness_max,
+            "goal": self.entries(),
+        }
+
+    def table(self) -> dict[str, list[Any]]:
+        """One number a row."""
+        rows = self.entries()
+        return {column: [row[column] for row in rows] for column in COLUMNS}
+
+    def __repr__(self) -> str:
+        first = ", ".join(f"{one.path} = {one.value:.4g}" for one in self.reached[:3])
+        heading = f"Goal: a largest stiffness of {self.goal:.6g} N/m, now {self.stiffness_max:.6g} N/m"
+        return f"{heading}\n  {first or 'no number reaches it alone'}"
+
+
+Change = tuple[str, float]  # a number by its path, and the value that it gets
+
+
+class ChangedStiffness:
+    """Largest stiffnesses of a device at an operating point, with one number or another changed.
+
+    places    the steps of each number that may be changed, by its path, and of those that move with it
+    refusals  path -> why the device cannot be built, or not charted, with the value that was tried last
+    """
+
+    def __init__(self, device: Device, point: OperatingPoint, places: Mapping[str, tuple[KeyPath, ...]]) -> None:
+        self.device, self.point, self.places = device, point, places
+        self.refusals: dict[str, str] = {}
+        document = {key: part for key, part in device.document.items() if key != "sources"}
+        self._grouping = DesignGrouping(document, device.label, {})
+
+    def stiffnesses(self, changes: Sequence[Change]) -> Floats:
+        """Largest stiffness [N/m] with each change alone; 0 where no wall with K > 0, B >= 0 is stable, nan where
+        there is no such device, or no chart of it. Of those that cannot be built together with others a number's
+        are built in the order given, to either side of its own value up to the first that is none: to learn that
+        a place is out of reach takes longest of all.
+        """
+        K = np.full(len(changes), np.nan)
+        charted = np.zeros(len(changes), dtype=bool)
+        together = [n for n, (path, _) in enumerate(changes) if all(map(takes_arrays, self.places[path]))]
+        for built in build_at_point(self._groups([changes[n] for n in together]), self.point):
+            if built.table is None:
+                continue
+            numbers = chart_numbers(built.table, STIFFEST)
+            certain = numbers.status != DOUBTFUL
+            rows = np.array(together, dtype=np.int64)[built.rows[certain]]
+            K[rows] = np.nan_to_num(numbers.stiffness[certain])
+            charted[rows] = True
+        ended = set[tuple[str, bool]]()  # numbers, and to which side of the device's own value there is none left
+        for n in np.flatnonzero(~charted).tolist():
+            path, value = changes[n]
+            side = path, value > self._own(path)
+            if side not in ended:
+                K[n] = self._alone(path, value)
+                ended |= {side} if np.isnan(K[n]) else set()
+        return K
+
+    def _alone(self, path: str, value: float) -> float:
+        document = self.device.document
+        settings = [(dotted(steps, document), value) for steps in self.places[path]]
+        try:
+            changed = from_document(address.assign_all(document, settings), skip_assembly_check=True)
+            peak = largest_stiffness(changed.at_point(self.point).loop)
+        except DeviceError as error:
+            self.refusals[path] = error.faults[0].message
+        except (ValueError, ChartError, np.linalg.LinAlgError) as error:
+            self.refusals[path] = str(error)
+        else:
+            return 0.0 if peak is None else peak.stiffness
+        return np.nan
+
+    def _groups(self, changes: Sequence[Change]) -> Iterator[DesignGroup]:
+        return self._grouping.groups(list(self._columns(changes))) if changes else iter(())
+
+    def _columns(self, changes: Sequence[Change]) -> Iterator[DesignColumn]:
+        """Each number that is changed somewhere: as in the device but in the rows of its own changes."""
+        document = self.device.document
+        for path in dict.fromkeys(path for path, _ in changes):
+            rows = [n for n, (other, _) in enumerate(changes) if other == path]
+            at = np.zeros(len(changes), dtype=np.int64)
+            at[rows] = np.arange(1, len(rows) + 1)
+            own = self._own(path)
+            for steps in self.places[path]:
+                yield DesignColumn(dotted(steps, document), [own, *(changes[n][1] for n in rows)], at)
+
+    def _own(self, path: str) -> float:
+        """The number's value in the device; 0 where the file leaves it out."""
+        document = self.device.document
+        return float(address.get(document, path)) if address.exists(document, path) else 0.0

@@ -21,6 +21,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
+from zwidth.chart.area import Peak
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.curve import wall_at
 from zwidth.chart.loop_polynomials import (
@@ -29,7 +30,6 @@ from zwidth.chart.loop_polynomials import (
     most_degree,
     polynomial_memory,
 )
-from zwidth.chart.peak import Peak
 from zwidth.chart.real_root_lines import end_of_curve
 from zwidth.chart.tracer import Tracer, tracer_of
 from zwidth.compiled import compiled, compiled_lean

@@ -1,12 +1,17 @@
-"""Results of a sensitivity analysis: of each number, of numbers scaled together, and the stiffest wall."""
+"""Results of a sensitivity analysis: of each number, of numbers scaled together, and the stiffest wall.
+
+Numbers of a device file as what a sensitivity is by: which have a derivative.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan
+from math import isfinite, nan
 from typing import Any, Final
 
-from zwidth.chart.peak import Peak
+from zwidth.chart.area import Peak
+from zwidth.device.faults import KeyPath
+from zwidth.device.schema import device_file as schema
 from zwidth.result import Result
 from zwidth.study.sensitivity.optimum import Kind
 
@@ -145,3 +150,11 @@ class Sensitivities(Result):
     def tie(self) -> bool:
         """Whether two walls are stiffest at once; each derivative then holds for `peak` alone."""
         return self.peak is not None and bool(self.second_peak >= (1.0 - TIE) * self.peak.stiffness)
+
+
+def number_obstacle(steps: KeyPath, value: float) -> str:
+    """Why a number has no derivative whatever the device; "" if it may have one."""
+    if not isfinite(value):
+        return "it is infinite, and one per cent of it is no change"
+    whole = any(subschema.get("type") == "integer" for subschema in schema.subschemas(steps))
+    return "it is a whole number, which has no derivative" if whole else ""

@@ -3,17 +3,29 @@
 At one damping each device has intervals of stable stiffness. Sorted together, their ends say at which stiffness
 how many devices are stable, and so where at least k of them are: exact over the drawn devices, at each damping.
 Between two dampings the band is drawn straight.
+
+Where the stable walls of each drawn device begin and end, on lines of equal damping, as a job.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.loop_edge import trace_edge
+from zwidth.chart.point_chart import chart_at
+from zwidth.chart.tracer import Tracer
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import FAILED, OK, UNDECIDED, Note
+from zwidth.study.designs.sweep_job import SweepJob
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.tolerances.intervals import Interval
 
 Pieces = tuple[tuple[float, float], ...]
@@ -154,3 +166,157 @@ def refined_dampings(coverage: Coverage, counts: Sequence[int], pieces: int) -> 
     inside = [step for step in sorted(steps) if 0 <= step < len(B) - 1]
     shares = np.arange(1, pieces) / pieces
     return np.concatenate([B[step] + shares * (B[step + 1] - B[step]) for step in inside] or [np.empty(0)])
+
+
+MOST_KNOWN: Final = 4096  # devices whose outlines are kept in memory; each takes some 20 kB
+MOST_INTERVALS: Final = 4  # of stable stiffness on one line of one device; of more, the longest are kept
+
+
+def stable_intervals(outlines: Sequence[Floats], dampings: Floats) -> Floats:
+    """Intervals of stable stiffness K >= 0 on lines of equal damping, from the outline of a stable set.
+
+    A line crosses the outline an even number of times; between the first and second crossing, the third and
+    fourth, ... its walls are stable. Chords of an outline lie within 1e-6 of its extent (`arc_kernels.CHORD`).
+
+    outlines  closed walks (k, 2) of walls [K, B]
+    dampings  (d,) ascending [N s/m]
+    Returns   (d, MOST_INTERVALS, 2) ends of each interval [N/m], nan where there are fewer; of more than
+              MOST_INTERVALS the longest, which leaves out walls that are stable and adds none
+
+    >>> square = np.array([[0.0, -1.0], [2.0, -1.0], [2.0, 1.0], [0.0, 1.0], [0.0, -1.0]])
+    >>> stable_intervals([square], np.array([0.0, 3.0]))[:, 0].tolist()
+    [[0.0, 2.0], [nan, nan]]
+    """
+    out = np.full((len(dampings), MOST_INTERVALS, 2), np.nan)
+    if not outlines:
+        return out
+    first = np.concatenate([walk[:-1] for walk in outlines])
+    last = np.concatenate([walk[1:] for walk in outlines])
+    low, high = np.minimum(first[:, 1], last[:, 1]), np.maximum(first[:, 1], last[:, 1])
+    # a chord crosses the lines low <= B < high: a corner on a line counts once
+    begin, end = np.searchsorted(dampings, low, "left"), np.searchsorted(dampings, high, "left")
+    counts = end - begin
+    chord = np.repeat(np.arange(len(counts)), counts)
+    line = np.repeat(begin - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts) + np.arange(len(chord))
+    along = (dampings[line] - first[chord, 1]) / (last[chord, 1] - first[chord, 1])
+    K = first[chord, 0] + along * (last[chord, 0] - first[chord, 0])
+    order = np.lexsort((K, line))
+    K, line = K[order], line[order]
+    ends, of = K.reshape(-1, 2), line[::2]  # each line has an even number of them
+    positive = ends[:, 1] > 0.0
+    ends, of = np.maximum(ends[positive], 0.0), of[positive]
+    starts = np.searchsorted(of, np.arange(len(dampings) + 1))
+    for d in np.flatnonzero(np.diff(starts) > MOST_INTERVALS):
+        own = np.arange(starts[d], starts[d + 1])
+        shorter = np.argsort(ends[own, 0] - ends[own, 1], kind="stable")[MOST_INTERVALS:]
+        of[own[shorter]] = -1
+    ends, of = ends[of >= 0], of[of >= 0]
+    out[of, np.arange(len(of)) - np.searchsorted(of, of)] = ends
+    return out
+
+
+class Outlines(NamedTuple):
+    """The outlines of a device's stable set.
+
+    walks   closed walks (k, 2) of walls [K, B]; None where it has no chart
+    status  OK, or why it has none
+    reason  in words
+    """
+
+    walks: Sequence[Floats] | None
+    status: int = OK
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class EdgeJob:
+    """The devices of a sweep as cells, each with its intervals of stable stiffness on lines of equal damping.
+
+    sweep     the devices; its measures are not computed
+    dampings  (d,) ascending [N s/m]
+    known     device's number -> its outlines, of the first MOST_KNOWN devices that this process has charted; jobs
+              of other dampings may share it
+    """
+
+    sweep: SweepJob
+    dampings: Floats
+    known: dict[int, Outlines] = field(default_factory=dict, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "known": {}}
+
+    @property
+    def count(self) -> int:
+        """Number of devices."""
+        return self.sweep.count
+
+    @cached_property
+    def measures(self) -> tuple[str, ...]:
+        """Ends of the intervals, line after line."""
+        return tuple(
+            f"{end}_{n}_at_{d}"
+            for d in range(len(self.dampings))
+            for n in range(MOST_INTERVALS)
+            for end in ("low", "high")
+        )
+
+    @property
+    def question(self) -> str:
+        """Fingerprint that stored results are recognised by."""
+        return fingerprint("edges", self.sweep.question, self.dampings)
+
+    def compute(self, first: int, last: int) -> CellValues:
+        """Devices first to last - 1. Ends that there are not are 0, 0; a device without an edge has a status."""
+        values = np.zeros((last - first, len(self.measures)))
+        status = np.full(values.shape, OK, dtype=np.uint8)
+        notes: list[Note] = []
+        for number, (found, kind, reason) in self.outlines(first, last):
+            row = number - first
+            if found is None:
+                values[row], status[row] = np.nan, kind
+                notes.append(Note(kind, reason, 1, (number,)))
+            else:
+                values[row] = np.nan_to_num(stable_intervals(found, self.dampings), nan=0.0).ravel()
+        return CellValues(values, status, (tuple(notes), *[()] * (len(self.measures) - 1)))
+
+    def outlines(self, first: int, last: int) -> Iterator[tuple[int, Outlines]]:
+        """Number and outlines of each of the devices first to last - 1."""
+        numbers = range(first, last)
+        if all(number in self.known for number in numbers):
+            yield from ((number, self.known[number]) for number in numbers)
+            return
+        together = np.zeros(last - first, dtype=bool)
+        for rows, points in self.sweep.points_together(first, last):
+            together[rows] = True
+            for place, row in enumerate(rows.tolist()):
+                yield first + row, self._remembered(first + row, _outlines(points[place]))
+        for row in np.flatnonzero(~together).tolist():
+            point = self.sweep.point_alone(first + row)
+            found = _outlines(point) if isinstance(point, OperatingPoint) else Outlines(None, *point)
+            yield first + row, self._remembered(first + row, found)
+
+    def _remembered(self, number: int, found: Outlines) -> Outlines:
+        if len(self.known) < MOST_KNOWN:
+            self.known[number] = found
+        return found
+
+
+def _outlines(point: OperatingPoint) -> Outlines:
+    """The outlines of a device's stable set."""
+    try:
+        if point.charted_by_response:
+            return Outlines(chart_at(point, decay=False).regions)
+        return Outlines(trace_edge(Tracer(point.loop)).outlines)
+    except ChartError as error:
+        return Outlines(None, UNDECIDED, str(error))
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return Outlines(None, FAILED, str(error))
+
+
+def highest_damping(job: EdgeJob, count: int) -> float:
+    """Largest damping of a stable wall with K >= 0 of the first `count` devices [N s/m]; 0 if there is none."""
+    largest = 0.0
+    for _, found in job.outlines(0, min(count, job.count)):
+        for walk in found.walks or ():
+            largest = max(largest, float(walk[walk[:, 0] >= 0.0, 1].max(initial=0.0)))
+    return largest

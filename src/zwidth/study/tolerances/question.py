@@ -1,4 +1,9 @@
-"""`ToleranceQuestion`: a device, its tolerances, and what is asked of the devices that are produced."""
+"""`ToleranceQuestion`: a device, its tolerances, and what is asked of the devices that are produced.
+
+Is the wanted wall stable? As a measure of many devices at once: 1 where it is, 0 where it is not.
+
+From the arguments of `tolerance` to a `ToleranceQuestion`: the same checks as of a study file.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +12,29 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+import numpy as np
+
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.point_chart import check_at
+from zwidth.chart.table_radii import radii_at_points
+from zwidth.chart.verdict import NEAR, STABLE, UNDECIDED
+from zwidth.device.address import is_number, table
 from zwidth.device.device import Device
-from zwidth.device.toml_access import is_number, table
+from zwidth.device.faults import DeviceError, Fault, KeyPath
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.measures.definition import Measure, MeasureValues, WantedWall, WantedWalls, as_argument
+from zwidth.measures.evaluation import complete_pointwise
+from zwidth.measures.preconditions import walls_of
 from zwidth.memory_limit import check_memory
+from zwidth.model.argument_checks import require, wrong_type
 from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
-from zwidth.study.designs.study import Study
-from zwidth.study.designs.study_file import read_document, study_of
+from zwidth.study.designs.study import Study, check_study
+from zwidth.study.designs.study_file import measures_of, plain_value, read_document, study_of
+from zwidth.study.tolerances.distribution import Tolerance
 from zwidth.study.tolerances.intervals import draws_needed
-from zwidth.study.tolerances.tolerance import Tolerance
 from zwidth.study.tolerances.tolerance_tables import tolerances_of
-from zwidth.study.tolerances.wall_verdict import WALL_IS_STABLE
 
 SAMPLES: Final = 1000
 INDEX_SAMPLES: Final = 512
@@ -184,3 +200,124 @@ def check_size(question: ToleranceQuestion) -> None:
         f"{devices:.0f} devices, {question.samples} drawn and the others for indices and narrower tolerances,",
         "lower samples or index_samples",
     )
+
+
+def wall_is_stable(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> MeasureValues:
+    """1 where the wanted wall is stable, 0 where it is unstable; undecided within rounding, as `zwidth check`.
+
+    Far from the unit circle the spectral radius decides, of all points together; near it each point is judged
+    alone, with the rounding error of its own eigenvalue.
+    """
+    K, B = walls_of(wanted, point.shape)
+    # a single point has the digits that `Loop.check` has
+    radii = radii_at_points(point, K, B) if point.shape else np.full((), np.nan)
+    known = np.where(radii < 1.0 - NEAR, 1.0, np.where(radii > 1.0 + NEAR, 0.0, np.nan))
+
+    def alone(at: tuple[int, ...]) -> float:
+        verdict = int(check_at(point[at], [K[at]], [B[at]]).verdict[0])
+        if verdict == UNDECIDED:
+            raise ChartError("the wall lies on the stability limit, as far as rounding tells")
+        return float(verdict == STABLE)
+
+    return complete_pointwise(known, alone, point)
+
+
+WALL_IS_STABLE: Final = Column(
+    "wall_is_stable",
+    Measure(
+        name="wall_is_stable",
+        title="Whether the wanted wall is stable",
+        unit="",
+        better="higher",
+        source="eigenvalues",
+        function=f"{__name__}:wall_is_stable",
+        of_wall=True,
+        of_designs=True,
+    ),
+)
+
+
+LABEL: Final = "tolerance"
+ARGUMENTS: Final = {
+    "at": "position",
+    "stiffness_N_per_m": "stiffness",
+    "damping_Ns_per_m": "damping",
+    "frequency_Hz": "frequency",
+    "tolerance": "tolerances",
+}
+
+
+def question_over(
+    device: Device,
+    tolerances: Mapping[str, Mapping[str, Any]],
+    measures: str | Measure | Sequence[str | Measure],
+    user_measures: Mapping[str, Measure] | None,
+    circumstances: Mapping[str, Any],
+    draw: Mapping[str, Any],
+) -> ToleranceQuestion:
+    """The question of the arguments of `tolerance`.
+
+    circumstances, draw  values by key of a study file and of its [draw]; None where they are not given
+    Raises  DeviceError  with all faults found
+            TooLarge     where the devices would not fit into memory
+            TypeError    for arguments of another kind
+    """
+    require("device", device, Device)
+    names, by_name = measures_of(measures, user_measures)
+    angles = circumstances.get("at") if isinstance(circumstances.get("at"), Mapping) else None
+    given = {
+        key: plain_value(value)
+        for key, value in circumstances.items()
+        if value is not None and value is not angles
+    }
+    drawn = {key: plain_value(value) for key, value in draw.items() if value is not None}
+    document: dict[str, Any] = {
+        "device": device.label,
+        **({"measures": names} if names else {}),
+        "tolerance": _tables(tolerances),
+        **given,
+        **({"draw": drawn} if drawn else {}),
+    }
+    faults: TableFaults = []
+    study = check_study(document, LABEL, device, {}, by_name, faults, spelling=as_argument, needs=("tolerance",))
+    found = tolerances_of(document, device, faults)
+    faults += wall_faults(document, ARGUMENTS) + draw_faults(drawn)
+    if angles is not None:
+        try:
+            device.position(angles)
+        except DeviceError as error:
+            faults.append((("at",), error.faults[0].message))
+    if faults or study is None:
+        raise DeviceError([_fault(path, message, list(tolerances)) for path, message in faults])
+    return question_with(study if angles is None else replace(study, at=angles), found, drawn)
+
+
+def _tables(tolerances: Any) -> list[dict[str, Any]]:
+    """The [[tolerance]] tables of the argument. Raises TypeError, ValueError."""
+    if not isinstance(tolerances, Mapping):
+        raise wrong_type("tolerances", "a dictionary of paths and distributions", tolerances)
+    if not tolerances:
+        raise ValueError(
+            "tolerances has no path; write such as {'loop.delay_samples': {'distribution': 'uniform', 'low': 0.3, "
+            "'high': 0.6}}"
+        )
+    for key, given in tolerances.items():
+        if not isinstance(key, str):
+            raise wrong_type("tolerances", "a dictionary whose keys are paths", key)
+        if not isinstance(given, Mapping):
+            raise wrong_type(f"tolerances[{key!r}]", "a dictionary such as {'distribution': 'normal', ...}", given)
+    return [
+        {"key": key, **{name: plain_value(value) for name, value in table.items()}}
+        for key, table in tolerances.items()
+    ]
+
+
+def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
+    """A fault of the document, under the name of the argument that it came from."""
+    first, *rest = path
+    if first == "draw" and rest:
+        first, *rest = rest
+    if first == "tolerance" and rest and isinstance(rest[0], int):
+        rest = [keys[rest[0]], *rest[1:]] if rest[1:] != ["key"] else []  # the message names the key
+    argument = ARGUMENTS.get(str(first), str(first))
+    return Fault(argument, ".".join(map(str, rest)), message)

@@ -1,17 +1,27 @@
-"""From the [[tolerance]] tables of a study file to tolerances, or to what is wrong with them."""
+"""From the [[tolerance]] tables of a study file to tolerances, or to what is wrong with them.
+
+Messages about distributions that reach beyond what a device can have, with what to write instead.
+
+How far a number of the device file can go before the device can no longer be built.
+
+The device format says of some numbers alone how large they may be; others must agree with what stands beside
+them: a mass matrix is positive definite, a filter cuts off below half the sampling frequency. So devices are built
+with the least and the largest value that is drawn, before any is computed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from math import inf, isfinite, log
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, floor, inf, isfinite, log, log10
 from typing import Any, Final
 
 from zwidth.device import address
+from zwidth.device.address import is_number, tables
 from zwidth.device.device import Device
-from zwidth.device.faults import KeyPath, dotted, nearest, quote
+from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, nearest, quote
+from zwidth.device.load import from_document
 from zwidth.device.schema import device_file as schema
-from zwidth.device.toml_access import is_number, tables
 from zwidth.study.designs.axis_tables import (
     SetNumbers,
     TableFault,
@@ -22,19 +32,17 @@ from zwidth.study.designs.axis_tables import (
     ties_of,
     unit_of,
 )
-from zwidth.study.designs.sampling import CIRCUMSTANCES, Tie
-from zwidth.study.tolerances.beyond import beyond_faults
-from zwidth.study.tolerances.buildable import FaultsOf, faults_with, obstacle
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Tie
 from zwidth.study.tolerances.distribution import (
     CUT,
     SPAN_OF_95,
     Distribution,
     Limits,
+    Tolerance,
     lognormal,
     normal,
     spread_of_variation,
 )
-from zwidth.study.tolerances.tolerance import Tolerance
 
 # Ways of giving the width, by the kind of distribution.
 WIDTHS: Final[dict[str, tuple[tuple[str, ...], ...]]] = {
@@ -286,3 +294,151 @@ def _limit(
         if key in kind:
             return float(kind[key]), 0
     return none, 0
+
+
+DIGITS: Final = 4  # of a number that a message advises
+OTHERWISE: Final = "give low and high that it may have"
+
+
+def beyond_faults(
+    key: str, path: str, value: float | None, width_key: str, law: Distribution, faults_at: FaultsOf
+) -> TableFaults:
+    """Faults of a distribution at whose ends, or at one of them, no device can be built.
+
+    path       of its number in full
+    value      of the number in the device file; None: it has none
+    width_key  the first of the keys of its table that give the width
+    """
+    by_ends = width_key == "low" and not law.spread
+    # what is advised about low has nothing to do with high, nor with the middle between them
+    inside = [value] if value is not None and law.low <= value <= law.high else []
+    starts = [law.middle, *inside, law.low, law.high] if by_ends else [law.middle]
+    start = next((one for one in starts if not faults_at(one)), None)
+    leads = f"leads to values of '{key}' from {law.low:.6g} to {law.high:.6g}"
+    if start is None:
+        fault = faults_at(law.middle)[0]
+        by_low = "move low and high to values that it may have"
+        advice = by_low if width_key == "low" else "correct what is tied to it"
+        return [((width_key,), f"{leads}; with {law.middle:.6g}, {_in_words(fault, path)}; {advice}")]
+    found = [one for end in (law.low, law.high) if (one := obstacle(faults_at, start, end)) is not None]
+    if not by_ends:
+        advice = _narrower(law, width_key, [one.last for one in found], faults_at) if found else ""
+        return [((width_key,), f"{leads}; {_at_end(one, path)}; {advice}") for one in found[:1]]
+    faults: TableFaults = []
+    for one in found:
+        rising = one.end == law.low
+        limit = _rounded(one.last, lambda end: not faults_at(end), up=rising)
+        advice = f"give {'low' if rising else 'high'} = {limit} or {'more' if rising else 'less'}"
+        faults.append((("low" if rising else "high",), f"{leads}; {_at_end(one, path)}; {advice}"))
+    return faults
+
+
+def _at_end(one: Obstacle, path: str) -> str:
+    words = _in_words(one.faults[0], path)
+    return words if one.is_of(path) else f"with {one.end:.6g}, {words}"
+
+
+def _in_words(fault: Fault, path: str) -> str:
+    """A fault without the advice that it gives about a single device."""
+    first = fault.message.split("; ")[0]
+    if first.count("(") > first.count(")"):
+        first = first[: first.rindex(" (")]
+    return f"{'it' if fault.key == path else fault.key} {first}"
+
+
+def _narrower(law: Distribution, width_key: str, ends: Sequence[float], faults_at: FaultsOf) -> str:
+    """What to write for a distribution that stays between `ends`, the farthest values that a device can have."""
+    middle = law.middle
+    if law.kind == "lognormal":
+        shown, reach = "cut_at_deviations", min(abs(log(end / middle)) for end in ends) / law.spread
+    elif law.spread:
+        shown, reach = "cut_at_deviations", min(abs(end - middle) for end in ends) / law.spread
+    else:
+        shown, reach = width_key, min(abs(end - middle) for end in ends)
+        reach *= 100.0 / abs(middle) if shown.endswith("_percent") else 1.0
+
+    def ends_at(width: float) -> tuple[float, float]:
+        if law.kind == "lognormal":
+            return middle * exp(-width * law.spread), middle * exp(width * law.spread)
+        way = abs(middle) * width / 100.0 if shown.endswith("_percent") else width * (law.spread or 1.0)
+        return middle - way, middle + way
+
+    if not reach > 0.0:
+        return OTHERWISE
+    fitting = _rounded(
+        reach, lambda width: not any(faults_at(min(max(end, law.low), law.high)) for end in ends_at(width))
+    )
+    return f"give {shown} = {fitting} or less"
+
+
+def _rounded(value: float, fits: Callable[[float], bool], *, up: bool = False) -> str:
+    """A number with few digits next to a value that fits: the nearest one if it fits, else one that lies below, or
+    above it.
+
+    >>> _rounded(0.0123456, lambda x: x <= 0.0123456), _rounded(25.0, lambda x: x < 25.0)
+    ('0.01234', '24.99')
+    """
+    if value == 0.0:
+        return "0"
+    step = 10.0 ** (floor(log10(abs(value))) + 1 - DIGITS)
+    nearest = round(value / step)
+    texts = [f"{(nearest + (n if up else -n)) * step:.{DIGITS}g}" for n in range(3)]
+    return next((text for text in texts if fits(float(text))), texts[-1])
+
+
+HALVINGS: Final = 64  # of the way from a value that a device can have to one that it cannot
+
+FaultsOf = Callable[[float], Sequence[Fault]]  # of the device with a value of the number
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Why no device can be built with an end of a distribution.
+
+    end     the value that no device can have
+    last    the value farthest towards it that one can have
+    faults  of the device with the end
+    """
+
+    end: float
+    last: float
+    faults: tuple[Fault, ...]
+
+    def is_of(self, path: str) -> bool:
+        """Whether it is the number at this path alone that may not have the value, whatever the others are."""
+        return all(fault.key == path for fault in self.faults)
+
+
+def faults_with(document: Mapping[str, Any], key: str, ties: tuple[Tie, ...]) -> FaultsOf:
+    """The faults that a device has with a value of one number, and of those tied to it, all others as they are."""
+    axis = Axis(key, (), ties=ties)
+
+    def faults(value: float) -> Sequence[Fault]:
+        changes = [(path, values[0]) for path, values in axis.columns([value])]
+        try:
+            # whether the mechanism reaches the handle's position is an outcome of each device
+            from_document(address.assign_all(dict(document), changes), skip_assembly_check=True)
+        except DeviceError as error:
+            return error.faults
+        return ()
+
+    return faults
+
+
+def obstacle(faults: FaultsOf, start: float, end: float) -> Obstacle | None:
+    """What is in the way from a value that a device can have to an end of a distribution; None where nothing is.
+
+    Halves the way between a value that a device can have and one that it cannot. Where 0 lies between the two it
+    is tried first: halving comes near to 0 without end.
+    """
+    at_end = tuple(faults(end))
+    if not at_end:
+        return None
+    good, bad = start, end
+    wanted = 0.0 if min(start, end) < 0.0 < max(start, end) else 0.5 * (good + bad)
+    for _ in range(HALVINGS):
+        if wanted in (good, bad):
+            break
+        good, bad = (good, wanted) if faults(wanted) else (wanted, bad)
+        wanted = 0.5 * (good + bad)
+    return Obstacle(end, good, at_end)

@@ -17,9 +17,8 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.result import Result
-from zwidth.study.designs.requirement import Requirement
-from zwidth.study.workspace.map import measures_of, reachable
-from zwidth.study.workspace.reach_outline import continued, reach_outline
+from zwidth.study.designs.column import Requirement
+from zwidth.study.workspace.map import continued, measures_of, reach_outline, reachable
 
 if TYPE_CHECKING:
     import xarray as xr

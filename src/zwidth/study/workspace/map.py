@@ -1,4 +1,13 @@
-"""Maps: measures all over a plane of the workspace."""
+"""Maps: measures all over a plane of the workspace.
+
+The exact edge of the reachable set on a map's plane, where the links' lengths alone decide it.
+
+Every chain of links from the base to the handle allows a shell about its base (`model.reach_shells`). For many
+mechanisms whose joints all turn freely, the handle reaches every point that lies in all shells. That is checked
+against every cell of the map; where it holds, the edge consists of exact arcs of circles.
+
+A map's results as a document, and as a table.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +25,29 @@ from zwidth.device.device import Device
 from zwidth.loop.linear_omissions import load_omissions
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
-from zwidth.measures.definition import NO_POSTURE, STATUS, UNREACHED, Measure, MeasureError, Note, WantedWall
-from zwidth.measures.evaluate import evaluate
-from zwidth.measures.wanted import WANTED_NUMBERS
+from zwidth.measures.definition import (
+    BEYOND_LIMIT,
+    NO_EQUILIBRIUM,
+    NO_POSTURE,
+    OK,
+    OUT_OF_REACH,
+    SINGULAR,
+    STATUS,
+    UNREACHED,
+    WANTED_NUMBERS,
+    Measure,
+    MeasureError,
+    Note,
+    WantedWall,
+)
+from zwidth.measures.evaluation import evaluate
 from zwidth.model.argument_checks import require
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.posture_batch import shells
 from zwidth.processors import Processor
 from zwidth.progress import Progress
-from zwidth.study.designs.column import measure_list, unit_attributes
+from zwidth.study.designs.column import measure_list, over_the_workspace, positions, unit_attributes
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.executor_interface import Executor
 from zwidth.study.jobs.job import Cells, CellValues
@@ -30,10 +55,12 @@ from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.extreme_direction import EXTREMES, extreme_over_directions, extreme_sign
 from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of, reachable_set
-from zwidth.study.workspace.reach_outline import KEY, shells_attribute
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from zwidth.study.workspace.common_area import CommonArea
+
 
 Direction = Sequence[float] | str | None
 COMPONENTS: Final = ("x", "y", "z")
@@ -351,3 +378,176 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         **{key: value for key, value in wanted.items() if value is not None},
         "zwidth": __version__,
     }
+
+
+KEY: Final = "reach_shells_m"  # attribute of a map: centre x, y, z, least and most distance of each shell
+QUARTER: Final = 256  # chords of a quarter of a circle; its area is too small by a share of 6e-6
+NEAR: Final = 1e-6  # share of a shell's size within which a cell may be judged either way
+LAYERS: Final = 2  # cells beyond the last with a value to which values are continued
+
+
+def shells_attribute(mechanism: Mechanism) -> list[float]:
+    """The shells of a mechanism's chains as a list of numbers, five for each shell."""
+    return [
+        float(value) for shell in shells(pack(mechanism), 0) for value in (*shell.centre, shell.least, shell.most)
+    ]
+
+
+def reach_outline(dataset: xr.Dataset, name: str) -> Any:
+    """The reachable set within a map's grid, as a shapely geometry in the plane's coordinates.
+
+    dataset  a map (`study.workspace.map`);   name  one of its measures
+    Returns  None where the shells do not decide reach, or the map does not hold them
+    """
+    import shapely
+
+    table = np.reshape(np.asarray(dataset.attrs.get(KEY, ()), dtype=np.float64), (-1, 5))
+    if not len(table) or not _decided_by(table, dataset, name):
+        return None
+    axes = np.asarray(dataset.attrs["plane_axes"], dtype=np.float64).reshape(2, 3)
+    through = np.asarray(dataset.attrs["plane_through_m"], dtype=np.float64)
+    x, y = dataset["x_m"].values, dataset["y_m"].values
+    outline: Any = shapely.box(x[0], y[0], x[-1], y[-1])
+    for *centre, least, most in table:
+        offset = np.array(centre) - through
+        middle, height = shapely.Point(axes @ offset), abs(float(np.cross(*axes) @ offset))
+        if height >= most:
+            return shapely.Polygon()
+        outline &= middle.buffer(np.sqrt(most**2 - height**2), quad_segs=QUARTER)
+        if least > height:
+            outline -= middle.buffer(np.sqrt(least**2 - height**2), quad_segs=QUARTER)
+    return outline
+
+
+def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
+    """Whether the reached cells are exactly those that lie in all shells."""
+    at, status = positions(dataset), dataset[f"{name}_status"].values
+    inside = np.ones(status.shape, dtype=np.bool_)
+    unsure = status == SINGULAR
+    for *centre, least, most in table:
+        distance = np.linalg.norm(at - np.array(centre), axis=-1)
+        inside &= (distance >= least) & (distance <= most)
+        unsure |= np.minimum(np.abs(distance - least), np.abs(distance - most)) < NEAR * most
+    return bool(np.all(unsure | (inside == ~np.isin(status, (OUT_OF_REACH, BEYOND_LIMIT)))))
+
+
+def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
+    """The values (ny, nx) of a map, continued beyond the edge of reach within the range of the others.
+
+    The value of such a cell is extrapolated linearly from the next two cells along each row, column and diagonal
+    that has them, and averaged; without two such cells it is the mean of its neighbours. A figure can then be cut
+    at the true edge, not at the last cell.
+    """
+    known = np.array(values, dtype=np.float64)
+    beyond = np.isin(status, NO_POSTURE)
+    finite = known[np.isfinite(known)]
+    if not len(finite):
+        return known
+    low, high = float(finite.min()), float(finite.max())
+    for _ in range(LAYERS):
+        next_to, behind = _along(known, 1), _along(known, 2)
+        with np.errstate(invalid="ignore"):
+            straight = _mean(2.0 * next_to - behind)
+        estimate = np.where(np.isnan(straight), _mean(next_to), straight)
+        known = np.where(beyond & np.isnan(known), np.clip(estimate, low, high), known)
+    return known
+
+
+def _along(values: Floats, steps: int) -> Floats:
+    """The values (8, ny, nx) a number of cells away along rows, columns and diagonals; nan outside the grid."""
+    padded = np.pad(values, steps, constant_values=np.nan)
+    rows, columns = values.shape
+    ways = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+    starts = [(steps * (1 + i), steps * (1 + j)) for i, j in ways]
+    return np.stack([padded[i : i + rows, j : j + columns] for i, j in starts])
+
+
+def _mean(values: Floats) -> Floats:
+    """Mean of the finite values over the first axis; nan where there is none."""
+    there = np.isfinite(values)
+    total = np.where(there, values, 0.0).sum(axis=0)
+    return np.where(there.any(axis=0), total / np.maximum(there.sum(axis=0), 1), np.nan)
+
+
+NAMES: Final = np.array([STATUS.get(k, "") for k in range(256)], dtype=object)
+
+
+def map_document(
+    dataset: xr.Dataset, device: Device | None = None, area: CommonArea | None = None
+) -> dict[str, Any]:
+    """A map by key and unit: its grid, its first measure, and with several all of them under `measures`.
+
+    dataset  as `study.workspace.map.workspace_map` returns it
+    device   None: numbers for which postures must be solved again are left out, as in `over_the_workspace`
+    area     common area of requirements; None: no requirements
+    """
+    names = measures_of(dataset)
+    axes = dataset.attrs["plane_axes"]
+    each = {name: _measure(dataset, name, device) for name in names}
+    document = {
+        "measure": names[0],
+        "plane": dataset.attrs["plane"],
+        "plane_axes": [axes[:3], axes[3:]],
+        "plane_through_m": dataset.attrs["plane_through_m"],
+        "x_m": dataset["x_m"].values,
+        "y_m": dataset["y_m"].values,
+        **each[names[0]],
+        "notes": [f"{name}: {note}" for name in names for note in _notes(dataset, name)],
+    }
+    document |= {"measures": each} if len(names) > 1 else {}
+    return document | ({} if area is None else area.document())
+
+
+def map_table(dataset: xr.Dataset) -> dict[str, Any]:
+    """A map as columns, a row for each cell, x fastest: position in the plane and, unless that is xy, in the base
+    frame; values and their status, and directions."""
+    x, y = np.meshgrid(dataset["x_m"].values, dataset["y_m"].values)
+    table: dict[str, Any] = {"x_m": x.ravel(), "y_m": y.ravel()}
+    if dataset.attrs["plane"] != "xy":
+        table |= _components("position", positions(dataset), "_m")
+    for name in measures_of(dataset):
+        table[str(dataset[name].attrs["key"])] = dataset[name].values.ravel()
+        table[f"{name}_status"] = NAMES[dataset[f"{name}_status"].values.ravel()]
+        if f"{name}_direction" in dataset:
+            table |= _components(f"{name}_direction", dataset[f"{name}_direction"].values)
+    return table
+
+
+def why_no_cell(dataset: xr.Dataset) -> str | None:
+    """Why no cell has a value of any measure; None where one has."""
+    names = measures_of(dataset)
+    if any((dataset[f"{name}_status"].values == OK).any() for name in names):
+        return None
+    notes = [note for name in names for note in _notes(dataset, name)]
+    if not notes and any((dataset[f"{name}_status"].values == NO_EQUILIBRIUM).any() for name in names):
+        return (
+            f"no cell has a value: in none that is reached is there an equilibrium under {dataset.attrs['load']}"
+        )
+    return "no cell has a value" + (f": {notes[0]}" if notes else "")
+
+
+def _measure(dataset: xr.Dataset, name: str, device: Device | None) -> dict[str, Any]:
+    """One measure of the document."""
+    attributes = dataset[name].attrs
+    document = {
+        "title": attributes["title"],
+        "unit": attributes.get("unit", ""),
+        "better": attributes["better"] or None,
+        "source": attributes["source"],
+        "values": dataset[name].values,
+        "status": NAMES[dataset[f"{name}_status"].values],
+        "overall": over_the_workspace(dataset, name, device),
+        "notes": _notes(dataset, name),
+    }
+    directed = f"{name}_direction"
+    return document | ({"directions": dataset[directed].values} if directed in dataset else {})
+
+
+def _notes(dataset: xr.Dataset, name: str) -> list[str]:
+    return str(dataset[name].attrs["notes"]).splitlines()
+
+
+def _components(name: str, vectors: Sequence[Any] | np.ndarray, unit: str = "") -> dict[str, Any]:
+    """Columns of vectors (..., 3)."""
+    rows = np.reshape(vectors, (-1, 3))
+    return {f"{name}_{axis}{unit}": rows[:, k] for k, axis in enumerate("xyz")}

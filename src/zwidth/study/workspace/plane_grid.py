@@ -15,7 +15,7 @@ from zwidth.model.argument_checks import require
 from zwidth.model.mechanism import ORIENTATION, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import reachable_positions
-from zwidth.model.reach_shells import Shell, shells
+from zwidth.model.posture_batch import Shell, shells
 from zwidth.study.advice import Advice, AdvisedError
 
 AXES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

@@ -1,0 +1,401 @@
+"""Simulated contact with a wall or another environment: from an operating point to a verdict.
+
+Arguments of a contact: which environment with which parameters, which hand, and what is wrong with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Final, Literal
+
+import numpy as np
+
+from zwidth.arrays import Floats
+from zwidth.contact.contact_simulation import (
+    ContactSimulation,
+    RangeExit,
+    RunLength,
+    bound_of_run,
+    contact_run_length,
+    is_pushed_on,
+    lengthened,
+    needed_substeps,
+    predicted_growth,
+)
+from zwidth.contact.environments import ENVIRONMENTS
+from zwidth.contact.environments.catalogue import load_environment
+from zwidth.contact.environments.environment import Environment
+from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
+from zwidth.contact.loop_simulation import SUBSTEPS, Run, simulate_batch
+from zwidth.contact.passivity_controller import PassivityController
+from zwidth.contact.time_response import TimeResponse, judge_response
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.model.argument_checks import check_choice, check_number, require
+from zwidth.model.operator import Operator
+from zwidth.model.posture import PostureError
+from zwidth.progress import Progress
+
+WallSides = Literal["two-sided", "one-sided"]
+
+DEPTH: Final = 1e-3  # m, at the start: inside what acts everywhere, outside what has a surface
+
+
+class NoForceError(ValueError):
+    """An environment returned no finite force for a position and a velocity that are numbers.
+
+    environment            its name;   time  of the first such sample [s]
+    penetration, velocity  that it was called with [m], [m/s]
+    """
+
+    def __init__(self, environment: str, time: float, penetration: float, velocity: float) -> None:
+        self.environment, self.time, self.penetration, self.velocity = environment, time, penetration, velocity
+        super().__init__(
+            f"{environment} gave no finite force at {time:.6g} s, where it was given a position of "
+            f"{penetration:.6g} m and {velocity:.6g} m/s; have it return a number there"
+        )
+
+
+def simulate_contact(
+    point: OperatingPoint,
+    stiffness: float | None = None,
+    damping: float | None = None,
+    *,
+    wall: WallSides = "two-sided",
+    no_pull: bool = False,
+    environment: str | Environment | None = None,
+    parameters: Mapping[str, float] | None = None,
+    wall_position: float = 0.0,
+    start_position: float | None = None,
+    start_velocity: float = 0.0,
+    push: float | None = None,
+    ramp: float = 0.0,
+    tremor: Tremor | None = None,
+    reach: Reach | None = None,
+    reflex: Reflex | None = None,
+    passivity_damping: float | None = None,
+    duration: float | None = None,
+    substeps: int = SUBSTEPS,
+    seed: int = 0,
+    trail: bool = True,
+    seconds_to_hear: Callable[[float], float] | None = None,
+    progress: Progress | None = None,
+) -> ContactSimulation:
+    """Simulate what happens when a device touches a wall, or something else.
+
+    point              the device, and the operator who holds it
+    stiffness, damping  of the wall, or of an environment that has them [N/m], [N s/m]; a wall needs a stiffness
+    wall               does it act on both sides of its position? Under load, of that from which F/K is left
+    no_pull            the one-sided wall, or an environment that can, never pulls the device inwards
+    environment        something else to touch: an Environment, a bundled name or "file.py:name"; None: the wall
+    parameters         of the environment by name; those left out have its defaults
+    wall_position      where wall or environment begins [m]
+    start_position     of the reading [m]; None: 1 mm inside what acts everywhere, 1 mm outside a surface
+    start_velocity     [m/s]
+    push               the hand's force towards the wall [N]; None: 2 against a surface if the hand does not reach,
+                       else 0
+    ramp               time in which the push grows to it [s]
+    tremor, reach, reflex  of the hand; None: none
+    passivity_damping  largest damping of a time-domain passivity controller [N s/m]; None: no controller. With one
+                       the same run is made without it, too
+    duration           [s]; None: a tenfold change at the predicted rate and at least eight periods, at most 60 s;
+                       2 s and more where something is not linear (see `run_length`)
+    substeps           between samples, where something is nonlinear
+    seed               of the encoders' noise
+    trail              keep the handle's position after each substep
+    seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]
+    progress           called with "simulating", the samples done, and all samples
+    Raises  ContactArgumentError  for arguments that do not go together, that the environment does not take, or
+                                  that need an operator
+            OutOfWorkspaceError   (one of these) for a start or a wall that the handle cannot be moved to
+            NoForceError          where the environment returns no number
+            TooLarge              (memory_limit) for more samples than there is memory for
+            ValueError            for numbers that are out of range
+            what `OperatingPoint.plant` raises
+
+    >>> from zwidth.loop.controller import Controller
+    >>> from zwidth.model.plant import Plant
+    >>> one = np.ones(1)
+    >>> plant = Plant(0.1 * one[:, None], *np.zeros((2, 1, 1)), one, one)
+    >>> point = OperatingPoint(Controller(0.001), given_plant=plant)
+    >>> simulate_contact(point, 1000.0, 2.0)
+    ContactSimulation: wall, stiffness 1000 N/m, damping 2 N s/m
+      stable: decaying, growth -0.007583 per sample (predicted -0.007582)
+      amplitude 5.223e-05 m, dominant frequency 16.01 Hz
+      largest force 1 N, deepest 0.001 m
+      501 samples, 0.5 s
+    """
+    require("point", point, OperatingPoint)
+    if point.response is not None:
+        from zwidth.chart.measured.chart import modelled_point
+
+        point = modelled_point(point)
+    _check_numbers(wall_position, start_position, start_velocity, duration, seed)
+    parameters = parameters or {}
+    if point.load is not None:
+        wall, environment, parameters = _under_load(point, wall, environment, parameters)
+    touched, values = environment_with_values(
+        _wall_or(environment, wall, has_stiffness=stiffness is not None or "stiffness" in parameters),
+        parameters,
+        stiffness=stiffness,
+        damping=damping,
+        no_pull=no_pull,
+    )
+    arm = point.operator if point.ungripped_plant.handle is not None else None
+    hand = active_hand(arm, touched.surface, push, ramp, tremor, reach, reflex)
+    if start_position is None:
+        start_position = wall_position + (-DEPTH if touched.surface else DEPTH)
+    _distance_from_path(point, wall_position, "wall_position")
+    off_path = _distance_from_path(point, start_position, "start_position")
+    loop = point.contact_loop
+    growth = predicted_growth(point.loop, touched, values)
+    run = Run(
+        loop,
+        values,
+        hand=hand,
+        start_position=start_position,
+        start_velocity=start_velocity,
+        wall_position=wall_position,
+        seed=seed,
+        bound=bound_of_run(abs(start_position - wall_position), growth.per_sample),
+    )
+    runs = [run]
+    if passivity_damping is not None:
+        runs.insert(0, replace(run, passivity=PassivityController(passivity_damping)))
+    controlled = len(runs) > 1
+    substeps = needed_substeps(loop, hand, substeps)
+    simulate = partial(
+        simulate_batch, runs, touched, substeps=substeps, trail=trail, ledger=True, progress=progress
+    )
+    if duration is not None:
+        length = RunLength(duration, "as requested")
+        responses = simulate(duration=duration)
+    else:
+        length = contact_run_length(loop, hand, growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
+        length, responses = _long_enough(simulate, length, loop.period, seconds_to_hear)
+    _check_forces(responses, touched)
+    drifts = is_pushed_on(point.loop, touched, values, hand)
+    judgement = judge_response(responses[0], drifts=drifts)
+    if judgement.behaviour == "converged" and growth.decays is False and not _is_disturbed(responses[0]):
+        # a device that nothing disturbs stays at rest on an unstable wall, too
+        judgement = replace(judgement, behaviour="undecided")
+    return ContactSimulation(
+        point=point,
+        environment=touched,
+        values=values,
+        hand=hand,
+        start_position=start_position,
+        start_velocity=start_velocity,
+        distance_from_path=off_path,
+        predicted_growth=growth.per_sample,
+        length=length,
+        substeps=substeps,
+        seed=seed,
+        response=responses[0],
+        judgement=judgement,
+        range_exit=range_exit(point, responses[0]),
+        uncontrolled=responses[1] if controlled else None,
+    )
+
+
+def _is_disturbed(response: TimeResponse) -> bool:
+    """Whether a run has a motion, or a force that friction holds against."""
+    return bool(np.ptp(response.truth) > 0.0 or np.any(response.force))
+
+
+def _long_enough(
+    simulate: Callable[..., list[TimeResponse]],
+    length: RunLength,
+    period: float,
+    seconds_to_hear: Callable[[float], float] | None,
+) -> tuple[RunLength, list[TimeResponse]]:
+    """The responses; simulated again, longer, where the frequency that comes out takes that to be heard."""
+    responses = simulate(duration=length.seconds)
+    if seconds_to_hear is None or responses[0].given_up:
+        return length, responses
+    longer = lengthened(length, seconds_to_hear(judge_response(responses[0]).frequency), period)
+    return (length, responses) if longer == length else (longer, simulate(duration=longer.seconds))
+
+
+def range_exit(point: OperatingPoint, response: TimeResponse) -> RangeExit | None:
+    """Find where a motion leaves the handle's range, which is computed only if an extreme of the motion cannot be
+    reached."""
+    handle = response.handle
+    try:
+        for extreme in (handle.min(), handle.max()):
+            point.distance_from_path(float(extreme))
+    except PostureError:
+        if reached := point.handle_range:
+            outside = (handle < reached[0]) | (handle > reached[1])
+            return RangeExit(float(response.time[outside.argmax()]), *reached) if outside.any() else None
+    return None
+
+
+def _check_numbers(
+    wall_position: float, start_position: float | None, start_velocity: float, duration: float | None, seed: int
+) -> None:
+    check_number("wall_position", wall_position, "m")
+    check_number("start_position", 0.0 if start_position is None else start_position, "m")
+    check_number("start_velocity", start_velocity, "m/s")
+    check_number("duration", 1.0 if duration is None else duration, "s", above=0.0)
+    if seed < 0:
+        raise ValueError(f"seed must be zero or positive, got {seed}")
+
+
+def _under_load(
+    point: OperatingPoint,
+    wall: WallSides,
+    environment: str | Environment | None,
+    parameters: Mapping[str, float],
+) -> tuple[WallSides, str | Environment | None, Mapping[str, float]]:
+    """The wall under load: the one-sided one is that on which the hand leans; parameters with its load.
+
+    Raises  ContactArgumentError  for anything but a wall, on which no hand leans
+    """
+    if environment is not None:
+        raise ContactArgumentError("environment", "does not go with a load, which the wall holds; leave one out")
+    if wall == "two-sided":
+        return wall, None, parameters
+    load = -point.equilibrium.wall_force
+    if not load:
+        raise ContactArgumentError("wall", "is one-sided, and no hand leans on it; give a load with a force")
+    return "two-sided", ENVIRONMENTS["pressed_wall"], {"load": load, **parameters}
+
+
+def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stiffness: bool) -> str | Environment:
+    """The other environment, or the wall that acts on these sides.
+
+    Raises  ContactArgumentError  where both are given, or the wall has no stiffness
+    """
+    check_choice("wall", wall, ("two-sided", "one-sided"))
+    if environment is not None and wall == "one-sided":
+        raise ContactArgumentError("wall", "is one-sided beside another environment; leave one out")
+    if environment is None and not has_stiffness:
+        raise ContactArgumentError("stiffness", "is missing; a wall needs one [N/m]")
+    own = ENVIRONMENTS["one_sided_wall" if wall == "one-sided" else "wall"]
+    return own if environment is None else environment
+
+
+def _distance_from_path(point: OperatingPoint, position: float, argument: str) -> float | None:
+    """How far from a position the handle's path passes [m]; None for a device without a mechanism. Raises
+    OutOfWorkspaceError where the handle cannot be moved so far."""
+    try:
+        return point.distance_from_path(position)
+    except PostureError as error:
+        raise OutOfWorkspaceError(argument, position, error) from None
+
+
+def _check_forces(responses: Sequence[TimeResponse], environment: Environment) -> None:
+    """Raise NoForceError where the environment, called with numbers, returned none."""
+    for response in responses:
+        called = np.isfinite(response.reading) & np.isfinite(response.velocity)
+        silent = np.flatnonzero(called & ~np.isfinite(response.force))
+        if len(silent):
+            first = silent[0]
+            raise NoForceError(
+                environment.name,
+                float(response.time[first]),
+                float(response.penetration[first]),
+                float(response.velocity[first]),
+            )
+
+
+PUSH: Final = 2.0  # N, against what has a surface
+PLACES: Final = {"wall_position": "the wall", "start_position": "the start"}
+
+
+class ContactArgumentError(ValueError):
+    """An argument of a contact that cannot be meant.
+
+    argument  its name
+    reasons   what is wrong with it, each a fault of its own
+    missing   the argument that is to be given with it; None: none
+    """
+
+    def __init__(self, argument: str, *reasons: str, missing: str | None = None) -> None:
+        self.argument, self.reasons, self.missing = argument, reasons, missing
+        advice = "" if missing is None else f"; give {missing}"
+        super().__init__("\n".join(f"{argument}: {reason}{advice}" for reason in reasons))
+
+
+class OutOfWorkspaceError(ContactArgumentError):
+    """The handle of a mechanism cannot be moved to the start, or to the wall.
+
+    argument  "start_position" or "wall_position";   position  along the direction [m]
+    """
+
+    def __init__(self, argument: str, position: float, why: PostureError) -> None:
+        self.position = position
+        place = f"{PLACES[argument]} lies {position:g} m along the direction"
+        super().__init__(argument, f"{place}, out of the workspace: {why}")
+
+
+def environment_with_values(
+    environment: str | Environment,
+    parameters: Mapping[str, float],
+    *,
+    stiffness: float | None = None,
+    damping: float | None = None,
+    no_pull: bool = False,
+) -> tuple[Environment, Floats]:
+    """An environment, and its parameters as it takes them.
+
+    environment  or what `load_environment` finds it by
+    parameters   by name; those left out have the environment's defaults
+    stiffness, damping, no_pull  three of them; None and False: not given here
+    Raises       ContactArgumentError  for an unknown environment, a file that does not serve, parameters that it
+                                       does not take or that are given twice
+
+    >>> environment_with_values("slot", {"width": 0.01}, stiffness=500.0)[1].tolist()
+    [0.01, 500.0, 0.0, 0.0]
+    """
+    chosen = _environment(environment)
+    given = dict(parameters)
+    for name, value in {"stiffness": stiffness, "damping": damping, "no_pull": float(no_pull) or None}.items():
+        if value is None:
+            continue
+        if name not in chosen.names:
+            has = ", ".join(chosen.names) or "none"
+            raise ContactArgumentError(name, f"{chosen.name} has no such parameter; it has {has}")
+        if name in given:
+            raise ContactArgumentError("parameters", f"{name} is given twice")
+        given[name] = value
+    try:
+        return chosen, chosen.values(**given)
+    except ValueError as error:
+        raise ContactArgumentError("parameters", *str(error).splitlines()) from None
+
+
+def _environment(environment: str | Environment) -> Environment:
+    if isinstance(environment, Environment):
+        return environment
+    require("environment", environment, str)
+    try:
+        return load_environment(environment)
+    except ValueError as error:
+        raise ContactArgumentError("environment", *str(error).splitlines()) from None
+
+
+def active_hand(
+    operator: Operator | None,
+    surface: bool,
+    push: float | None,
+    ramp: float,
+    tremor: Tremor | None,
+    reach: Reach | None,
+    reflex: Reflex | None,
+) -> Hand:
+    """The operator with what he does; `surface` says whether there is one to push against.
+
+    Raises  ContactArgumentError  for what needs an arm, or a push
+    """
+    for name, movement in (("reach", reach), ("reflex", reflex)):
+        if movement is not None and operator is None:
+            raise ContactArgumentError(name, "needs an arm, and nobody holds the device", missing="operator")
+    if push is None:
+        push = PUSH if surface and reach is None else 0.0
+    if ramp and not push:
+        why = "is the time in which a push grows, and no push is given"
+        raise ContactArgumentError("ramp", why, missing="push")
+    return Hand(operator, push, ramp, reach, tremor, reflex)

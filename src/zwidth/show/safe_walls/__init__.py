@@ -1,1 +1,0 @@
-"""Tables of safe walls as programs for a haptic loop."""

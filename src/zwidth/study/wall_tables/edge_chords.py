@@ -1,0 +1,350 @@
+"""Edges of many loops' stable sets as chords, from the compiled stages of a chart.
+
+Intervals of damping in which all walls of a band of stiffnesses are stable.
+
+A rectangle of walls [K_low, K_high] x (B_low, B_high) that no edge of the stable set enters is stable as a whole
+or not at all: the number of roots outside the circle changes at an edge only. So the edges that lie in the band,
+seen along B, leave gaps, and one wall in each gap tells whether the gap is stable. A wall lies in the set if a
+ray from it crosses the edge an odd number of times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from threading import local
+from typing import Final
+
+import numpy as np
+
+from zwidth.arrays import Flags, Floats, Ints
+from zwidth.chart.arcs import PAIR
+from zwidth.chart.chart import stability_chart
+from zwidth.chart.chart_numbers import fill_nodes, read_edge
+from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.chart.edge_memory import ARCS, DOUBTFUL, MOST_SAMPLES, EdgeMemory, edge_memory
+from zwidth.chart.edge_samples import degree_of, fill_loop
+from zwidth.chart.point_chart import chart_at
+from zwidth.chart.wall_samples import MOST_DEGREE
+from zwidth.compiled import compiled, compiled_lean
+from zwidth.loop.circle_factors import COMPUTER, wall_on_circle
+from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.operating_point import OperatingPoint
+from zwidth.loop.point_loops import table_of_points
+from zwidth.loop.sections import UnmovedError
+from zwidth.threads import in_chunks
+
+PIECES: Final = 8  # chords between two neighbouring samples of a curve
+MOST_CHORDS: Final = 3072  # of one loop; one with more is charted alone
+AT_ONCE: Final = 256  # loops whose chords are in memory at full length
+# Places in a chord: K and B of its first and its last wall, and how far the edge may lie beside it in K and in B.
+K0, B0, K1, B1, SAG_K, SAG_B = range(6)
+# A chord between two samples lies an eighth of a second difference beside its curve; twice that is allowed.
+SAG: Final = 0.25
+RING_SAG: Final = 1e-6  # of a ring's extent: its chords stay this close to the edge (`chart.arc_kernels.CHORD`)
+STRAIGHT: Final = 1e-12  # of a ring's extent: along chords that change less the edge does not
+
+
+@dataclass(frozen=True)
+class EdgeChords:
+    """The edges of N stable sets, each as closed rings of chords; the order of the chords does not matter.
+
+    chords   (m, 6)    K [N/m] and B [N s/m] of both ends, and how far the edge may lie beside the chord in K and B
+    offsets  (N + 1,)  index of each loop's first chord; one without chords has no stable wall
+    known    (N,)      False where the edge could not be closed: nothing is known of that loop
+    """
+
+    chords: Floats
+    offsets: Ints
+    known: Flags
+
+    def __len__(self) -> int:
+        return len(self.known)
+
+    @classmethod
+    def joined(cls, parts: list[EdgeChords]) -> EdgeChords:
+        """The loops of several, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        counts = np.concatenate([np.diff(part.offsets) for part in parts])
+        return cls(
+            np.concatenate([part.chords for part in parts]),
+            np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+            np.concatenate([part.known for part in parts]),
+        )
+
+    @property
+    def largest_stiffness(self) -> float:
+        """Smallest over the loops of the largest K of an edge [N/m]; 0 where a loop has no stable wall."""
+        counts = np.diff(self.offsets)
+        if not len(counts) or (counts == 0).any():
+            return 0.0
+        return float(np.maximum.reduceat(self.chords[:, [K0, K1]].max(axis=1), self.offsets[:-1]).min())
+
+
+def edges_of_points(point: OperatingPoint) -> EdgeChords:
+    """The edges of the stable sets at all points, flat.
+
+    Points whose modes compiled code cannot treat, and charts in doubt, are charted alone.
+
+    Raises  what `OperatingPoint.loop` and `chart_at` raise
+    """
+    flat = point.flat if point.shape else point
+    count = int(np.prod(point.shape))
+    parts = []
+    for first in range(0, count, AT_ONCE):
+        piece = flat[first : first + AT_ONCE] if point.shape else flat
+        table = None if point.response is not None else table_of_points(piece)
+        number = min(AT_ONCE, count - first)
+        doubtful = np.ones(number, dtype=np.bool_)
+        chords, counts = np.empty((number, MOST_CHORDS, 6)), np.zeros(number, dtype=np.int64)
+        if table is not None:
+            _fill_all(table, chords, counts, doubtful)
+        each = [chords[n, : counts[n]] for n in range(number)]
+        known = np.ones(number, dtype=np.bool_)
+        for n in np.flatnonzero(doubtful):
+            try:
+                each[n] = _charted_alone(piece[n] if point.shape else piece)
+            except (ChartError, UnmovedError, np.linalg.LinAlgError):
+                known[n], each[n] = False, np.empty((0, 6))
+        offsets = np.concatenate([[0], np.cumsum([len(one) for one in each])]).astype(np.int64)
+        parts.append(EdgeChords(np.concatenate(each), offsets, known))
+    return EdgeChords.joined(parts)
+
+
+def _charted_alone(point: OperatingPoint) -> Floats:
+    """The chords of one point's edge, by its own chart. Raises ChartError."""
+    chart = chart_at(point) if point.charted_by_response else stability_chart(point.loop, decay=False)
+    each = []
+    for ring in chart.regions:
+        size = np.ptp(ring, axis=0)
+        # a chord along an axis is straight, above all the line of real roots at K = 0
+        sag = np.where(np.abs(np.diff(ring, axis=0)) > STRAIGHT * size, RING_SAG * size, 0.0)
+        each.append(np.column_stack([ring[:-1], ring[1:], sag]))
+    return np.concatenate([np.empty((0, 6)), *each])
+
+
+def _fill_all(loops: LoopTable, chords: Floats, counts: Ints, doubtful: Flags) -> None:
+    own = local()
+
+    def several(first: int, last: int) -> None:
+        if not hasattr(own, "memory"):
+            own.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
+        _fill_several(loops, own.memory, chords, counts, doubtful, first, last)
+
+    in_chunks(several, len(counts))
+
+
+@compiled
+def _fill_several(
+    loops: LoopTable,
+    memory: EdgeMemory,
+    chords: Floats,
+    counts: Ints,
+    doubtful: Flags,
+    first: int,
+    last: int,
+) -> None:
+    """Chords (N, MOST_CHORDS, 6) of loops first to last - 1, their numbers (N,), and which are in doubt (N,)."""
+    memory.circle.sizes[COMPUTER] = -1
+    for i in range(first, last):
+        doubtful[i], counts[i] = True, 0
+        if loops.section_count[i] == 0 or degree_of(loops, i) > MOST_DEGREE:
+            continue
+        fill_loop(loops, i, 1.0, memory)
+        if read_edge(memory) == DOUBTFUL:
+            continue
+        count = _fill_chords(memory, chords[i])
+        if count >= 0:
+            doubtful[i], counts[i] = False, count
+
+
+@compiled_lean
+def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
+    """The chords of the rings of arcs; -1 where there are too many, or one is not finite."""
+    arcs, n = memory.arcs, 0
+    for k in range(memory.counts[ARCS]):
+        following = arcs.next_arc[k]
+        if following < 0:
+            continue
+        if arcs.kind[k] == PAIR:
+            n = _add_curve(memory, k, out, n)
+        else:
+            n = _add_chord(out, n, arcs.first[k, 0], arcs.first[k, 1], arcs.last[k, 0], arcs.last[k, 1], 0.0, 0.0)
+        if n < 0:
+            return -1
+        # where rounding blurs a corner it is two walls, joined by a chord
+        x, y, u, v = arcs.last[k, 0], arcs.last[k, 1], arcs.first[following, 0], arcs.first[following, 1]
+        if x != u or y != v:
+            n = _add_chord(out, n, x, y, u, v, 0.0, 0.0)
+            if n < 0:
+                return -1
+    return n
+
+
+@compiled_lean
+def _add_curve(memory: EdgeMemory, k: int, out: Floats, n: int) -> int:
+    """PIECES chords for each interval between the nodes of a curve's arc; their number so far, -1 as above.
+
+    The interval is cut at equal steps of the angle, with t = tan(theta/2); its second differences tell how far the
+    curve lies beside the chords.
+    """
+    circle, nodes = memory.circle, memory.picked
+    count = fill_nodes(memory, k)
+    for i in range(1, count):
+        start, end = 2.0 * np.arctan(nodes[0, i - 1]), 2.0 * np.arctan(nodes[0, i])
+        x0, y0 = nodes[1, i - 1], nodes[2, i - 1]
+        x, y, before_x, before_y = x0, y0, 0.0, 0.0
+        sag_K = sag_B = 0.0
+        begin = n
+        for j in range(1, PIECES + 1):
+            if j < PIECES:
+                u, v = wall_on_circle(circle, np.tan(0.5 * (start + (end - start) * j / PIECES)))
+            else:
+                u, v = nodes[1, i], nodes[2, i]
+            if j > 1:
+                sag_K = max(sag_K, abs(u - x - before_x))
+                sag_B = max(sag_B, abs(v - y - before_y))
+            before_x, before_y = u - x, v - y
+            n = _add_chord(out, n, x, y, u, v, 0.0, 0.0)
+            if n < 0:
+                return -1
+            x, y = u, v
+        for j in range(begin, n):
+            out[j, SAG_K], out[j, SAG_B] = SAG * sag_K, SAG * sag_B
+    return n
+
+
+@compiled_lean
+def _add_chord(out: Floats, n: int, x: float, y: float, u: float, v: float, sag_K: float, sag_B: float) -> int:
+    """One more chord; the number of chords, -1 where memory is full or an end is not finite."""
+    if n >= len(out) or not np.isfinite(x + y + u + v):
+        return -1
+    out[n, K0], out[n, B0], out[n, K1], out[n, B1], out[n, SAG_K], out[n, SAG_B] = x, y, u, v, sag_K, sag_B
+    return n + 1
+
+
+GAPS: Final = 4  # stable intervals kept of a band, the longest
+# Where in the band the ray runs: at no special place, so that it passes no corner; both have to agree.
+PROBES: Final = (0.4871, 0.3413)
+
+
+def stable_intervals(edges: EdgeChords, bands: Floats) -> Floats:
+    """The longest intervals of damping, stable with every stiffness of a band, for each loop and band.
+
+    bands    (b, 2)  lowest and highest stiffness of each [N/m]
+    Returns  (N, b, GAPS, 2)  lowest and highest damping [N s/m], ascending; nan behind the last, and for loops of
+             which nothing is known
+    """
+    out = np.full((len(edges), len(bands), GAPS, 2), np.nan)
+    most = max(int(np.diff(edges.offsets).max(initial=0)), MOST_CHORDS)
+    _fill_intervals(edges.chords, edges.offsets, np.ascontiguousarray(bands), np.empty((most, 2)), out)
+    return out
+
+
+@compiled
+def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, out: Floats) -> None:
+    for i in range(len(offsets) - 1):
+        first, last = offsets[i], offsets[i + 1]
+        for j in range(len(bands)):
+            low, high = bands[j, 0], bands[j, 1]
+            n = _obstacles(chords, first, last, low, high, room)
+            top, count = -np.inf, 0
+            for k in range(n):
+                if (
+                    room[k, 0] > top
+                    and k > 0
+                    and _is_inside(chords, first, last, low, high, 0.5 * (top + room[k, 0]))
+                ):
+                    count = _keep_longest(out[i, j], count, top, room[k, 0])
+                top = max(top, room[k, 1])
+
+
+@compiled_lean
+def _obstacles(chords: Floats, first: int, last: int, low: float, high: float, room: Floats) -> int:
+    """The intervals of damping that chords in the band occupy, ascending by their lower ends; their number."""
+    n = 0
+    for c in range(first, last):
+        x, y, u, v = chords[c, K0], chords[c, B0], chords[c, K1], chords[c, B1]
+        below, above = low - chords[c, SAG_K], high + chords[c, SAG_K]
+        if max(x, u) < below or min(x, u) > above:
+            continue
+        if x > u:
+            x, y, u, v = u, v, x, y
+        if x < below:
+            y += (below - x) / (u - x) * (v - y)
+            x = below
+        if u > above:
+            v = y + (above - x) / (u - x) * (v - y)
+        a, b = min(y, v) - chords[c, SAG_B], max(y, v) + chords[c, SAG_B]
+        i = n
+        while i > 0 and room[i - 1, 0] > a:
+            room[i, 0], room[i, 1] = room[i - 1, 0], room[i - 1, 1]
+            i -= 1
+        room[i, 0], room[i, 1] = a, b
+        n += 1
+    return n
+
+
+@compiled_lean
+def _is_inside(chords: Floats, first: int, last: int, low: float, high: float, B: float) -> bool:
+    """Whether walls of this damping in the band are stable: two rays towards larger B, which must agree."""
+    for share in PROBES:
+        K, odd = low + share * (high - low), False
+        for c in range(first, last):
+            x, u = chords[c, K0], chords[c, K1]
+            if (x > K) != (u > K) and chords[c, B0] + (K - x) / (u - x) * (chords[c, B1] - chords[c, B0]) > B:
+                odd = not odd
+        if not odd:
+            return False
+    return True
+
+
+@compiled_lean
+def _keep_longest(out: Floats, count: int, low: float, high: float) -> int:
+    """Add an interval behind the others, without the shortest where they are too many; their number."""
+    if count < GAPS:
+        out[count, 0], out[count, 1] = low, high
+        return count + 1
+    shortest = 0
+    for k in range(1, GAPS):
+        if out[k, 1] - out[k, 0] < out[shortest, 1] - out[shortest, 0]:
+            shortest = k
+    if high - low > out[shortest, 1] - out[shortest, 0]:
+        for k in range(shortest, GAPS - 1):
+            out[k, 0], out[k, 1] = out[k + 1, 0], out[k + 1, 1]
+        out[GAPS - 1, 0], out[GAPS - 1, 1] = low, high
+    return count
+
+
+def common_interval(intervals: Floats) -> tuple[float, float]:
+    """The longest interval (low, high) that lies in one of each loop's, (nan, nan) where there is none.
+
+    intervals  (N, GAPS, 2) of each loop, nan behind the last
+    """
+    room = np.empty((2, GAPS * max(len(intervals), 1) + 1, 2))
+    low, high = _common(np.ascontiguousarray(intervals), room)
+    return float(low), float(high)
+
+
+@compiled
+def _common(intervals: Floats, room: Floats) -> tuple[float, float]:
+    """Cut the intervals that are left by those of one loop after the other."""
+    count, now = 1, 0
+    room[0, 0, 0], room[0, 0, 1] = -np.inf, np.inf
+    for i in range(len(intervals)):
+        left = 0
+        for k in range(count):
+            for g in range(GAPS):
+                if not intervals[i, g, 0] < intervals[i, g, 1]:  # nan, of which max and min say nothing
+                    break
+                low, high = max(room[now, k, 0], intervals[i, g, 0]), min(room[now, k, 1], intervals[i, g, 1])
+                if low < high and left < room.shape[1]:
+                    room[1 - now, left, 0], room[1 - now, left, 1] = low, high
+                    left += 1
+        now, count = 1 - now, left
+    best, low, high = 0.0, np.nan, np.nan
+    for k in range(count):
+        if room[now, k, 1] - room[now, k, 0] > best:
+            low, high = room[now, k, 0], room[now, k, 1]
+            best = high - low
+    return low, high

@@ -1,0 +1,284 @@
+"""Safe walls over a device's workspace, for a haptic loop to clamp its gains by.
+
+The cells of a table of safe walls as a job, so that a long one is stored and continued.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from numbers import Integral, Real
+from typing import Any, Final
+
+import numba
+import numpy as np
+
+from zwidth.device.device import Device
+from zwidth.device.operator_choice import NOBODY
+from zwidth.measures.definition import OK, STATUS, Note
+from zwidth.model.argument_checks import describe_value, require, wrong_type
+from zwidth.progress import Progress
+from zwidth.study.advice import Advice, AdvisedError
+from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.job import CellValues
+from zwidth.study.jobs.journal import fingerprint
+from zwidth.study.jobs.store import Store, store_for
+from zwidth.study.wall_tables.cell_walls import CellQuestion, cell_walls
+from zwidth.study.wall_tables.grid import Sectors, cells_of
+from zwidth.study.wall_tables.table import SafeWalls, table_of_cells, table_size
+
+LEVELS: Final = 12
+MOST_LEVELS: Final = 255  # what a byte of the exported program counts
+MOST_PARTS: Final = 16
+BATCH: Final = 4  # cells
+
+
+class SafeWallsError(AdvisedError):
+    """A table of safe walls that cannot be made."""
+
+
+def safe_walls(
+    device: Device,
+    hands: Sequence[str] | None = None,
+    *,
+    x: Sequence[float] | None = None,
+    y: Sequence[float] | None = None,
+    z: Sequence[float] | None = None,
+    cells: Sequence[int] | None = None,
+    levels: int = LEVELS,
+    directions: int = 1,
+    margin: float = 0.0,
+    span: float | None = None,
+    size_limit: int | None = None,
+    assembly: str | None = None,
+    model: str | None = None,
+    seed: int = 1,
+    store: Store | str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> SafeWalls:
+    """A table of the walls that are stable in every posture of each cell of the workspace, in every direction and
+    with every hand; see `docs/export.md` for what is proven of it and what is tried.
+
+    hands       who may hold it: bundled operators, files, "none" for nobody; left out: as the device file says
+    x, y, z     lowest and highest coordinate of the handle [m]; left out: the file's workspace, or what is reached
+    cells       number of cells along each axis; left out: 20 along the longer side of a plane, 6 in space
+    levels      bands of stiffness in each cell, at most 255
+    directions  into how many pieces each face of a square (a cube) of directions is cut: 1 for a table of all
+                directions; n for further tables of 2 n (3 n^2) sectors, at most 16
+    margin      share by which stiffness and damping may both be off, at least 0 and below 1: the walls of the
+                table are stable with both times any factors from 1 - margin to 1 + margin
+    span        damping that every rectangle has at least [N s/m]; left out: the rectangles of the largest area
+    size_limit  bytes that the numbers of the exported program may take
+    assembly, model   as for `Device.at`
+    seed        of the random samples by which cells are tried
+    store       a folder that keeps the cells that are done
+    progress    is called with "cells", cells done, and cells of all
+    workers     processes at most; left out: one for each core
+    Raises      SafeWallsError  for arguments that are not allowed, a table beyond the limit, a device under load,
+                                one that renders moments, a measured response
+                PlaneError      as `grid.cells_of` does
+                DeviceError     for hands that cannot be read, and as `Device.at` does
+                what `OperatingPoint.loop`, `executor.run` and `Store` raise
+    """
+    job = safe_walls_job(
+        device,
+        hands,
+        ranges=(x, y, z),
+        cells=cells,
+        levels=levels,
+        directions=directions,
+        margin=margin,
+        size_limit=size_limit,
+        assembly=assembly,
+        model=model,
+        seed=seed,
+    )
+    return compute_table(device, job, span, store_for(job, store), progress, workers)
+
+
+def safe_walls_job(
+    device: Device,
+    hands: Sequence[str] | None,
+    *,
+    ranges: Sequence[Sequence[float] | None],
+    cells: Sequence[int] | None,
+    levels: int,
+    directions: int,
+    margin: float,
+    size_limit: int | None,
+    assembly: str | None,
+    model: str | None,
+    seed: int,
+) -> SafeWallsJob:
+    """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made."""
+    require("device", device, Device)
+    _check_kinds(hands, cells, ranges)
+    _check_numbers(levels, directions, margin)
+    if device.response is not None:
+        raise SafeWallsError(
+            "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth "
+            "identify"
+        )
+    if device.load is not None:
+        raise SafeWallsError(
+            "a table holds for a device without load: its walls would hang on how hard the hand pushes",
+            Advice("leave the load out, with {}", "set", "load=unset"),
+        )
+    if device.mechanism is not None and device.renders_moments(None):
+        raise SafeWallsError(
+            "the device renders moments about an axis, and a table is about forces; render a force"
+        )
+    grid = cells_of(device, ranges, cells, assembly)
+    if directions > 1 and not grid.dimensions:
+        raise SafeWallsError(
+            f"the device has no [mechanism] and one direction, got {directions} parts of directions",
+            Advice("leave out {}", "directions"),
+        )
+    held = tuple(device.held_by(hand) for hand in hands) if hands else (device,)
+    sectors = Sectors(grid.dimensions, directions)
+    question = CellQuestion(held, grid, sectors, levels, float(margin), assembly, model, seed)
+    if size_limit is not None and (size := table_size(question)) > size_limit:
+        raise SafeWallsError(
+            f"the table takes {size} bytes, more than the {size_limit} of its limit",
+            Advice("take fewer with {}, or fewer levels", "cells"),
+        )
+    _check_point(question)
+    return SafeWallsJob(question)
+
+
+def compute_table(
+    device: Device,
+    job: SafeWallsJob,
+    span: float | None,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+    *,
+    cluster: str | None = None,
+    time_limit: float | None = None,
+) -> SafeWalls:
+    """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
+    if span is not None and not (isinstance(span, Real) and isfinite(span) and span > 0.0):
+        raise SafeWallsError(f"the span of damping must be positive, got {describe_value(span)}")
+    cells = run(job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit)
+    asked = job.cell_question
+    return table_of_cells(device, hand_names(asked), asked, cells, span)
+
+
+def hand_names(question: CellQuestion) -> tuple[str, ...]:
+    """What the hands are called, in their order; "none" for nobody."""
+    return tuple(device.operator_name or NOBODY for device in question.devices)
+
+
+def _check_kinds(hands: object, cells: object, ranges: Sequence[object]) -> None:
+    """Raise TypeError for arguments that are no sequences of what they should be."""
+    if isinstance(hands, str):
+        raise wrong_type("hands", "a list of operators", hands, f"write [{hands!r}]")
+    if hands is not None and not isinstance(hands, Sequence):
+        raise wrong_type("hands", "a list of operators", hands)
+    if cells is not None and not _all(cells, Integral):
+        raise wrong_type("cells", "whole numbers such as (20, 10)", cells)
+    for name, given in zip("xyz", ranges, strict=True):
+        if given is not None and not (_all(given, Real) and len(given) == 2):  # type: ignore[arg-type]
+            raise wrong_type(name, "two numbers such as (-0.1, 0.1)", given)
+
+
+def _all(values: Any, kind: type[Any]) -> bool:
+    """Whether these are a sequence, or an array, of numbers of this kind."""
+    whole = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
+    return whole and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
+
+
+def _check_numbers(levels: int, directions: int, margin: float) -> None:
+    for name, value, most in (("levels", levels, MOST_LEVELS), ("directions", directions, MOST_PARTS)):
+        if not (isinstance(value, Integral) and 1 <= value <= most):
+            raise SafeWallsError(f"{name} must be a whole number from 1 to {most}, got {describe_value(value)}")
+    if not (isinstance(margin, Real) and 0.0 <= margin < 1.0):
+        raise SafeWallsError(f"margin must be at least 0 and below 1, got {describe_value(margin)}")
+
+
+def _check_point(question: CellQuestion) -> None:
+    """Raise what is wrong with the device, its assembly or its model, before the cells have it as their status."""
+    from zwidth.model.posture import PostureError
+
+    for device in question.devices:
+        try:
+            point = device.at(assembly=question.assembly, model=question.model)
+        except PostureError:  # an assembly that does not reach the reference may reach others
+            continue
+        _ = point.loop
+
+
+METHOD: Final = 3  # changes with the way in which cells are searched, so that no table is made of two
+
+
+@dataclass(frozen=True, repr=False)
+class SafeWallsJob:
+    """The cells of a table of safe walls; columns are the numbers of its tables.
+
+    cell_question  what is asked of every cell
+    """
+
+    cell_question: CellQuestion
+
+    def __repr__(self) -> str:
+        return f"SafeWallsJob: {self.count} cells, {len(self.cell_question.devices)} hands"
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return self.cell_question.grid.count
+
+    @property
+    def measures(self) -> Sequence[str]:
+        """Columns: for each table its largest stiffness, then lowest and then highest damping of its bands."""
+        bands = range(1, self.cell_question.levels + 1)
+        return tuple(
+            f"{name}_{slot}"
+            for slot in range(self.cell_question.slots)
+            for name in ("stiffness", *(f"damping_{end}_{j}" for end in ("min", "max") for j in bands))
+        )
+
+    @property
+    def question(self) -> str:
+        """Fingerprint that stored results are recognised by."""
+        asked = self.cell_question
+        hands = [[device.document, device.operator] for device in asked.devices]
+        grid = asked.grid
+        return fingerprint(
+            "safe walls",
+            METHOD,
+            hands,
+            [grid.axes, grid.through, grid.low, grid.high, list(grid.counts)],
+            [asked.sectors.dimensions, asked.sectors.parts, asked.levels, asked.margin],
+            [asked.assembly, asked.model, asked.seed, asked.narrowing],
+        )
+
+    def compute(self, first: int, last: int) -> CellValues:
+        """Cells first to last - 1, each by itself. Raises what `OperatingPoint.loop` raises."""
+        columns = len(self.measures)
+        threads = numba.get_num_threads()
+        numba.set_num_threads(1)  # kernels take a millisecond here, and handing out their chunks would take longer
+        try:
+            cells = [cell_walls(self.cell_question, cell) for cell in range(first, last)]
+        finally:
+            numba.set_num_threads(threads)
+        values = np.full((last - first, columns), np.nan)
+        status = np.zeros((last - first, columns), dtype=np.uint8)
+        notes: dict[tuple[int, str], tuple[int, int]] = {}
+        for n, cell in enumerate(cells):
+            status[n] = cell.status
+            if cell.status == OK:
+                assert cell.top is not None
+                assert cell.ranges is not None
+                rows = [cell.top[:, None], cell.ranges[:, :, 0], cell.ranges[:, :, 1]]
+                values[n] = np.concatenate(rows, axis=1).ravel()
+            else:
+                key = cell.status, cell.reason or f"a posture in the cell is {STATUS[cell.status]}"
+                count, where = notes.get(key, (0, first + n))
+                notes[key] = count + 1, where
+        own = tuple(Note(*key, count, (where,)) for key, (count, where) in notes.items())
+        return CellValues(values, status, (own, *((),) * (columns - 1)))
