@@ -7,10 +7,10 @@ with a pair of roots on the circle. Charts differ in where their curves come fro
     one direction         the loop's factors                     (`tracer.Tracer`)
     many loops            those of each member                   (`tracer.Tracer`)
     several directions    eigenvalues of the plant's response, or walls followed from angle to angle
-                                                                 (`several_directions.branch.Branch`)
+                                                                 (`several_directions.polygon_arcs.Branch`)
     measured              none: its edge is chords between interpolated points
 
-From walks along the edge to simple rings: the cells of a stable set.
+Walks along the edge become simple rings: the cells of a stable set.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The area of a stable set within K >= 0, B >= 0: Green's integral of K dB along its edge.
+"""Area, largest stiffness and largest damping of a stable set within K >= 0, B >= 0, read off its edge's arcs.
+
+The area is Green's integral of K dB along the edge.
 
 Over a panel of a curve the integral of K dB is that of the polynomials through its walls at ten Gauss-Lobatto
 points. What they miss of B oscillates, and cancels: the error falls as that of Gauss's rule with as many points.
-
-The largest stiffness and the largest damping of a stable set, read off the arcs of its edge.
 """
 
 from __future__ import annotations

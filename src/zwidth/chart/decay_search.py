@@ -4,8 +4,6 @@ Mostly the slowest root of that wall is a double real one: it makes the two oute
 and B follow from its radius, and the radius at which another root becomes as large is found on a line. Whether any
 wall decays faster is then read off the curve on a circle that is smaller by a hair: an edge that it has there
 encloses such walls. From the best of them a simplex goes down, until no edge is left.
-
-Spectral radii of walls by their polynomials, and a simplex search for the wall with the smallest.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Working memory in which a loop's curve becomes the edge of its stable set, stage by stage.
 
     samples of the curve -> flags -> corners -> arcs -> rings          (`edge_samples`, `corner`, `edge_arcs`,
-    `rings`)
+    `arcs`)
 
 The caller owns it, kernels fill it and allocate nothing; what does not fit is an overflow, which they report.
 Where rounding leaves a question open (a flag, a corner, a piece of a line of real roots) the stage says so by

@@ -1,4 +1,4 @@
-"""The sampled response of a plant with hysteretic damping on the unit circle, at any angle and to rounding.
+"""Hysteretic damping: the sampled response on the unit circle to rounding, the chart, and its edge for fits.
 
     P(e^{iwT}) = sum_k G(i w_k) H(i w_k) / T,    w_k = w + 2 pi k/T
 
@@ -27,7 +27,7 @@ The edge of a plant with a loss factor, where that of its viscous equivalent is 
 The chart with a loss factor takes seconds, most of them to count the cells. The viscous plant that loses as much
 in each mode at its own frequency has nearly the same chart, with the same arcs at nearly the same angles; there
 the walls of the hysteretic plant are computed exactly, from its sampled response. Arcs meet at other angles than
-the viscous ones do: these are computed, too (`hysteretic_corners`). Where that does not succeed the two edges are
+the viscous ones do: these are computed, too. Where that does not succeed the two edges are
 not made of the same arcs, and the edge is that of the whole chart.
 
 Where the arcs of an edge meet when its curve of walls is replaced by a slightly different one.

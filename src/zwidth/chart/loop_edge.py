@@ -1,6 +1,6 @@
 """The edge of one loop's stable set: by compiled stages, and where these are in doubt by eigenvalues.
 
-Walls on it are judged as it is made (`edge_judgement`): some between its samples before its numbers are read, and
+Walls on it are judged as it is made (see below): some between its samples before its numbers are read, and
 all its points where they are drawn. Where one is none of the edge the curve is traced again, through that place.
 
 Whether each wall of an edge has its largest root on the circle: the edge is judged as it is made.

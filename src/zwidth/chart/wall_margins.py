@@ -355,7 +355,7 @@ def stiffness_with_margins_alone(
 
 
 def stiffness_with_chords(loops: list[Loop], a: float, b: float) -> tuple[float, float] | None:
-    """`stiffness_with_margins_alone` with edges as chords (`arc_kernels.CHORD`), where compiled stages are in
+    """`stiffness_with_margins_alone` with edges as chords (`tracer.CHORD`), where compiled stages are in
     doubt."""
     tracers = [Tracer(loop) for loop in loops]
     outlines = [TracedEdge(closed_rings(tracer)[0], {0: tracer}).outlines for tracer in tracers]

@@ -102,7 +102,7 @@ class ContactSimulation(Result):
 
     @property
     def behaviour(self) -> Behaviour | Literal["forced"]:
-        """Behaviour (see `motion_verdict.Judgement`); "forced" where the device only goes with the hand's tremor,
+        """Behaviour (see `time_response.Judgement`); "forced" where the device only goes with the hand's tremor,
         "growing" where it was gone before there was anything to judge."""
         judged, tremor = self.judgement, self.hand.tremor
         if self.response.given_up and judged.behaviour == "undecided":

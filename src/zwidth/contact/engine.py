@@ -4,7 +4,7 @@ At each sample the encoders are read, the velocity is estimated, the environment
 filtered, limited and queued; then the plant goes through the two parts of the interval, the first with the
 command of one sample more of delay. Linear parts are exact with any substep. A nonlinear part acts as its mean
 force over a substep, determined by the motion in that substep; the error is of second order in its length (see
-`elements`).
+`plant_step`).
 """
 
 from __future__ import annotations

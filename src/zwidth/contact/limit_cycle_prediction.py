@@ -29,7 +29,7 @@ class SimulatedVibration:
     """Vibration that a simulation ends in.
 
     start, duration  [m] from the middle of the vibration, [s]
-    behaviour        as in `motion_verdict.Judgement`
+    behaviour        as in `time_response.Judgement`
     amplitude        of the sensor's motion in the last quarter [m];   frequency  [Hz]
     """
 

@@ -145,7 +145,7 @@ class Observation:
     """Verdict on one wall, from the motion after a disturbance.
 
     stable     the motion died away inside the wall, or is too small to be seen
-    behaviour  as `motion_verdict` names it
+    behaviour  as `time_response` names it
     amplitude  of the handle in the end [m]
     frequency  dominant [Hz]; nan where nothing moves
     """

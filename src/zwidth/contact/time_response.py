@@ -1,4 +1,4 @@
-"""A run in time, and what it says: see `motion_verdict` for how it is judged.
+"""A run in time, and what it says: see `judge_response` for how it is judged.
 
 Verdict on a simulated motion: it decays, grows, is a limit cycle, bounces, or leaves the wall.
 

@@ -2,8 +2,6 @@
 
 These checks read the plain document and skip every value that is itself faulty, so that they run
 beside the checks of single keys and no fault hides another.
-
-What the keys of [arm] must agree on: names of links, angles of joints, masses, a way of holding.
 """
 
 from __future__ import annotations

@@ -1,11 +1,4 @@
-"""What two keys of the computer and of the motors' windings must agree on.
-
-What the keys of force sensor, feedforward and local loop must agree on, with each other and with the device.
-
-What the keys of [load] must agree on, with each other and with the device.
-
-Transmissions whose ratio changes with the joint: what their table, their joint and other keys must agree on.
-"""
+"""What keys of the computer, of fixed feedback, of windings, of [load] and of ratio tables must agree on."""
 
 from __future__ import annotations
 

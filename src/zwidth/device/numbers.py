@@ -2,10 +2,6 @@
 
 All of it is read off the schema and the file. Keys that the file leaves out are among them where the schema has a
 value that stands for "none", such as a delay of 0.
-
-Words for a number of a device file: its key without the unit, and where the file says that it comes from.
-
-Ranges of the numbers of a device file: what the schema allows, and the ends of a slider within it.
 """
 
 from __future__ import annotations

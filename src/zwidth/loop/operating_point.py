@@ -318,7 +318,7 @@ class OperatingPoint(PosedDevice):
 
         stiffness, damping  of the wanted wall, for measures about one [N/m], [N s/m]
         frequency           at which the hand moves [Hz]
-        spectral_radius ... colliding_links  what else some measures need, as in `measures.wanted.WantedWall`
+        spectral_radius ... colliding_links  what else some measures need, as in `measures.definition.WantedWall`
         """
         wanted = {name: value for name, value in locals().items() if name not in ("self", "measure")}
         return _verbs.measure(self, measure, wanted).about(self)

@@ -1,7 +1,4 @@
-"""Errors of operating points, and what several directions rendered together leave out.
-
-An operating point in words.
-"""
+"""An operating point in words: a line of its own, its errors, and what several directions together leave out."""
 
 from __future__ import annotations
 

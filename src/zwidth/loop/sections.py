@@ -1,8 +1,6 @@
 """The sampled plant as rows of second-order factors, without what no wall moves or no sensor reads.
 
-Rows of `loop.sections` for many plants at once, from their pairs of poles.
-
-The rows of one plant by the kernels that serve many.
+Those of many plants at once follow from their pairs of poles, and those of one by the same kernels.
 """
 
 from __future__ import annotations

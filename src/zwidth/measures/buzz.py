@@ -1,6 +1,4 @@
-"""The catalogue's measure of the vibration that friction, encoder steps or limits keep up at a wanted wall.
-
-The least vibration of the hand that is felt, by frequency.
+"""The vibration that friction, encoder steps or limits keep up at a wanted wall, and the least that is felt.
 
 On the skin of the hand, by contactors of 2.9 cm^2 and more, the threshold is flat up to 40 Hz, falls by 12 dB an
 octave to its least at about 250 Hz (Gescheider and Verrillo, in Sensory Functions of the Skin of Humans, 1979: the

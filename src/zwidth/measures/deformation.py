@@ -13,12 +13,8 @@ Moreyra and Hannaford (A practical measure of dynamic response of haptic devices
 ratio of this name. Their text could not be read: that it compares the motions at the two ends of the structure,
 over frequency, is known at second hand, and the formula is ours.
 
-The catalogue's measures of how a wanted wall feels, at operating points.
-
-See `measures.vibration_decay`, `measures.deformation` and `measures.handle_impedance` for the formulas. Stability
+Functions `..._at` are the catalogue's measures of an operating point at a wanted wall. Stability
 is that of the device with its operator; the felt impedance and the deformation are those of the device without.
-
-The catalogue's measure of the structure's vibration: the first flexible mode at operating points.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ of the joints' angles:
 singular posture, and for a planar mechanism with more than two drives. Other
 coordinates are, for instance, the motors' angles, or absolute angles of links in place of those between them.
 
-The catalogue's measures of the mechanism at operating points: see `measures.dexterity` for the formulas.
+Functions `..._at` are the catalogue's measures of an operating point.
 
 A mechanism has as many drives as directions its handle can move in, so that every singular value of its Jacobian
 counts: in a singular posture, too, and in whatever frame.

@@ -103,7 +103,7 @@ def measure_at(
     """Evaluate a measure, of the catalogue by its name or a user's own, at operating points.
 
     stiffness, damping, frequency  of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures about it
-    spectral_radius ... colliding_links  what else some measures need, as in `measures.wanted.WantedWall`
+    spectral_radius ... colliding_links  what else some measures need, as in `measures.definition.WantedWall`
     Raises  ValueError    for an unknown name
             MeasureError  where this device does not have the measure, or an argument that it needs is missing; the
                           text begins with its name

@@ -1,17 +1,12 @@
-"""What the hand feels of one rendered wall: the result.
+"""What the hand feels of one rendered wall: impedance over frequency, stiffness at rest, the chart over it.
 
-What the hand feels of a wall on a measured device: frequency by frequency from its measured paths.
-
-A hand force f e^{jwt} moves the encoder's samples by Y = G_eh f + P U, and the loop answers with U = -C Y, where
-C = K + B w(z), the force's filter and software's delay included. At the frequency itself the handle moves by
+On a measured device it follows frequency by frequency from the measured paths. A hand force f e^{jwt} moves the
+encoder's samples by Y = G_eh f + P U, and the loop answers with U = -C Y, where C = K + B w(z), the force's filter
+and software's delay included. At the frequency itself the handle moves by
 
     x_h = [G_hh - W G_ha C G_eh/(1 + P C)] f,        Z = f/(jw x_h)
 
 with all that was measured, and W G_ha as `loop.measured.measured_port` gives it.
-
-What the hand feels of one rendered wall: impedance over frequency, and stiffness at rest.
-
-The stability chart over the static stiffness that the hand feels, in place of the commanded one.
 """
 
 from __future__ import annotations

@@ -9,9 +9,8 @@ All are invariant to the base frame (with the direction turned alike), the order
 which a coordinate turns faster than another; lengths in other units give the same force, acceleration and step
 in these.
 
-The catalogue's measures of motors and encoders at operating points: formulas are in `measures.forces`.
-
-A number of a drive that the device file leaves out is not guessed: a MeasureError names it.
+Functions `..._at` are the catalogue's measures of an operating point. A number of a drive that the device file
+leaves out is not guessed: a MeasureError names it.
 """
 
 from __future__ import annotations

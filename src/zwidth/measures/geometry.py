@@ -2,7 +2,7 @@
 
 A link is taken for straight rods from its joint to the joints, loop closures and the handle that it carries.
 
-The catalogue's measures of the room that a mechanism needs and leaves: formulas are in `measures.geometry`.
+Functions `..._at` are the catalogue's measures of an operating point.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How the handle moves under the hand, of many devices at once and at many frequencies (see `handle_impedance`).
+"""What the hand feels of many devices at once and at many frequencies (see `handle_impedance`).
 
 With a wall C = K + B w(z) and the modes' responses between actuator a, sensor s and handle h, at s = jw,
 
@@ -7,11 +7,8 @@ With a wall C = K + B w(z) and the modes' responses between actuator a, sensor s
 which is `handle_impedance.felt_impedance` with the inverse of D + H C/(1 + S C) a s^T written out (Sherman and
 Morrison). P and w are those of the loops' kernels.
 
-The least value of a response in a band of frequencies, of many devices at once.
-
-The catalogue's measures of what the hand feels, at operating points: see `measures.handle_impedance`.
-
-Stability is that of the device with its operator; the felt impedance is that of the device without.
+Functions `..._at` are the catalogue's measures of an operating point. Stability is that of the device with its
+operator; the felt impedance is that of the device without.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Closed forms of the stable walls: largest stiffness, largest damping, stable area (thesis 5.2.1).
+"""Largest stiffness, largest damping and stable area of the stable walls: exact, with margins, and in closed form.
+
+Functions `..._at` are the catalogue's measures of an operating point, from the exact chart (with margins: see
+`chart.wall_margins`). Closed forms (thesis 5.2.1):
 
 Two models have closed forms, both without physical damping, the velocity being the backward difference of two
 readings, unfiltered:
@@ -11,12 +14,6 @@ only. Both are exact where their assumptions hold: no W = sqrt(k/m) T is too lar
 coefficient the scan has lost, is (12 - 16 ln 2) m^2/T^3; (5.7) is extended beyond W = pi; (5.8), damaged in the
 scan, is read with ln(1 + c). (4.46), the largest damping of all stable K, at K = -k, is not used: here it is that
 of K -> 0. The numbers below (4.32) in the thesis are a misprint: they are those without delay.
-
-The catalogue's measures of the stable walls, from the exact chart at operating points.
-
-The catalogue's measure of the stiffest wall with margins, at operating points: see `chart.wall_margins`.
-
-The catalogue's closed forms of the impedance range at operating points: see `measures.impedance_range`.
 
 As in the thesis's maps (Figs. 5.2, 5.3), damping is left out although the device is damped; the titles say so. A
 MeasureError is raised unless all other assumptions hold: the model is `rigid` or `motor-mass`, there is no
@@ -244,7 +241,7 @@ def _computed(
     alone: Callable[[OperatingPoint], float],
     none_stable: str = "",
 ) -> MeasureValues:
-    """A number of all points' charts, computed together (`chart.point_numbers`), and of a point in doubt, or of a
+    """A number of all points' charts, computed together (`chart.point_chart`), and of a point in doubt, or of a
     device whose modes are not in that form, by the chart of each alone.
 
     number       attribute of `ChartNumbers`

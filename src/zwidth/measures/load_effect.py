@@ -3,11 +3,9 @@
     relative change of the largest stiffness = (K_max under load - K_max without it) / K_max without it
 
 both in the posture that the device has under load. A motion that no wall moves without load grows or decays under
-one (`loop.sideways`); the fastest-growing one counts.
+one (`loop.loop`); the fastest-growing one counts.
 
-The catalogue's measures of what a load does to the stiffest wall and along the surface, one point at a time.
-
-See `measures.load_effect` for what is computed.
+Functions `..._at` are the catalogue's measures of an operating point.
 """
 
 from __future__ import annotations

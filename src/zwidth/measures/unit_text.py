@@ -1,7 +1,4 @@
-"""Units as texts and figures write them.
-
-Units of what is rendered about an axis: newtons become newton metres and metres radians.
-"""
+"""Units as texts and figures write them; about an axis newtons become newton metres and metres radians."""
 
 from __future__ import annotations
 

@@ -21,9 +21,8 @@ is B > K T/2 and a third root of at most rho: the rest follows. Where it is not 
 is larger and with another mass (`fastest_mass` finds it, for any model). The scan damages the last
 term under the root of (5.15) to "KZAL"; it is (K T)^2.
 
-The catalogue's measures of how fast vibration at a wanted wall decays, for many points together.
-
-See `measures.vibration_decay` for the formulas. Stability is that of the device with its operator.
+Functions `..._at` are the catalogue's measures of an operating point. Stability is that of the device with its
+operator.
 """
 
 from __future__ import annotations

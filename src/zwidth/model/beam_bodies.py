@@ -324,7 +324,7 @@ def carried_body(
     mechanism: Mechanism, link: int, beam: BeamProperties, planar: Floats | None = None
 ) -> tuple[float, Floats, Floats]:
     """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m^2] of what a link has beside a beam; arguments and
-    errors are those of `flexible_link`."""
+    errors are those of `flexible_body`."""
     links = mechanism.links
     mass, centre, inertia = (np.asarray(each)[link] for each in (links.mass, links.center_of_mass, links.inertia))
     L, m = beam.length, beam.mass_per_length * beam.length

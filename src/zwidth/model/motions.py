@@ -16,7 +16,7 @@ The last term is what the links' constraint forces do as they turn: f . J B2 = -
 closures' multipliers lambda, A^T lambda = J^T f on the joints that nobody drives. Left out, a loop under load
 has the stiffness of another mechanism.
 
-Flexible links (`flexible_link`) have elastic coordinates among the joint coordinates; theirs are the last. They
+Flexible links (`flexible_body`) have elastic coordinates among the joint coordinates; theirs are the last. They
 hang on closures, too: with N the elastic motions that leave drives and closures alone, u' = B (p', xi'), B =
 [B_rigid, N]. Of all bases N the natural modes are taken that the links have while the drives stand still, of a
 mass of 1 each, the slowest first. Other bases tell the same, but their mass matrix is singular to rounding where

@@ -63,7 +63,7 @@ class Plant:
     lagged_dampers     electrical damping and the like
     hysteresis (n, n)  imaginary part of the stiffness at positive frequencies, K (1 + i eta) for a loss factor eta
                        [N/m]; it describes steady vibration only, so that such a plant has no transition matrix
-                       (see `chart.hysteretic`); None: none
+                       (see `chart.hysteretic_response`); None: none
     nonlinear          friction, encoder steps and the like: what only `contact` knows of
     hand_force (3, n)  force of the operator on the handle per x'', x' and x, as he is in the matrices already;
                        None: nobody holds it

@@ -44,7 +44,7 @@ def sweep_response(
     """The response P of a sampled record, and the coherence that tells its error.
 
     By polynomials over the transform of the whole record (`local_polynomials`); of a record of more than two
-    million samples over those of blocks of a million (`summed_polynomials`). A device without a spring drifts; so
+    million samples over those of blocks of a million (`local_polynomials`). A device without a spring drifts; so
     the position is differenced first, once for each integrator (twice where their number is not known), and the
     result divided by (z - 1)^m again. Noise is taken to be at least that of the encoder's steps, q^2 / 12 in each
     reading, whatever the record shows: readings that follow the force alone hide it.
@@ -84,7 +84,7 @@ def sweep_response_of_blocks(
     segment: int | None = None,
 ) -> Response:
     """The response as by `sweep_response`, from blocks of force and position (n,), all of one length, which are
-    read one after the other and not kept: least squares over all of them (`summed_polynomials`).
+    read one after the other and not kept: least squares over all of them (`local_polynomials`).
 
     Raises  ResponseError  as `sweep_response` does
     """

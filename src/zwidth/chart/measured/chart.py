@@ -1,6 +1,7 @@
 """The stability chart of a measured device, without a model: boundary by its response, cells by counting roots.
 
-How far a fitted plant stands for a measured device: its misfit, and its largest stiffness beside the data's.
+Beside it, how far a fitted plant stands for a measured device: its misfit, and its largest stiffness beside the
+data's.
 """
 
 from __future__ import annotations
@@ -165,7 +166,7 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
 
         h = -1/P,   B = Im h / Im w,   K = Re h - B Re w          at every measured frequency
 
-    The stable cells are those without a root outside the unit circle (`root_count`). Assumed of the device:
+    The stable cells are those without a root outside the unit circle (`boundary`). Assumed of the device:
     without a wall it is stable but for its integrators.
 
     Where the error of the response is known, the largest stiffness is that of walls that are stable for every

@@ -1,11 +1,9 @@
-"""The cells that a measured boundary cuts a window of the plane into, and which of them are stable.
+"""Stable cells of a measured boundary in a window of the plane, their largest numbers, and the band in doubt.
 
-The largest stiffness and the largest damping of measured cells.
+Largest stiffness and damping: chords follow the curve to a share of the window, so that both are found in the
+whole of it first and then again in a small one of their own.
 
-Chords follow the curve to a share of the window, so that both are found in the whole of it first and then again in
-a small one of their own.
-
-The band along the stable walls' edge that the error of a measurement leaves in doubt.
+The band lies along the stable walls' edge, where the error of the measurement leaves walls in doubt.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The polygons say only which arcs follow each other round the common set. Where two arcs run closer to each other
 than chords follow them, polygons change from one to the other and back; such runs are left out if another
 member is unstable at their middle. Where one member's arc gives way to another's, the corner is
-solved for (`member_corner`).
+solved for.
 
 Where the arc of one member gives way to that of another.
 

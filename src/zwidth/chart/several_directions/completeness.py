@@ -82,7 +82,7 @@ def _is_one_law(equation: WallEquation) -> bool:
 
 
 def _moves_both(equation: WallEquation) -> bool:
-    """Whether both numbers move its roots; of one alone `one_number` finds the lines."""
+    """Whether both numbers move its roots; of one alone `curve_set` finds the lines."""
     return bool(equation.stiffness[0] > 0.0 and equation.damping[0] > 0.0)
 
 

@@ -1,7 +1,7 @@
 """All curves that cut the plane of walls of several directions: their samples, and how they run in a box.
 
 Of the equation of each set of coupled directions all walls are known at the sampled angles (`wall_equation`); they
-are joined to branches (`branches`), and points are added between them until chords follow (`curve_chords`).
+are joined to branches (`branches`), and points are added between them until chords follow.
 
 Branches with so many points that chords follow them.
 

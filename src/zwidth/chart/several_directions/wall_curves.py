@@ -1,6 +1,6 @@
 """What cuts the plane of walls of several directions: curves and lines of walls with a root on the circle.
 
-A part of the plane of walls.
+`Box` is a part of that plane.
 """
 
 from __future__ import annotations

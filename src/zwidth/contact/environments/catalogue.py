@@ -1,7 +1,4 @@
-"""The environments of this package by name.
-
-Finding an environment: one of ours by its name, or a user's in an own file.
-"""
+"""Environments by name: those of this package, or a user's in an own file."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""A wavy surface, felt by the force along it.
+"""Environments without a wall: what is felt while the device moves along a surface, or anywhere.
 
-Ridges and grooves with straight flanks, felt by the force along them.
-
-A patch that one rubs over: sticking by a spring whose anchor slips.
-
-A mass that is felt everywhere, by a filtered estimate of the acceleration.
+texture          a wavy surface, felt by the force along it
+grating          ridges and grooves with straight flanks, felt by the force along them
+friction_patch   a patch that one rubs over: sticking by a spring whose anchor slips
+virtual_mass     a mass that is felt everywhere, by a filtered estimate of the acceleration
 """
 
 from __future__ import annotations

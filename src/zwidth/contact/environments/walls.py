@@ -1,16 +1,12 @@
-"""The Kelvin-Voigt wall as one touches it: it acts inside only.
+"""Environments with a surface that pushes: one law each, as a compiled function with named parameters.
 
-The Kelvin-Voigt wall to both sides: the linear wall of all charts.
-
-The one-sided wall on which a hand leans: as one touches it about the haptic equilibrium.
-
-A wall whose spring hardens or softens with depth.
-
-Contact whose damping grows with depth, so that force neither jumps at the surface nor pulls at slow speeds.
-
-Two walls that face each other, with room between.
-
-A wall that is met by a proxy, which pulls the device along by a spring and a damper: the virtual coupling.
+wall             Kelvin-Voigt to both sides: the linear wall of all charts
+one_sided_wall   Kelvin-Voigt as one touches it: it acts inside only
+pressed_wall     the one-sided wall on which a hand leans, about the haptic equilibrium
+nonlinear_wall   its spring hardens or softens with depth
+hunt_crossley    its damping grows with depth: no jump of the force at the surface, no pull at slow speeds
+slot             two walls that face each other, with room between
+coupled_wall     met by a proxy, which pulls the device along by a spring and a damper: the virtual coupling
 """
 
 from __future__ import annotations

@@ -1,13 +1,9 @@
 """A device file from MJCF or URDF: reading, deciding what those leave open, checking and writing.
 
-Reading the text of a robot file, and telling MJCF from URDF.
-
-A loop file beside a URDF: what closes, and which joints are driven.
-
-The device file's tables, from a robot and what was decided about it.
-
-A device file as text: sections in the order of their documentation, numbers to their last digit, and
-comments.
+1. The text is read, MJCF told from URDF, and a loop file beside a URDF: what closes, which joints are driven.
+2. `decide` says what the file leaves open.
+3. Tables of a device file are made of the robot and what was decided.
+4. They are written as text: sections in the order of their documentation, numbers to their last digit, comments.
 """
 
 from __future__ import annotations

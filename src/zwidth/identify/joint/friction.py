@@ -1,8 +1,7 @@
 """Dry and viscous friction of one joint, from free, coasting or driven motion.
 
-A measured force beside the commanded one: how much of it acts, and how late.
-
-Effective mass or inertia of one joint, from driven motion.
+From driven motion the effective mass or inertia follows, too; beside a measured force, how much of the commanded
+one acts, and how late.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What one reading of the records shows: averaged spectra, levels, and where they are excited.
 
-Force that repeats: its period, and what the lines that it does not excite say of friction and backlash.
-
-Averaged spectra of long records, segment by segment, in a memory that does not grow with the record.
+Spectra are averaged segment by segment, in a memory that does not grow with the record. A force that repeats has a
+period; the lines that it does not excite tell of friction and backlash.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
 """Records of measurements: columns of numbers from a file or from arrays, read in pieces where they are long.
 
-Long records of slow motion, shortened by averaging rows that follow each other.
-
-A table's columns as numbers in a temporary file: written once, read often, in a memory that stays flat.
-
-Which columns a kind of measurement has, and what is wrong with those of a table.
+`Columns` are those that a kind of measurement has. A long table is read as text once and kept as numbers in a
+temporary file, so that memory stays flat; records of slow motion are shortened by averaging rows.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """The longest stretch of a record of a sweep without a gap, block by block, and what its checks want to know.
 
-Whether both parts of a sweep excite the same frequencies.
-
-Whether two parts of a record excite the same frequencies, so that one can be predicted from the other.
+Two parts of a record must excite the same frequencies for one to be predicted from the other.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The step of an adaptive window to the next reading, compiled apart: device files are read without numba.
-
-The step of Levant's differentiator to the next reading, compiled apart: device files are read without numba.
-"""
+"""The steps of nonlinear estimators to the next reading, compiled apart: device files are read without numba."""
 
 from __future__ import annotations
 

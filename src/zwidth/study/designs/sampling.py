@@ -160,7 +160,7 @@ class Sampling:
 
     A grid has every combination; the last axis changes fastest. A Latin hypercube of n designs divides each axis
     into n equal parts and has one design in each, at a random place in it: the parts of the axes are paired at
-    random, the same for the same seed (`latin_hypercube`). Of paired axes the n-th design has the n-th value of
+    random, the same for the same seed. Of paired axes the n-th design has the n-th value of
     each. Nothing grows with the number of designs of a grid or a hypercube.
 
     size    number of designs of the Latin hypercube; None: a grid, or paired axes

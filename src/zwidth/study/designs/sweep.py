@@ -146,13 +146,13 @@ def sweep(
 
     axes           path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly,
                    model, operator (names, files, "none"), and of the wanted wall stiffness_N_per_m,
-                   damping_Ns_per_m, frequency_Hz and the other numbers of `measures.wanted.WANTED_NUMBERS`
+                   damping_Ns_per_m, frequency_Hz and the other numbers of `measures.definition.WANTED_NUMBERS`
     measures       one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or
                    measures
     position, direction, assembly, model    of all designs, as for `Device.at`
     stiffness, damping, frequency           of the wanted wall [N/m], [N s/m], and of the hand [Hz], for measures
                                                 about them
-    spectral_radius ... colliding_links     what else some measures need, as in `measures.wanted.WantedWall`
+    spectral_radius ... colliding_links     what else some measures need, as in `measures.definition.WantedWall`
     paired         True: not every combination, but as many designs as each axis has values: the n-th design has
                    the n-th value of every axis, such as numbers drawn at random
     plane          the workspace, for measures over it (`study.workspace.plane_grid`); left out: 15 by 15 points of

@@ -303,7 +303,7 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
     """The robust chart of a family of a measured device.
 
     Of ranges, random members join one by one, the one first that runs deepest into the robust walls (see
-    `unseen_measured`), until none of them does; then as many others are tried.
+    `unseen_members`), until none of them does; then as many others are tried.
     """
     from zwidth.study.robust.family import MeasuredFamily, MeasuredMember, MeasuredMembers
     from zwidth.study.robust.unseen_members import (

@@ -4,7 +4,7 @@
 
 The stiffest wall is not searched again for each number: to first order it moves as the edge on which it lies
 (`optimum`). The device is built again with the number slightly larger and smaller, together for all numbers
-(`changed_devices`), and the motion of the edge is differenced (`derivative`).
+(`changed_devices`), and the motion of the edge is differenced (`changed_devices`).
 
 Sensitivities of a measured device: to delay, sampling period, filters and the operator's numbers.
 

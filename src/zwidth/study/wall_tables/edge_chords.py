@@ -40,7 +40,7 @@ AT_ONCE: Final = 256  # loops whose chords are in memory at full length
 K0, B0, K1, B1, SAG_K, SAG_B = range(6)
 # A chord between two samples lies an eighth of a second difference beside its curve; twice that is allowed.
 SAG: Final = 0.25
-RING_SAG: Final = 1e-6  # of a ring's extent: its chords stay this close to the edge (`chart.arc_kernels.CHORD`)
+RING_SAG: Final = 1e-6  # of a ring's extent: its chords stay this close to the edge (`chart.tracer.CHORD`)
 STRAIGHT: Final = 1e-12  # of a ring's extent: along chords that change less the edge does not
 
 

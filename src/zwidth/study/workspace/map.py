@@ -2,11 +2,9 @@
 
 The exact edge of the reachable set on a map's plane, where the links' lengths alone decide it.
 
-Every chain of links from the base to the handle allows a shell about its base (`model.reach_shells`). For many
+Every chain of links from the base to the handle allows a shell about its base (`model.posture_batch`). For many
 mechanisms whose joints all turn freely, the handle reaches every point that lies in all shells. That is checked
 against every cell of the map; where it holds, the edge consists of exact arcs of circles.
-
-A map's results as a document, and as a table.
 """
 
 from __future__ import annotations
