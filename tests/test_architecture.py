@@ -27,7 +27,6 @@ EVERYWHERE = {
     "arrays",
     "compiled",
     "compile_events",
-    "cuda_kernels",
     "processors",
     "progress",
     "machine_code",
@@ -40,7 +39,6 @@ EVERYWHERE = {
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
-MAY_IMPORT["cuda_kernels"] = {"tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["identify"].add("device")
 MAY_IMPORT["study"].add("device")

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from zwidth.conditions.comparison import BoundsComparison
     from zwidth.contact.contact_simulation import ContactSimulation
     from zwidth.contact.environments.environment import Environment
-    from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
     from zwidth.contact.mechanism.motion import MechanismMotion
     from zwidth.contact.mechanism.simulate_mechanism import SurfaceRendering
     from zwidth.contact.mechanism.surfaces import Surface
+    from zwidth.contact.wall_limit_cycles import LimitCyclePrediction
     from zwidth.device.device import Device
     from zwidth.device.load import Settings
     from zwidth.guarantees.guarantees import Guarantees

@@ -25,8 +25,8 @@ from numba import cuda, typeof, types
 
 from zwidth.chart import MOST_DEGREE, chart_cuda
 from zwidth.chart.chart_batch import empty_numbers
+from zwidth.chart.chart_cuda import rounding_each_step
 from zwidth.chart.edge_memory import MOST_SAMPLES, edge_memory
-from zwidth.cuda_kernels import rounding_each_step
 from zwidth.loop import Controller
 from zwidth.loop.loop_table import loop_table
 

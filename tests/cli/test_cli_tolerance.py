@@ -16,7 +16,7 @@ from scipy import stats
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from zwidth.measures import OK, UNDECIDED
 from zwidth.show import caption_of_result
-from zwidth.show.tolerance_text import wall_sentence
+from zwidth.show.cli.tolerance import wall_sentence
 from zwidth.study import run_tolerances
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tolerance.md").read_text(encoding="utf-8")

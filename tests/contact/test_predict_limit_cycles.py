@@ -20,8 +20,12 @@ from zwidth.contact import (
     quiet_limit,
     resting_limit,
 )
-from zwidth.contact.limit_cycle_prediction import answered_cycles
-from zwidth.contact.wall_limit_cycles import behaviour_at_the_end, largest_motion, predict_limit_cycles
+from zwidth.contact.wall_limit_cycles import (
+    answered_cycles,
+    behaviour_at_the_end,
+    largest_motion,
+    predict_limit_cycles,
+)
 from zwidth.loop import Controller, HysteresisError, OperatingPoint
 from zwidth.model import Brake, Counter, Friction, Nonlinear
 from zwidth.show import json_value

@@ -1,4 +1,4 @@
 from .assumptions import Bound as Bound
+from .comparison import compare as compare
 from .comparison import exact_stiffness_limit as exact_stiffness_limit
-from .registry import compare as compare
 from .spring_stability import spring_stable as spring_stable

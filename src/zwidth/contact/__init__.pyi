@@ -28,7 +28,6 @@ from .hand import Reflex as Reflex
 from .hand import Tremor as Tremor
 from .harmonic_balance import limit_cycles as limit_cycles
 from .harmonic_balance import with_harmonics as with_harmonics
-from .limit_cycle_prediction import LimitCyclePrediction as LimitCyclePrediction
 from .loop_simulation import Run as Run
 from .loop_simulation import simulate as simulate
 from .loop_simulation import simulate_batch as simulate_batch
@@ -60,6 +59,7 @@ from .touch_step import TouchNumbers as TouchNumbers
 from .touch_step import touch as touch
 from .touch_step import touch_obstacle as touch_obstacle
 from .touch_step import touch_periods as touch_periods
+from .wall_limit_cycles import LimitCyclePrediction as LimitCyclePrediction
 from .wall_limit_cycles import NoEncoderStepsError as NoEncoderStepsError
 from .wall_limit_cycles import NothingNonlinearError as NothingNonlinearError
 from .wall_limit_cycles import predict_limit_cycles as predict_limit_cycles

@@ -15,7 +15,7 @@ from .estimators import SavitzkyGolay as SavitzkyGolay
 from .estimators import WindowedDifference as WindowedDifference
 from .estimators.frequency_response import phase_delay as phase_delay
 from .estimators.frequency_response import relative_response as relative_response
-from .estimators.run_estimator import velocity_of as velocity_of
+from .estimators.kernels import velocity_of as velocity_of
 from .factor_response import feedforward_response as feedforward_response
 from .factor_response import rows_response as rows_response
 from .fixed_feedback import Feedforward as Feedforward

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from zwidth.contact.contact_simulation import ContactSimulation
     from zwidth.contact.environments.environment import Environment
     from zwidth.contact.hand import Reach, Reflex, Tremor
-    from zwidth.contact.limit_cycle_prediction import LimitCyclePrediction
     from zwidth.contact.mechanism.motion import MechanismMotion
     from zwidth.contact.mechanism.simulate_mechanism import SurfaceRendering
     from zwidth.contact.mechanism.surfaces import Surface
+    from zwidth.contact.wall_limit_cycles import LimitCyclePrediction
     from zwidth.guarantees.guarantees import Guarantees
     from zwidth.loop.measured.measured_port import MeasuredPort
     from zwidth.measures.definition import Measure, MeasureValues

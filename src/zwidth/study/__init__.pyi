@@ -25,8 +25,8 @@ from .designs.sweep import sweep as sweep
 from .designs.sweep_job import SweepJob as SweepJob
 from .designs.sweep_job import sweep_job as sweep_job
 from .jobs.executor import RecoveredWarning as RecoveredWarning
+from .jobs.executor import open_executor as open_executor
 from .jobs.executor import run as run
-from .jobs.executor_interface import open_executor as open_executor
 from .jobs.job import CellValues as CellValues
 from .jobs.journal import Journal as Journal
 from .jobs.journal import JournalError as JournalError

@@ -32,22 +32,20 @@ from zwidth.chart.measured.boundary import (
 from zwidth.chart.measured.doubt import Doubt, EdgeFrequencies, MeasuredVerdicts, doubt_of, judge_measured
 from zwidth.chart.measured.loop import MeasuredLoop, UnusableRange
 from zwidth.chart.measured.stable_regions import (
+    LINES,
     Band,
+    CertainWall,
     StableRegions,
     angles_at_wall,
     band_rings,
+    certain_wall,
+    damping_lines,
     has_stable_inner_side,
     largest_damping,
+    largest_possible,
     refine_peak,
     regions_within,
     window_of_regions,
-)
-from zwidth.chart.measured.stiffness_limits import (
-    LINES,
-    CertainWall,
-    certain_wall,
-    damping_lines,
-    largest_possible,
 )
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.loop.controller import Controller

@@ -201,8 +201,8 @@ WITHOUT_SAMPLES = (1e-5, 1e2)
 # Walls on each side of a cell's edge, how far from it in shares of the box, and over which share of it its
 # direction is taken.
 ALONG, OFF_EDGE, AHEAD = 60, 1e-3, 1e-4
-# Spectral radii this close to 1, and walls this close to an edge in shares of the box, are not compared.
-ON_CIRCLE, ON_EDGE = 1e-9, 3e-5
+# Walls this close to an edge, in shares of the box, are not compared, nor are radii within ON_CIRCLE of 1.
+ON_EDGE = 3e-5
 # Walls from which crossings are looked for, to how many others each, and how often the way is halved.
 FROM, TO, HALVINGS = 24, 6, 60
 # Angles about each crossing at which curves are sampled, in shares of it.

@@ -1,21 +1,31 @@
-"""What a robot file leaves open: which joints are driven and free, how joints are written, where the handle is."""
+"""What a robot file leaves open: which joints are driven and free, how joints are written, where the handle is.
+
+What can move in a mechanism: which joints are driven, which are free, and what of the handle the drives
+control.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
+from pydantic import ValidationError
 
 from zwidth.arrays import Floats
-from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
-from zwidth.device.robot_files import freedom
+from zwidth.device.build_mechanism import mechanism as build_mechanism
+from zwidth.device.faults import DeviceError, Fault, comma_list, dotted, fail, suggestion
+from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
-from zwidth.device.robot_files.freedom import Motions
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
+from zwidth.device.schema.mechanism import MechanismSection
+from zwidth.device.validation_messages import validation_messages
+from zwidth.model.handle_position import constraints, handle_goal
+from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.rotations import roll_pitch_yaw_of
 
 HANDLE_WORDS: Final = re.compile(
@@ -81,7 +91,7 @@ def decide(robot: Robot, choices: Choices) -> Decided:
         _check_loops(robot, motions)
         driven = motors if motors is not None else _assumed(robot, tree, motions)
         rows = [motions.rows(tree.link_of[motor.joint])[0] for motor in driven]
-        kept = [rows[k] for k in freedom.independent(motions.basis, [[row] for row in rows])]
+        kept = [rows[k] for k in independent(motions.basis, [[row] for row in rows])]
         changed = _set_free(robot, tree, motions, shape, kept, {motor.joint for motor in driven})
         if changed == shape:
             break
@@ -167,7 +177,7 @@ def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkT
         raise fail(robot.label, "", "has no joint that turns about one axis or slides, which a drive needs")
     links = [{key: value for key, value in link.items() if key != "free"} for link in tree.links]
     section = section_of(robot, tree, handle, "pose", [{"name": "drive", "joint": single}]) | {"links": links}
-    return tree, freedom.motions(section, robot.label)
+    return tree, mechanism_motions(section, robot.label)
 
 
 def section_of(
@@ -254,7 +264,7 @@ def _assumed(robot: Robot, tree: LinkTree, motions: Motions) -> list[Motor]:
         if joint.single and name in tree.link_of and name not in followers
     ]
     groups = [motions.rows(tree.link_of[name]) for name in singles]
-    return [Motor(singles[k], singles[k]) for k in freedom.independent(motions.basis, groups)]
+    return [Motor(singles[k], singles[k]) for k in independent(motions.basis, groups)]
 
 
 def _set_free(
@@ -265,7 +275,7 @@ def _set_free(
     Where a joint of several coordinates is neither free nor determined as a whole, it is split, and all is asked
     anew.
     """
-    left = freedom.left_over(motions.basis, driven)
+    left = left_over(motions.basis, driven)
     free: set[str] = set()
     turned = dict(shape.turned)
     looped = _looped(robot)
@@ -283,7 +293,7 @@ def _set_free(
             if name not in free
             and not joint.single
             and body not in looped
-            and freedom.independent(left, [motions.rows(tree.link_of[name])])
+            and independent(left, [motions.rows(tree.link_of[name])])
         ]
         spin = next(
             (name for name in joints if name not in free and _spins(motions, tree, joints, name, left)), None
@@ -291,7 +301,7 @@ def _set_free(
         singles = [name for name in sizes if len(motions.rows(tree.link_of[name])) == 1 and sizes[name] > MOVES]
         if whole:
             free.add(whole[0])
-            left = freedom.left_over(left, motions.rows(tree.link_of[whole[0]]))
+            left = left_over(left, motions.rows(tree.link_of[whole[0]]))
         elif spin:
             body, rows = joints[spin][0], motions.rows(tree.link_of[spin])
             axis = _only_direction(left[rows])
@@ -303,7 +313,7 @@ def _set_free(
             sprung = [name for name in singles if name in joints and joints[name][1].stiffness > 0.0]
             largest = max(sprung or singles, key=lambda name: sizes[name])
             free.add(largest)
-            left = freedom.left_over(left, motions.rows(tree.link_of[largest]))
+            left = left_over(left, motions.rows(tree.link_of[largest]))
         else:
             name = max(sizes, key=lambda name: sizes[name])
             return replace(shape, split=shape.split | {name})
@@ -328,7 +338,7 @@ def _spins(motions: Motions, tree: LinkTree, joints: dict[str, Any], name: str, 
     if joints[name][1].kind != "spherical" or name not in tree.link_of:
         return False
     resting = [row for row, entry in enumerate(motions.entries) if len(motions.rows(entry.partition("/")[0])) == 1]
-    turning = freedom.left_over(left, resting)
+    turning = left_over(left, resting)
     if not turning.shape[1]:
         return False
     values = np.linalg.svd(turning[motions.rows(tree.link_of[name])], compute_uv=False)
@@ -370,19 +380,19 @@ def _controls(
     if not kept:
         raise fail(robot.label, "", _nothing_moves(robot, motions))
     free = [row for name in sorted(shape.free) for row in _free_rows(robot, tree, motions, name)]
-    each = [freedom.handle_motions(place, kept, free) for place in motions.places]
-    found = [controls for H in each if (controls := freedom.controls_of(H))]
+    each = [handle_motions(place, kept, free) for place in motions.places]
+    found = [controls for H in each if (controls := controls_of(H))]
     if not found:
         raise fail(robot.label, "", _not_controlled(motions, tree, driven, kept, each))
     controls = min(found, key=("position", "orientation", "pose").index)
     parts = {"position": slice(0, 3), "orientation": slice(3, 6), "pose": slice(0, 6)}
     if wanted is not None:
-        if not any(freedom.controlled(H[parts[wanted]]) for H in each):
+        if not any(controlled(H[parts[wanted]]) for H in each):
             raise fail(
                 robot.label, "controls", f"cannot be {wanted}: it leaves drives open; it can be {controls} or pose"
             )
         controls = wanted
-    if not freedom.controlled(each[0][parts[controls]]):
+    if not controlled(each[0][parts[controls]]):
         robot.warn(
             "mechanism.reference",
             "the posture of the file is singular: its drives cannot move the handle every way. Give another with "
@@ -413,7 +423,7 @@ def _not_controlled(
     motions: Motions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
 ) -> str:
     names = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
-    resting = set.intersection(*(set(freedom.idle(H)) for H in each))
+    resting = set.intersection(*(set(idle(H)) for H in each))
     idle = [names[kept[k]].joint for k in sorted(resting)]
     if idle:
         return (
@@ -427,3 +437,144 @@ def _not_controlled(
         f"asked by the handle, which must tell all of them. Hold {len(kept) - rank} of them still with "
         f"fix={joints[-1]} or another"
     )
+
+
+REGULAR: Final = 1e-6  # least singular value over the largest, of a handle that its drives control
+NEGLIGIBLE: Final = 1e-9  # share of a handle's largest motion, below which a joint does not move it
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """The motions of a mechanism where it stands with its loops closed.
+
+    basis    (m, f) what the loops leave, scaled to [rad] and sizes of the mechanism
+    handle   (6, m) motions of the handle by each coordinate: its position, then its turning, scaled alike
+    """
+
+    basis: Floats
+    handle: Floats
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What a mechanism can do.
+
+    entries  name of what each of the m joint coordinates moves: its link's, of a joint of several coordinates with
+             a number behind it for all but the last
+    places   the reference posture, then postures nearby: the reference may be special
+    angles   (n,) joint coordinates with closed loops;   gaps  (k,) that remain [m];   size  of the mechanism [m]
+    goal     (6,) position of the handle [m], rotation vector of its axes [rad]
+    """
+
+    mechanism: Mechanism
+    entries: list[str]
+    places: list[Configuration]
+    angles: Floats
+    gaps: Floats
+    size: float
+    goal: Floats
+
+    @property
+    def basis(self) -> Floats:
+        """The motions (m, f) where the loops leave the fewest."""
+        return min((place.basis for place in self.places), key=lambda basis: basis.shape[1])
+
+    def rows(self, link: str) -> list[int]:
+        """The coordinates of a link's joint."""
+        own = {link, *(f"{link}/{k}" for k in range(1, 6))}
+        return sorted((u for u, name in enumerate(self.entries) if name in own), key=lambda u: self.order[u])
+
+    @property
+    def order(self) -> list[int]:
+        """The number of each coordinate's entry among those of its joint; the last has the largest."""
+        numbers = (name.partition("/")[2] for name in self.entries)
+        return [int(number) if number else 6 for number in numbers]
+
+    @property
+    def open_loops(self) -> list[int]:
+        """Indices of the loops that do not close."""
+        return [k for k, gap in enumerate(self.gaps) if gap > CLOSED * self.size]
+
+
+def mechanism_motions(section: dict[str, Any], label: str) -> Motions:
+    """The motions of a draft of [mechanism] whose handle is given by its pose, whichever joints the draft says are
+    driven or free.
+
+    Raises DeviceError  for numbers that a device file does not allow
+    """
+    try:
+        checked = MechanismSection.model_validate(section)
+    except ValidationError as error:
+        document = {"mechanism": section}
+        faults = [
+            Fault(label, dotted(("mechanism", *path), document), message)
+            for path, message in validation_messages(error, section)
+        ]
+        raise DeviceError(faults) from None
+    mechanism = build_mechanism(checked)
+    mech = pack(mechanism)
+    angles, gaps = close_loops(mechanism, mech)
+    names = [mechanism.links.names[i] for i in mech.joint]
+    places = [_configuration(mech, place) for place in closed_nearby(mech, angles)]
+    size = float(mech.size[0])
+    return Motions(mechanism, names, places, angles, gaps, size, handle_goal(mech, 0, angles))
+
+
+def _configuration(mech: MechanismArrays, angles: Floats) -> Configuration:
+    loops = int(mech.first_row[-1])
+    rows = constraints(mech, 0, angles, np.zeros(6))[0] * mech.unit[0][:, None]
+    return Configuration(null_space(rows[:, :loops].T), np.asarray(rows[:, loops : loops + 6].T))
+
+
+def independent(basis: Floats, groups: Iterable[Sequence[int]], kept: Sequence[int] = ()) -> list[int]:
+    """Which groups of rows of a basis, each with those before it, are independent of the rows kept so far."""
+    chosen, rows = [], list(kept)
+    for k, group in enumerate(groups):
+        if _rank(basis[[*rows, *group]]) == len(rows) + len(group):
+            chosen.append(k)
+            rows += group
+    return chosen
+
+
+def left_over(basis: Floats, rows: Sequence[int]) -> Floats:
+    """The motions (m, f') in which these coordinates rest."""
+    if not rows or not basis.size:
+        return basis
+    _, values, right = np.linalg.svd(basis[list(rows)])
+    rank = int(np.sum(values > INDEPENDENT * values[0])) if values.size and values[0] > 0.0 else 0
+    return np.asarray(basis @ right[rank:].T)
+
+
+def _rank(rows: Floats) -> int:
+    values = np.linalg.svd(rows, compute_uv=False)
+    return int(np.sum(values > INDEPENDENT * max(values[0], np.finfo(float).tiny))) if values.size else 0
+
+
+def handle_motions(place: Configuration, driven: Sequence[int], free: Sequence[int]) -> Floats:
+    """Motions of the handle by each driven coordinate while the free ones rest, (6, d)."""
+    rows = [*driven, *free]
+    rates = np.linalg.lstsq(place.basis[rows], np.eye(len(rows)), rcond=None)[0]
+    return np.asarray(place.handle @ place.basis @ rates)[:, : len(driven)]
+
+
+def controls_of(H: Floats) -> str | None:
+    """The least of the handle whose motions tell those of all drives: "position", "orientation" or "pose"; None:
+    some drive moves while the handle rests."""
+    for controls, part in (("position", H[:3]), ("orientation", H[3:]), ("pose", H)):
+        if controlled(part):
+            return controls
+    return None
+
+
+def controlled(part: Floats) -> bool:
+    """Whether motions of the handle (r, d) tell those of all drives."""
+    values = np.linalg.svd(part, compute_uv=False)
+    return len(values) == part.shape[1] and bool(values[-1] > REGULAR * max(values[0], np.finfo(float).tiny))
+
+
+def idle(H: Floats) -> list[int]:
+    """The drives that do not move the handle at all."""
+    sizes = np.abs(H).max(axis=0)
+    return [
+        int(k) for k in np.flatnonzero(sizes <= NEGLIGIBLE * max(sizes.max(initial=0.0), np.finfo(float).tiny))
+    ]

@@ -6,7 +6,7 @@ the position [1/s]. All lengths are in metres, all times in seconds. Their frequ
 `zwidth.loop.estimators.frequency_response`.
 
 Two methods are not linear, `Foaw` and `Levant`: they have no w(z), `estimator` raises NonlinearError, and a loop
-with them is simulated instead. `zwidth.loop.estimators.run_estimator` runs any method over recorded positions.
+with them is simulated instead. `zwidth.loop.estimators.kernels` runs any method over recorded positions.
 """
 
 from zwidth.loop.estimators.alpha_beta import AlphaBeta

@@ -48,7 +48,7 @@ class Foaw:
     Raises          ValueError      otherwise
                     NonlinearError  from `estimator`: it has no w(z)
 
-    >>> from zwidth.loop.estimators.run_estimator import velocity_of
+    >>> from zwidth.loop.estimators.kernels import velocity_of
     >>> (velocity_of(Foaw(4, 0.5e-6), [0.0, 0.0, 1e-6, 1e-6, 2e-6, 2e-6], 0.001) * 1e3).round(3)
     array([0.   , 0.   , 0.5  , 0.333, 0.5  , 0.5  ])
     """

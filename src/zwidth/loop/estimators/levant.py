@@ -46,7 +46,7 @@ class Levant:
     Raises            ValueError      unless it is positive and finite
                       NonlinearError  from `estimator`: it has no w(z)
 
-    >>> from zwidth.loop.estimators.run_estimator import velocity_of
+    >>> from zwidth.loop.estimators.kernels import velocity_of
     >>> velocity_of(Levant(50.0), [0.0, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4], 0.001).round(4)
     array([0.   , 0.055, 0.11 , 0.1  , 0.1  , 0.1  ])
     """

@@ -91,7 +91,7 @@ def compile_environments() -> None:
 def run_estimators() -> None:
     """Velocity estimates of recorded positions and single modes, from Python only; modes with fixed feedback."""
     from zwidth.loop.estimators import BackwardDifference, Foaw, Levant
-    from zwidth.loop.estimators.run_estimator import velocity_of
+    from zwidth.loop.estimators.kernels import velocity_of
     from zwidth.loop.hold import modal_row, mode_growth
 
     for method in (BackwardDifference(), Foaw(4, 1e-6), Levant(10.0)):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from zwidth.contact.friction_quantisation_plane import DevicePlane
     from zwidth.contact.harmonic_balance import LimitCycle
-    from zwidth.contact.limit_cycle_prediction import (
+    from zwidth.contact.wall_limit_cycles import (
         LimitCycleAnswer,
         LimitCyclePrediction,
         SimulatedVibration,
@@ -193,7 +193,7 @@ def _headings(prediction: LimitCyclePrediction) -> list[str]:
 
 
 def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
-    from zwidth.contact.limit_cycle_prediction import cycle_speed
+    from zwidth.contact.wall_limit_cycles import cycle_speed
 
     for answer in prediction.answers:
         cycle = answer.cycle

@@ -1,8 +1,11 @@
-"""`zwidth tolerance`: a device as it is produced, every number somewhere within its tolerance."""
+"""`zwidth tolerance`: a device as it is produced, every number somewhere within its tolerance.
+
+What a study of tolerances found, in sentences.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, wraps
 from typing import TYPE_CHECKING, Any, Final
@@ -18,26 +21,19 @@ from zwidth.show.cli.options import Question, refuse_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import circumstances_of_study
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
-from zwidth.show.tolerance_text import (
-    advice_sentence,
-    band_rows,
-    cut_sentences,
-    index_rows,
-    narrower_rows,
-    no_index_sentences,
-    outcome_sentences,
-    tolerance_text,
-    wall_sentence,
-)
-from zwidth.show.units import amount, printed
+from zwidth.show.units import amount, number, percent, printed, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.device.device import Device
-    from zwidth.study.tolerances.outcomes import MeasureQuantiles
+    from zwidth.study.tolerances.band import BandWall
+    from zwidth.study.tolerances.distribution import Tolerance
+    from zwidth.study.tolerances.intervals import Interval
+    from zwidth.study.tolerances.outcomes import Index, Indices, MeasureQuantiles
     from zwidth.study.tolerances.question import ToleranceQuestion
     from zwidth.study.tolerances.result import ToleranceStudy
+
 
 PROGRESS: Final = ".progress"  # ending of the folder that keeps finished work beside a file that is written
 
@@ -216,3 +212,213 @@ def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:
         )
     partly = "" if one.devices == drawn else f" (of {one.devices} devices with a value)"
     return [f"{one.name}{partly}", *texts]
+
+
+UNDECIDED: Final = "undecided"  # an outcome
+MUCH_CUT: Final = 0.01  # share of a distribution that is cut off, and said to be
+
+WORDS = {
+    "failed": "could not be built",
+    "out of reach": "do not get to the handle's position",
+    "singular": "are singular there",
+    "no value": "have no value",
+}
+
+
+def share_text(share: Interval) -> str:
+    """A share with its interval: 93.20 % (91.46 to 94.68 %)."""
+    low, high = number(100.0 * share.low), number(100.0 * share.high)
+    return typed(f"{percent(share.value)} ({low} to {high} %)")
+
+
+def tolerance_text(one: Tolerance) -> str:
+    """How a number differs, in words: normal about 0.1 kg, standard deviation 0.005 kg."""
+    law = one.distribution
+    if law.kind in ("uniform", "triangular"):
+        ends = f"{_written(law.low)} to {_written(law.high)}"
+        return f"{law.kind}, {ends}{f' {one.unit}' if one.unit else ''}"
+    unit = f" {one.unit}" if one.unit else ""
+    width = f"standard deviation {_written(law.spread)}{unit}"
+    if law.kind == "lognormal":
+        width = f"standard deviation {_written(100.0 * law.spread)} % of it"
+    ends = f"cut off below {_written(law.low)} and above {_written(law.high)}"
+    return f"{law.kind} about {_written(law.middle)}{unit}, {width}, {ends} ({_written(100.0 * law.cut_off)} %)"
+
+
+def _written(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def cut_sentences(tolerances: Sequence[Tolerance]) -> Iterator[str]:
+    """Which distributions lose so much by being cut off that what is drawn differs from what was given."""
+    for one in tolerances:
+        law = one.distribution
+        if law.cut_off > MUCH_CUT:
+            mean, deviation = law.moments
+            unit = f" {one.unit}" if one.unit else ""
+            yield (
+                f"{one.key}: {typed(percent(law.cut_off))} of its distribution is cut off; what is drawn has a "
+                f"mean of {mean:.3g}{unit} and a standard deviation of {deviation:.3g}{unit}"
+            )
+
+
+def wall_sentence(result: ToleranceStudy) -> str:
+    """The probability of the wanted wall; or what to give for it."""
+    share, wall = result.probability, result.question.study.wall
+    if share is None:
+        return (
+            "no wall is wanted: give stiffness_N_per_m and damping_Ns_per_m for the probability that it is stable"
+        )
+    shown = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    if result.undecided:
+        return _undecided_sentence(result, shown, share)
+    if share.value == 1.0:
+        least = typed(percent(share.low))
+        return f"the wall {shown} is stable in all of them, so in at least {least} of all that are produced"
+    if share.value == 0.0:
+        most = typed(percent(share.high))
+        return f"the wall {shown} is stable in none of them, so in at most {most} of all that are produced"
+    return f"the wall {shown} is stable in {share_text(share)} of those that are produced"
+
+
+def _undecided_sentence(result: ToleranceStudy, shown: str, share: Interval) -> str:
+    """The sentence of a wall that lies on the stability limit of some devices, as far as rounding tells."""
+    from zwidth.study.tolerances.outcomes import STABLE
+
+    count, many = result.question.samples, result.undecided
+    within = "within rounding of the stability limit"
+    if many == count:
+        return f"the wall {shown} is undecided in all of them, {within}: its probability is not known"
+    stable = result.outcomes.get(STABLE, 0)
+    known = f"stable in {stable or 'none'} of {count} devices and undecided in {many}, {within}"
+    low, high = typed(percent(share.low)), typed(percent(share.high))
+    between = f"{typed(number(100.0 * share.low))} to {high}" if stable else f"at most {high}"
+    part = f"at least {low}" if share.high == 1.0 else between
+    return f"the wall {shown} is {known}: in {part} of those that are produced"
+
+
+def outcome_sentences(result: ToleranceStudy) -> Iterator[str]:
+    """Devices that are neither stable nor unstable, and those without any stable wall."""
+    count = result.question.samples
+    if result.undecided and not result.question.has_wall:  # of a wall its own sentence tells it
+        charts = f"{result.undecided} of {count} devices have a chart that rounding leaves undecided"
+        yield f"{charts}; they are left out of the largest stiffness"
+    for name, many in result.outcomes.items():
+        if name in WORDS or name in result.without_answer:
+            what = WORDS.get(name, f"have the status {name}")
+            yield f"{many} of {count} devices {what}; they count as not stable"
+    if result.without_stable_wall:
+        none = f"{result.without_stable_wall} of {count} devices have no stable wall with K > 0 and B >= 0"
+        yield f"{none}: their largest stiffness counts as 0"
+    if result.uncharted:
+        yield f"{result.uncharted} of {count} devices have no chart; in its bands they count as not stable"
+    yield from (f"  {printable(reason)}" for reason in result.reasons[:3])
+
+
+def band_rows(result: ToleranceStudy) -> Iterator[list[str]]:
+    """Of each band its share, the stiffest wall and a more cautious one, with the further devices that have it."""
+    for band in result.bands:
+        walls = [_tried(band.stiffest)]
+        # nobody promises what most devices do not render
+        walls.append(_tried(band.certain) if band.probability >= 0.5 else "")
+        yield [typed(percent(band.probability)), *walls]
+
+
+def _tried(wall: BandWall | None) -> str:
+    if wall is None:
+        return "none"
+    place = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    return place if wall.share is None else f"{place}; {share_text(wall.share)} of {wall.unseen} further ones"
+
+
+def index_rows(outcomes: Sequence[Indices]) -> Iterator[list[str]]:
+    """Of each tolerance its part in the spread of each outcome: the total index with its interval.
+
+    outcomes  those that have indices
+    """
+    for each in zip(*(one.indices for one in outcomes), strict=True):
+        yield [each[0].key, *map(_part, each)]
+
+
+def _part(one: Index) -> str:
+    low, high = number(100.0 * one.total.low), number(100.0 * one.total.high)
+    if not one.total_is_certain:
+        return typed(f"0, as far as can be told ({low} to {high} %)")
+    return typed(f"{percent(one.total.value)} ({low} to {high} %)")
+
+
+def narrower_rows(result: ToleranceStudy) -> Iterator[list[str]]:
+    """Of each tolerance, half as wide, the share of devices with the wall, and the gain."""
+    for one in result.tightened:
+        gain = _gain(one.gain)
+        yield [one.key, share_text(one.share), gain if one.is_certain else f"0, as far as can be told: {gain}"]
+
+
+def no_index_sentences(result: ToleranceStudy) -> Iterator[str]:
+    """Which outcomes have no index, and why."""
+    for one in result.indices:
+        if not one.indices:
+            yield f"no index of {one.name}: {one.reason}"
+
+
+def advice_sentence(result: ToleranceStudy) -> str:
+    """Which tolerance to tighten first, and what for."""
+    share = result.probability
+    if share is None:
+        return _advice_without_wall(result)
+    if not result.tightened:
+        return (
+            f"every one of {result.question.samples} devices renders the wall: nothing is to be tightened for it"
+        )
+    best = result.best_to_tighten
+    if not best and (result.undecided or result.middle == UNDECIDED):
+        return (
+            "which tolerance to tighten first is not known, for the wall lies on the stability limit: want one "
+            "that lies away from it"
+        )
+    if not result.middle_is_stable:
+        return (
+            f"no narrower tolerance helps this wall, for {_middle_text(result)}: tightening leads there; change "
+            "the design, or want less of the wall"
+        )
+    if not best:
+        return f"{result.question.samples} devices do not tell that half of any tolerance would help; draw more"
+    first = best[0]
+    change = f"{typed(percent(share.value))} to {share_text(first.share)}, by {_gain(first.gain)}"
+    words = f"half its tolerance raises {change}"
+    if len(best) == 1:
+        return f"tighten {first.key} first: {words}"
+    others = " or ".join(one.key for one in best[1:])
+    return (
+        f"tighten {first.key} first, or {others}, which so many devices do not tell apart: of {first.key} {words}"
+    )
+
+
+def _middle_text(result: ToleranceStudy) -> str:
+    """What the device in the middle of the tolerances is, if it does not render the wall."""
+    from zwidth.study.tolerances.outcomes import UNSTABLE, WITHOUT_WALL
+
+    if result.middle == UNSTABLE:
+        return "it is unstable in the middle of the tolerances"
+    what = "has no stable wall" if result.middle == WITHOUT_WALL else f"is {result.middle or 'not known'}"
+    return f"the device in the middle of the tolerances {what}"
+
+
+def _gain(gain: Interval) -> str:
+    """A gain in percentage points, with its interval."""
+    value, low, high = (number(100.0 * one) for one in (gain.value, gain.low, gain.high))
+    return typed(f"{value} percentage points ({low} to {high})")
+
+
+def _advice_without_wall(result: ToleranceStudy) -> str:
+    if not result.middle_is_stable:
+        return f"which tolerance to tighten first is not known, for {_middle_text(result)}"
+    outcome = next((one for one in result.indices if one.name == "stiffness_max" and one.indices), None)
+    certain = [one for one in outcome.indices if one.total_is_certain] if outcome is not None else []
+    if not certain:
+        return "which tolerance to tighten first is not known"
+    first = max(certain, key=lambda one: one.total.value)
+    rivals = [one.key for one in certain if one is not first and one.total.high >= first.total.low]
+    part = f"it has a part in {typed(percent(first.total.value))} of the spread of stiffness_max"
+    words = f"tighten {first.key} first: {part}"
+    return f"{words}; {' and '.join(rivals)} cannot be told from it" if rivals else words

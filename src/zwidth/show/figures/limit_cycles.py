@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from zwidth.arrays import Floats
 from zwidth.contact.friction_quantisation_plane import DevicePlane
 from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle
-from zwidth.contact.limit_cycle_prediction import LimitCycleAnswer, LimitCyclePrediction
+from zwidth.contact.wall_limit_cycles import LimitCycleAnswer, LimitCyclePrediction
 from zwidth.show.figures.style import BLACK, BLUE, GREY, STABLE, VERMILION, legend_above, number_logarithmic
 from zwidth.show.units import as_written, quantity
 

@@ -32,8 +32,7 @@ from zwidth.study.designs.sweep_data import (
     sweep_table,
 )
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.executor_interface import Executor
+from zwidth.study.jobs.executor import Executor, run
 from zwidth.study.jobs.job import Cells
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.plane_grid import PlaneGrid

@@ -26,8 +26,7 @@ from typing import Final
 from zwidth._version import __version__
 from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.progress import Progress
-from zwidth.study.jobs.executor import SMALL, run
-from zwidth.study.jobs.executor_interface import Executor, open_executor
+from zwidth.study.jobs.executor import SMALL, Executor, open_executor, run
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import FILE as LOCK

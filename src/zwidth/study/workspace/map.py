@@ -46,8 +46,7 @@ from zwidth.model.posture_batch import shells
 from zwidth.processors import Processor
 from zwidth.progress import Progress
 from zwidth.study.designs.column import measure_list, over_the_workspace, positions, unit_attributes
-from zwidth.study.jobs.executor import run
-from zwidth.study.jobs.executor_interface import Executor
+from zwidth.study.jobs.executor import Executor, run
 from zwidth.study.jobs.job import Cells, CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import Store, store_for
