@@ -25,10 +25,10 @@ import numpy as np
 from gallery import five_bar_designs
 from gallery.five_bar import bundled
 from gallery.shared_loops import write_page
-from zwidth.device import Device, DeviceError
+from zwidth.device import Device
 from zwidth.device.load import load
+from zwidth.errors import DeviceError, PostureError
 from zwidth.measures import rigid_range, sprung_range
-from zwidth.model import PostureError
 
 Y = five_bar_designs.REFERENCE[1]
 REACH = float(

@@ -27,6 +27,7 @@ EVERYWHERE = {
     "arrays",
     "compiled",
     "compile_events",
+    "errors",
     "processors",
     "progress",
     "machine_code",
@@ -38,6 +39,7 @@ EVERYWHERE = {
 }
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
+MAY_IMPORT["memory_limit"] = MAY_IMPORT["processors"] = {"errors"}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["identify"].add("device")

@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 from typing import Final
 
+from zwidth.errors import TooLarge
+
 SHARE: Final = 0.5  # of the machine's memory
 UNKNOWN: Final = 4e9  # bytes of memory assumed where the system does not state them
-
-
-class TooLarge(ValueError):
-    """A result that would not fit into memory."""
 
 
 def check_memory(numbers: float, what: str, advice: str) -> None:

@@ -5,41 +5,18 @@ What the second needs is looked for when it is asked for; nothing of numba is im
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib.util import find_spec
 from typing import Final, Literal, get_args
 
+from zwidth.errors import ProcessorError
+
 Processor = Literal["cpu", "cuda"]
 PROCESSORS: Final[tuple[Processor, ...]] = get_args(Processor)
 LEAST_CAPABILITY: Final = (7, 5)  # the oldest that CUDA 13 compiles for
 _USED: Final[ContextVar[Processor]] = ContextVar("processor", default="cpu")
-
-
-class ProcessorError(ValueError):
-    """This computer cannot compute on a GPU.
-
-    reason  what is missing
-    advice  what would help; "": another computer
-    """
-
-    def __init__(self, reason: str, advice: str = "") -> None:
-        super().__init__(reason, advice)
-        self.reason, self.advice = reason, advice
-
-    def __str__(self) -> str:
-        return self.spelled(lambda name, value: name if value is None else f"{name}={value!r}")
-
-    def spelled(self, spelling: Callable[[str, str | None], str]) -> str:
-        """The message, with the argument spelled as in Python or as an option.
-
-        >>> str(ProcessorError("needs a GPU"))
-        "processor='cuda' needs a GPU; leave processor out to compute without one"
-        """
-        instead = f"leave {spelling('processor', None)} out to compute without one"
-        advice = f"{self.advice}, or {instead}" if self.advice else instead
-        return f"{spelling('processor', 'cuda')} {self.reason}; {advice}"
 
 
 @contextmanager

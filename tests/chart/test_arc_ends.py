@@ -5,7 +5,8 @@ import pytest
 
 from tests.chart.test_chart_against_eigenvalues import DAMPED
 from tests.systems import FEATURES, RATIOS, random_loop
-from zwidth.chart import ChartError, stability_chart
+from zwidth.chart import stability_chart
+from zwidth.errors import ChartError
 
 KINDS = ("chain", "dense", "coupled", "apart")
 # Farthest that double precision can tell the two roots of a double one apart from one, by several roundings

@@ -11,7 +11,8 @@ from zwidth.chart.chart_batch import STIFFEST, ChartNumbers, chart_numbers
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
 from zwidth.chart.roots import real_root
 from zwidth.compiled import compiled
-from zwidth.loop import Controller, Loop, OperatingPoint, UnmovedError, table_of_loops
+from zwidth.errors import UnmovedError
+from zwidth.loop import Controller, Loop, OperatingPoint, table_of_loops
 from zwidth.model import Plant
 
 # Link-side and motor-side mass, spring, damper, sampling period, delay in samples, and the largest stiffness: by

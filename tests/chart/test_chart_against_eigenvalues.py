@@ -7,8 +7,9 @@ import pytest
 import shapely
 
 from tests.systems import mass, random_loop, reference_transition_matrix, two_mass
-from zwidth.chart import ChartError, boundary_points, stability_chart, work_array
+from zwidth.chart import boundary_points, stability_chart, work_array
 from zwidth.chart.hurwitz import QUOTIENT, hurwitz
+from zwidth.errors import ChartError
 from zwidth.loop import Butterworth, CentralDifference, Controller, FirstOrder, Loop
 
 # Damping of real structures; loops with undamped modes have a set of their own, since an undamped mode that the

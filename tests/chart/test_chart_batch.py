@@ -14,7 +14,8 @@ from zwidth.chart.curve import trace, walls
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
 from zwidth.chart.hurwitz import edges_stable_set
 from zwidth.chart.wall_samples import HIDDEN
-from zwidth.loop import Loop, UnmovedError, table_of_loops
+from zwidth.errors import UnmovedError
+from zwidth.loop import Loop, table_of_loops
 
 KINDS = ("chain", "dense", "coupled", "apart")
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from tests.cli.command_runner import refusal_lines
-from zwidth.processors import ProcessorError, check_processor
+from zwidth.errors import ProcessorError
+from zwidth.processors import check_processor
 
 ROOT = Path(__file__).parents[2]
 

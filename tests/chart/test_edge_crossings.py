@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.systems import published, random_loop
-from zwidth.chart import ChartError, EdgeChords, exact_edge, judge, stability_chart
+from zwidth.chart import EdgeChords, exact_edge, judge, stability_chart
+from zwidth.errors import ChartError
 
 
 def charts(count, seed):

@@ -15,8 +15,8 @@ from scipy.linalg import matrix_balance
 
 from tests.control_apart import random_controlled_loop
 from tests.study_sizes import study_size
-from zwidth.chart import ChartError, stability_chart
-from zwidth.loop import UnmovedError
+from zwidth.chart import stability_chart
+from zwidth.errors import ChartError, UnmovedError
 
 KINDS = {
     "force-sensor": ("force-sensor",),

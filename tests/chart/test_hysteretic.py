@@ -10,7 +10,8 @@ from scipy.optimize import minimize_scalar
 from tests.systems import mass, published, random_plant, two_mass
 from zwidth.chart import hysteretic_chart, stability_chart
 from zwidth.chart.hysteretic_response import SampledResponse
-from zwidth.loop import Butterworth, Controller, HysteresisError, Loop
+from zwidth.errors import HysteresisError
+from zwidth.loop import Butterworth, Controller, Loop
 from zwidth.model import Operator, Plant, attach
 
 

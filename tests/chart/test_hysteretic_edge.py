@@ -8,7 +8,8 @@ import pytest
 from tests.systems import random_controller, random_plant
 from zwidth.chart import EdgeChords, hysteretic_chart
 from zwidth.chart.hysteretic_response import hysteretic_edge
-from zwidth.loop import HysteresisError, Loop
+from zwidth.errors import HysteresisError
+from zwidth.loop import Loop
 
 CLOSE = 1e-4  # share of the chart's dampings; the sides of the chart's cells lie within 1e-5 of its window
 

@@ -16,7 +16,8 @@ from tests.systems import (
     velocity_weights,
 )
 from zwidth.chart import hysteretic_chart, stability_chart
-from zwidth.loop import Butterworth, HysteresisError, Kalman, Loop
+from zwidth.errors import HysteresisError
+from zwidth.loop import Butterworth, Kalman, Loop
 
 SMALLEST = 1e-5
 MARGIN = 1e-9  # least |1 + L| over 1 + |L| that is counted

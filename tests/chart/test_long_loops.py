@@ -6,9 +6,10 @@ import pytest
 from tests.chart.test_chart_against_eigenvalues import DAMPED, disagreements
 from tests.study_sizes import study_size
 from tests.systems import published, random_plant
-from zwidth.chart import MOST_DEGREE, ChartError, Tracer, stability_chart, terms_along
+from zwidth.chart import MOST_DEGREE, Tracer, stability_chart, terms_along
 from zwidth.chart.edge_by_eigenvalues import decided_trace
 from zwidth.chart.nyquist import phase_flags
+from zwidth.errors import ChartError
 from zwidth.loop import Controller, LeastSquaresSlope, Loop, SavitzkyGolay, WindowedDifference
 
 

@@ -15,9 +15,9 @@ import pytest
 import shapely
 
 from tests.apart import ApartLoop, ExactLoop, loop_of_every_kind
-from zwidth.chart import ChartError, stability_chart
+from zwidth.chart import stability_chart
 from zwidth.chart.verdict import STABLE, UNDECIDED
-from zwidth.loop import UnmovedError
+from zwidth.errors import ChartError, UnmovedError
 
 SEED = 20260
 WALLS = 500  # of a loop, half as many where its matrix has more than 16 rows

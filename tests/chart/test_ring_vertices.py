@@ -22,10 +22,11 @@ from tests.loop.estimators_cases import random_method
 from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
 from tests.systems import FEATURES, random_loop
 from zwidth import load
-from zwidth.chart import ChartError, TracedEdge, stability_chart
+from zwidth.chart import TracedEdge, stability_chart
 from zwidth.chart.arcs import PAIR
 from zwidth.chart.loop_edge import walls_off_circle
-from zwidth.loop import Controller, Loop, UnmovedError
+from zwidth.errors import ChartError, UnmovedError
+from zwidth.loop import Controller, Loop
 from zwidth.model import Plant
 
 BAND = 1e-9

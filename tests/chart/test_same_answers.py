@@ -23,12 +23,13 @@ import pytest
 import shapely
 
 from tests.apart import ApartLoop, ExactLoop, curve_area, loop_of_every_kind, straight_area
-from zwidth.chart import ALL_NUMBERS, ChartError, Tracer, stability_chart
+from zwidth.chart import ALL_NUMBERS, Tracer, stability_chart
 from zwidth.chart.arcs import MINUS, PAIR, PLUS
 from zwidth.chart.chart_batch import DECAY, chart_numbers
 from zwidth.chart.decay import fastest_decay
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
-from zwidth.loop import UnmovedError, table_of_loops
+from zwidth.errors import ChartError, UnmovedError
+from zwidth.loop import table_of_loops
 
 SEED = 20262
 TOLERANCE = 1e-9  # relative, of largest stiffness, largest damping and area

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, published, random_loop
 
-from zwidth.chart import ChartError, largest_stiffness, spectral_radius
+from zwidth.chart import largest_stiffness, spectral_radius
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
-from zwidth.loop import AlphaBeta, Butterworth, Controller, Loop, UnmovedError, table_of_loops
+from zwidth.errors import ChartError, UnmovedError
+from zwidth.loop import AlphaBeta, Butterworth, Controller, Loop, table_of_loops
 from zwidth.model import Plant
 
 KINDS = ("chain", "dense", "coupled", "apart")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, published, random_loop
 
-from zwidth.chart import ChartError, largest_stiffness, stability_chart
+from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
 from zwidth.chart.wall_margins import (
     delays_within,
@@ -16,7 +16,8 @@ from zwidth.chart.wall_margins import (
     stiffness_with_margins,
     stiffness_with_margins_alone,
 )
-from zwidth.loop import Controller, Loop, UnmovedError, table_of_loops
+from zwidth.errors import ChartError, UnmovedError
+from zwidth.loop import Controller, Loop, table_of_loops
 
 KINDS = ("chain", "dense", "coupled", "apart")
 ROUNDING = 1e-7  # of a radius, that of a wall on the edge

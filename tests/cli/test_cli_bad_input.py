@@ -222,7 +222,7 @@ def test_an_error_of_our_own_is_one_line_and_code_70(monkeypatch):
 
 @pytest.mark.parametrize("command", ["chart", "report"])
 def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, command):
-    from zwidth.chart import ChartError
+    from zwidth.errors import ChartError
 
     def open_edge(*_):
         raise ChartError("the edge could not be closed")
@@ -241,7 +241,7 @@ def test_a_chart_that_cannot_be_closed_is_undecided(tmp_path, monkeypatch, comma
 
 def test_a_chart_that_is_in_doubt_once_it_is_drawn_is_undecided(monkeypatch):
     """Its numbers are read before its edge is drawn and judged."""
-    from zwidth.chart import ChartError
+    from zwidth.errors import ChartError
 
     def doubted(*_):
         raise ChartError("walls on the edge are off the circle")

@@ -117,7 +117,7 @@ def test_no_stable_wall_is_an_answer():
 
 def test_a_chart_that_cannot_be_drawn_leaves_the_table(monkeypatch, tmp_path):
     def undecided(*_, **__):
-        from zwidth.chart import ChartError
+        from zwidth.errors import ChartError
 
         raise ChartError("the edge cannot be closed")
 

@@ -13,9 +13,10 @@ from scipy.optimize import brentq
 from tests.systems import published
 from zwidth.chart import stability_chart
 from zwidth.contact import StableExtent
+from zwidth.errors import FileError
 from zwidth.show import ErrorBarPoint, amount, draw_experiment, figure
 from zwidth.show.cli.experiment import sentences
-from zwidth.study import Experiment, Plan, PointsError, compare_points, read_points
+from zwidth.study import Experiment, Plan, compare_points, read_points
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m,edge,verdict\n"
 EDGES = "4000,2.6,lower,\n4000,20.7,upper,\n"  # 0.18 and 0.95 N s/m off
@@ -113,7 +114,7 @@ def test_without_an_exact_chart_nothing_is_counted_as_agreeing(tmp_path):
 )
 def test_a_verdict_is_checked(tmp_path, line, says):
     (tmp_path / "own.csv").write_text(HEAD + line + "\n")
-    with pytest.raises(PointsError, match=re.escape(says)):
+    with pytest.raises(FileError, match=re.escape(says)):
         read_points(str(tmp_path / "own.csv"))
 
 

@@ -13,8 +13,8 @@ from tests.cli.command_runner import document_of, refusal_lines, run_command
 from tests.measured_cases import measured_response
 from zwidth.chart import stability_chart
 from zwidth.chart.measured import chart as measured_chart
+from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth
-from zwidth.model import ResponseError
 
 HEAD = "frequency_Hz,real_m_per_N,imag_m_per_N"
 DEVICE = """

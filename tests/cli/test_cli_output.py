@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from tests.cli.command_runner import MECHANISM, run_command
-from zwidth.show import OutputError, csv_text, json_text, json_value
+from zwidth.errors import OutputError
+from zwidth.show import csv_text, json_text, json_value
 from zwidth.show.output import destination, replacing, write_text
 
 

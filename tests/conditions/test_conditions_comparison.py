@@ -6,10 +6,11 @@ from math import isnan
 
 import pytest
 
-from zwidth.chart import ChartError, stability_chart
+from zwidth.chart import stability_chart
 from zwidth.conditions import compare
 from zwidth.conditions.comparison import bounds_of, compare_bounds
 from zwidth.device import from_document
+from zwidth.errors import ChartError
 
 FRICTION = {"coulomb_N": 0.2}
 ENCODER = {"encoder": {"resolution_m": 1e-5}}

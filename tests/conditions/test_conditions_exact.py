@@ -7,9 +7,10 @@ import pytest
 import shapely
 from systems import published, random_loop
 
-from zwidth.chart import ChartError, judge, stability_chart
+from zwidth.chart import judge, stability_chart
 from zwidth.chart.verdict import STABLE
 from zwidth.conditions import exact_stiffness_limit
+from zwidth.errors import ChartError
 
 
 def stiffness_from_regions(chart, damping):

@@ -15,8 +15,8 @@ from systems import FEATURES, random_loop
 from zwidth.contact import Hand, Reflex, Run, simulate_batch
 from zwidth.contact.environments import one_sided_wall, wall
 from zwidth.contact.loop_simulation import simulate
+from zwidth.errors import TooLarge
 from zwidth.loop import BackwardDifference, Foaw, LeastSquaresSlope, Levant, Loop, SavitzkyGolay, velocity_of
-from zwidth.memory_limit import TooLarge
 from zwidth.model import Counter, LaggedDamper, Nonlinear, Operator
 
 MOTOR = np.array([0.0, 1.0])

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 
 from tests.systems import FEATURES, mass, published, random_loop
 from zwidth.chart import spectral_radius
-from zwidth.contact import Hand, StabilityTrial, StableExtent, TrialError, measure_edges, measure_tips, observe
-from zwidth.contact.boundary_experiment import NoStableWallError, SearchWindow, find_stable_walls, tip_dampings
+from zwidth.contact import Hand, StabilityTrial, StableExtent, measure_edges, measure_tips, observe
+from zwidth.contact.boundary_experiment import SearchWindow, find_stable_walls, tip_dampings
+from zwidth.errors import ArgumentError, NoAnswerError
 from zwidth.loop import Controller, Foaw, Loop
 from zwidth.model import Counter, Friction, Nonlinear, Operator, Plant, attach
 
@@ -168,15 +169,15 @@ def test_a_box_limits_where_is_looked():
     assert 1000.0 < place.stiffness <= 5000.0
     assert 5.0 <= place.damping <= 15.0
     assert not place.bounded
-    with pytest.raises(NoStableWallError, match="from 8000 to 9000 N/m"):
+    with pytest.raises(NoAnswerError, match="from 8000 to 9000 N/m"):
         find_stable_walls(trial, SearchWindow((8000.0, 9000.0), (0.0, 30.0)))
-    with pytest.raises(TrialError, match="stiffness must be a range LOW < HIGH"):
+    with pytest.raises(ArgumentError, match="stiffness must be a range LOW < HIGH"):
         find_stable_walls(trial, SearchWindow((9000.0, 8000.0), (0.0, 30.0)))
 
 
 def test_nothing_stable_is_said():
     undamped = published(structural=0.0, delay=1.0)
-    with pytest.raises(NoStableWallError, match="no stable wall was found"):
+    with pytest.raises(NoAnswerError, match="no stable wall was found"):
         find_stable_walls(StabilityTrial(undamped))
 
 
@@ -192,5 +193,5 @@ def test_nothing_stable_is_said():
     ],
 )
 def test_what_cannot_be_meant_is_refused(circumstances, message):
-    with pytest.raises(TrialError, match=message):
+    with pytest.raises(ArgumentError, match=message):
         StabilityTrial(published(), **circumstances)

@@ -13,10 +13,10 @@ from zwidth.contact import Hand, Reflex, Run, StabilityTrial, judge_response, ob
 from zwidth.contact.environments import wall
 from zwidth.contact.loop_simulation import simulate
 from zwidth.contact.wall_limit_cycles import predict_limit_cycles
+from zwidth.errors import FeedbackError
 from zwidth.loop import (
     Butterworth,
     Controller,
-    FeedbackError,
     Feedforward,
     FirstOrder,
     ForceSensor,

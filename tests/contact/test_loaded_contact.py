@@ -8,11 +8,12 @@ import pytest
 
 from tests.contact.mechanism_cases import with_friction
 from tests.model.model_cases import five_bar
-from zwidth.contact import ENVIRONMENTS, ContactArgumentError
+from zwidth.contact import ENVIRONMENTS
 from zwidth.contact.environments import wall
 from zwidth.contact.environments.walls import pressed_wall
 from zwidth.contact.loop_simulation import simulate
-from zwidth.loop import Butterworth, Controller, FeedbackError, OperatingPoint
+from zwidth.errors import ArgumentError, FeedbackError
+from zwidth.loop import Butterworth, Controller, OperatingPoint
 from zwidth.model import Load, ModalDamping, solve_posture
 
 COUNTED = five_bar()
@@ -108,9 +109,9 @@ def test_a_bent_spring_is_straight_for_small_motions_and_stiffens_by_its_law():
 
 def test_what_no_load_goes_with_is_refused():
     one = point(Load(push=3.0))
-    with pytest.raises(ContactArgumentError, match="does not go with a load"):
+    with pytest.raises(ArgumentError, match="does not go with a load"):
         one.simulate(900.0, 4.0, environment="slot")
-    with pytest.raises(ContactArgumentError, match="no hand leans on it"):
+    with pytest.raises(ArgumentError, match="no hand leans on it"):
         point(Load(gravity=(0.0, -9.81))).simulate(900.0, 4.0, wall="one-sided")
     with pytest.raises(FeedbackError, match="under load"):
         one.limit_cycles(900.0, 4.0)

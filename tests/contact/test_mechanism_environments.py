@@ -19,7 +19,6 @@ from zwidth.contact import (
     ENVIRONMENTS,
     Box,
     Hand,
-    MotionError,
     Parameter,
     Plane,
     Sphere,
@@ -29,6 +28,7 @@ from zwidth.contact import (
 )
 from zwidth.contact.environments import environment
 from zwidth.contact.loop_simulation import simulate
+from zwidth.errors import ArgumentError
 from zwidth.loop import Butterworth, Foaw, Levant, Loop
 from zwidth.model import ModalDamping, reduce_mechanism, solve_posture
 
@@ -283,5 +283,5 @@ def test_an_environment_that_gives_no_number_ends_the_motion_there():
     ],
 )
 def test_walls_that_cannot_be_meant(wall, surface, said):
-    with pytest.raises(MotionError, match=said):
+    with pytest.raises(ArgumentError, match=said):
         motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), wall, surface, **PUSHED)

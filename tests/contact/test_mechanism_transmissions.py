@@ -8,9 +8,9 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
-from zwidth.contact import MotionError
 from zwidth.device import from_document
 from zwidth.device.new_file import new_device
+from zwidth.errors import ArgumentError
 
 ARM = {
     "name": "Arm",
@@ -92,5 +92,5 @@ def test_a_joint_limit_ends_the_motion_and_is_named():
 def test_what_is_left_out_is_said():
     document = deepcopy(ARM)
     document["mechanism"]["links"][0]["joint_coulomb_Nm"] = 0.01
-    with pytest.raises(MotionError, match="dry friction of the joints themselves"):
+    with pytest.raises(ArgumentError, match="dry friction of the joints themselves"):
         from_document(document).at().move(duration=0.01)

@@ -11,22 +11,15 @@ from systems import mass
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
-from zwidth.contact import (
-    SOURCES,
-    NoEncoderStepsError,
-    NothingNonlinearError,
-    TimeResponse,
-    judge_response,
-    quiet_limit,
-    resting_limit,
-)
+from zwidth.contact import SOURCES, TimeResponse, judge_response, quiet_limit, resting_limit
 from zwidth.contact.wall_limit_cycles import (
     answered_cycles,
     behaviour_at_the_end,
     largest_motion,
     predict_limit_cycles,
 )
-from zwidth.loop import Controller, HysteresisError, OperatingPoint
+from zwidth.errors import ArgumentError, HysteresisError, NoAnswerError
+from zwidth.loop import Controller, OperatingPoint
 from zwidth.model import Brake, Counter, Friction, Nonlinear
 from zwidth.show import json_value
 
@@ -224,9 +217,9 @@ def test_it_shows_itself_in_five_lines():
 
 
 def test_what_cannot_be_asked_is_an_error_of_its_own():
-    with pytest.raises(NothingNonlinearError, match="dry friction, encoder steps or a largest force"):
+    with pytest.raises(NoAnswerError, match="dry friction, encoder steps or a largest force"):
         predict_limit_cycles(one_mass(), 1000.0, 1.0)
-    with pytest.raises(NoEncoderStepsError, match="leave it at 0"):
+    with pytest.raises(ArgumentError, match="leave it at 0"):
         predict_limit_cycles(one_mass(force_limit=1.0), 1000.0, 1.0, offset=0.5)
     with pytest.raises(ValueError, match=r"offset must be from -0\.5 to 0\.5"):
         predict_limit_cycles(rough(), 1000.0, 1.0, offset=0.6)

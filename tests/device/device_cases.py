@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
 from zwidth.device.faults import Fault
+from zwidth.errors import DeviceError
 
 PLANT_FILE = """
 name = "two masses"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
-from zwidth.device import DeviceError, address, bundled_names, from_document
+from zwidth.device import address, bundled_names, from_document
 from zwidth.device.load import load
 from zwidth.device.read import read
+from zwidth.errors import DeviceError
 from zwidth.loop import Butterworth, FirstOrder
 
 

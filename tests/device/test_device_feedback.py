@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError, OperatingPointError
 from zwidth.loop import (
     BackwardDifference,
     Butterworth,
@@ -19,7 +19,6 @@ from zwidth.loop import (
     Kalman,
     LocalLoop,
     Loop,
-    OperatingPointError,
     WindowedDifference,
 )
 from zwidth.show import computer_text

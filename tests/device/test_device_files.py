@@ -13,8 +13,8 @@ from tests import systems
 from tests.cli.command_runner import TWO_MASS, refusal_lines, run_command
 from tests.interruption import HANG_TIMEOUT_S
 from tests.measured_cases import measured_response
-from zwidth.device import DeviceError
 from zwidth.device.load import load
+from zwidth.errors import DeviceError
 from zwidth.study import read_study
 
 DEVICE = 'name = "measured"\n[response]\n{}\n[loop]\nsampling_period_s = 0.00125\n'

@@ -9,10 +9,11 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zwidth.device import DeviceError, address, bundled_names, from_document
+from zwidth.device import address, bundled_names, from_document
 from zwidth.device.faults import one_line
 from zwidth.device.load import load
 from zwidth.device.read import read
+from zwidth.errors import DeviceError
 
 junk = st.recursive(
     st.none()

@@ -15,8 +15,9 @@ import zwidth
 from tests.device.device_cases import faults
 from zwidth.device import from_document
 from zwidth.device.new_file import new_device
+from zwidth.errors import BeyondLimit, OutOfReach
 from zwidth.measures import BEYOND_LIMIT, OUT_OF_REACH
-from zwidth.model import BeyondLimit, OutOfReach, handle_position, solve_posture
+from zwidth.model import handle_position, solve_posture
 from zwidth.study import plane_of
 
 DELTA = tomllib.loads(new_device("Delta", "delta"))

@@ -8,8 +8,9 @@ import re
 import pytest
 
 from tests.device.device_cases import ARM_FILE, REMOVED, faults, with_changes
-from zwidth.device import Device, DeviceError, from_document
+from zwidth.device import Device, from_document
 from zwidth.device.load import load
+from zwidth.errors import DeviceError
 
 NAN = float("nan")
 

@@ -13,8 +13,9 @@ import pytest
 
 import zwidth
 from tests.frozen.devices import random_devices
-from zwidth.device import Device, DeviceError, DeviceNumber, address, bundled, device_numbers, from_document
+from zwidth.device import Device, DeviceNumber, address, bundled, device_numbers, from_document
 from zwidth.device.numbers import unchangeable
+from zwidth.errors import DeviceError
 
 RANDOM = {one.word: one.files for one in random_devices() if one.kind in ("plant", "mechanism") and one.files}
 OWN_LIMIT = re.compile(r"must be (a (whole )?number|(at least|at most|greater than|less than) -?\d)")

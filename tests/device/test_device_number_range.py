@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 import zwidth
-from zwidth.device import Device, DeviceError, DeviceNumber, bundled, device_numbers, from_document
+from zwidth.device import Device, DeviceNumber, bundled, device_numbers, from_document
 from zwidth.device.numbers import typical_size
+from zwidth.errors import DeviceError
 
 NAMES = [name for name, *_ in bundled()]
 MASS = "plant.mass_kg.0.1"

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from tests.device.device_cases import ARM_FILE, REMOVED, faults, with_changes
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
 from zwidth.device.design_batch import design_batch
 from zwidth.device.new_file import new_device
-from zwidth.model import OK, BeyondLimit
+from zwidth.errors import BeyondLimit, DeviceError
+from zwidth.model import OK
 from zwidth.model.posture import BEYOND_LIMIT
 
 RATIO, TABLE = "mechanism__drives__0__transmission_ratio", "mechanism__drives__0__ratio_table"

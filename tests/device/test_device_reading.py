@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from zwidth.device import DeviceError, bundled
+from zwidth.device import bundled
 from zwidth.device.load import load
 from zwidth.device.read import LARGEST_FILE, parse_document
-from zwidth.device.text_file import UnreadableFileError, decode
+from zwidth.device.text_file import decode
+from zwidth.errors import DeviceError, FileError
 
 GOOD = b'name = "a mass"\n[plant]\nmass_kg = 0.1\n[loop]\nsampling_period_s = 0.001\n'
 
@@ -118,7 +119,7 @@ def test_a_file_that_may_not_be_read(tmp_path):
 
 @given(st.binary(max_size=60))
 def test_whatever_the_bytes_only_device_errors_come_out(data):
-    with contextlib.suppress(DeviceError, UnreadableFileError):
+    with contextlib.suppress(DeviceError, FileError):
         parse_document(decode(data), "my.toml")
 
 

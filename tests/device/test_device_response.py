@@ -7,9 +7,9 @@ import pytest
 
 from tests import systems
 from tests.measured_cases import encoder_readings, measured_response
-from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.loop import Controller, Loop, OperatingPointError
+from zwidth.errors import DeviceError, OperatingPointError
+from zwidth.loop import Controller, Loop
 
 T = 0.00125
 HEAD = "frequency_Hz,real_m_per_N,imag_m_per_N"

@@ -10,9 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
-from zwidth.device import DeviceError, address, build_mechanism, bundled, bundled_names, from_document
+from zwidth.device import address, build_mechanism, bundled, bundled_names, from_document
 from zwidth.device.load import load
 from zwidth.device.read import read
+from zwidth.errors import DeviceError
 from zwidth.model import pack
 from zwidth.model.inertia import joint_mass_matrix
 
@@ -223,7 +224,7 @@ def test_a_direction_may_have_any_length(direction, unit):
 @pytest.mark.parametrize("settings", [["reference.position_m=[0.34, 0.34]", "workspace=unset"], []])
 def test_a_posture_out_of_reach_is_no_fault_of_the_file(settings):
     """It loads: other postures may be asked for. The posture asked for has no answer."""
-    from zwidth.model import OutOfReach
+    from zwidth.errors import OutOfReach
 
     device = load("five-bar", settings)
     with pytest.raises(OutOfReach):
@@ -232,7 +233,7 @@ def test_a_posture_out_of_reach_is_no_fault_of_the_file(settings):
 
 def test_arms_that_lie_on_each_other_are_not_driven():
     """With the base joints in one place and both elbows on one side the drives turn the arms as one."""
-    from zwidth.model import Singular
+    from zwidth.errors import Singular
 
     with pytest.raises(Singular, match="do not determine the other joints"):
         load("five-bar").at(assembly="elbows-left")

@@ -7,8 +7,9 @@ from copy import deepcopy
 
 import pytest
 
-from zwidth.device import DeviceError, address, from_document
+from zwidth.device import address, from_document
 from zwidth.device.read import read
+from zwidth.errors import DeviceError
 
 
 def faults(name, path, value):

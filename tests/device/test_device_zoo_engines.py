@@ -16,7 +16,8 @@ from tests.model.model_engines import ask_mujoco, ask_pinocchio
 from zwidth.device import bundled_names, from_document
 from zwidth.device.legs import written
 from zwidth.device.read import read
-from zwidth.model import PRISMATIC, PostureError, inertia_terms, natural_frequencies
+from zwidth.errors import PostureError
+from zwidth.model import PRISMATIC, inertia_terms, natural_frequencies
 
 MECHANISMS = [name for name in bundled_names() if "mechanism" in read(name)[0]]
 POSTURES = 5

@@ -11,7 +11,7 @@ import pytest
 import zwidth
 from tests.cli.command_runner import run_command
 from zwidth.device import bundled_names
-from zwidth.loop import MissingNumbersError
+from zwidth.errors import MissingNumbersError
 
 GEOMETRY = [name for name in bundled_names() if zwidth.load(name).missing.get("dynamics")]
 WITH_WORKSPACE = [name for name in GEOMETRY if np.isfinite(zwidth.load(name).mechanism.workspace[:2]).all()]

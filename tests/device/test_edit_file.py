@@ -7,7 +7,8 @@ import difflib
 import pytest
 
 import zwidth
-from zwidth.device import DeviceError, edited_text
+from zwidth.device import edited_text
+from zwidth.errors import DeviceError
 
 TEXT = """\
 # A device of mine.

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from zwidth import __version__
-from zwidth.device import DeviceError, address, from_document
+from zwidth.device import address, from_document
 from zwidth.device.load import load, schema
 from zwidth.device.operator_choice import operator_table
 from zwidth.device.text_file import STORE_VERSION
-from zwidth.study import CellValues, Journal, JournalError, Store, StoreError, StudyFile, fingerprint, read_study
+from zwidth.errors import DeviceError, StoreError
+from zwidth.study import CellValues, Journal, Store, StudyFile, fingerprint, read_study
 
 DEVICE = 'name = "m"\n{}\n[plant]\nmass_kg = 0.1\n{}\n[loop]\nsampling_period_s = 0.001\n'
 AXIS = '[[axis]]\nkey = "loop.delay_samples"\nvalues = [0]\n'
@@ -140,7 +141,7 @@ def test_a_newer_journal_is_refused_and_left_alone(tmp_path, question):
     newer = json.dumps(json.loads(head) | {"version": STORE_VERSION + 1})
     path.write_text("\n".join([newer, *lines]) + "\n")
     before = path.read_bytes()
-    with pytest.raises(JournalError) as caught:
+    with pytest.raises(StoreError) as caught:
         Journal(path, fingerprint(question))
     assert str(caught.value) == f"journal: its version {NEWER_STORE}, or name another file"
     assert path.read_bytes() == before

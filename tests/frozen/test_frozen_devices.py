@@ -8,7 +8,7 @@ import zwidth
 from tests.frozen.devices import faulty_devices, random_devices, studies
 from tests.frozen.plants import FEATURES
 from tests.frozen.toml_text import toml_text
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 
 DEVICES = random_devices()
 

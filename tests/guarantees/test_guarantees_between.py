@@ -7,12 +7,13 @@ import pytest
 
 from tests.measured_handle_cases import AT_SENSOR, COLLOCATED, EVERY, RECIPROCAL, frequencies, measured_device
 from zwidth.chart import MeasuredLoop
+from zwidth.errors import ResponseError
 from zwidth.guarantees import passive_region
 from zwidth.guarantees.between_frequencies import BETWEEN, CubicPieces
 from zwidth.guarantees.measured import measured_passive_region
 from zwidth.loop import Controller, Loop
 from zwidth.loop.measured.measured_port import measured_port
-from zwidth.model import Plant, ResponseError
+from zwidth.model import Plant
 
 # What a promise may exceed the exact one by: the data themselves are fitted modes beyond half the sampling rate.
 # Of 16 devices of up to three masses one, measured at 60 frequencies, exceeds it by more than 1e-5, by 1.9e-5.

@@ -9,9 +9,10 @@ import pytest
 
 from tests import systems
 from tests.measured_handle_cases import COLLOCATED, RECIPROCAL, frequencies, measured_device
+from zwidth.errors import ResponseError
 from zwidth.guarantees import passive_region
 from zwidth.loop import Controller, Loop, OperatingPoint
-from zwidth.model import Plant, ResponseError
+from zwidth.model import Plant
 
 T = 0.00125
 PLANT = systems.published().plant

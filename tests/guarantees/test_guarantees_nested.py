@@ -15,8 +15,9 @@ from scipy.optimize import minimize_scalar
 from tests.frozen.devices import random_devices
 from tests.guarantees.test_guarantees_passive import random_device, random_operator
 from tests.systems import mass, published
-from zwidth.chart import ChartError, spectral_radius, unstable
+from zwidth.chart import spectral_radius, unstable
 from zwidth.device.load import load
+from zwidth.errors import ChartError
 from zwidth.guarantees import SpringFamily, couplings, find_guarantees, spring_stable_region
 from zwidth.guarantees.coupling import coupling_angles, coupling_region, softest_limit
 from zwidth.guarantees.spring_stable import nyquist_spring

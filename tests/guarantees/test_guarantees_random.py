@@ -10,8 +10,9 @@ import pytest
 from tests.guarantees.test_guarantees_nested import scaled
 from tests.guarantees.test_guarantees_passive import random_operator, resonators_at
 from tests.systems import random_controller, random_method, random_plant
-from zwidth.chart import ChartError, eigenvalues, judge, stability_chart, unstable
+from zwidth.chart import eigenvalues, judge, stability_chart, unstable
 from zwidth.chart.verdict import UNSTABLE
+from zwidth.errors import ChartError
 from zwidth.guarantees import (
     SpringFamily,
     passive_region,

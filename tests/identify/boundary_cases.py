@@ -7,7 +7,8 @@ import json
 import numpy as np
 
 import zwidth
-from zwidth.chart import ChartError, EdgeChords
+from zwidth.chart import EdgeChords
+from zwidth.errors import ChartError
 from zwidth.identify import record_of
 from zwidth.identify.boundary.identify import COLUMNS
 

@@ -9,7 +9,8 @@ import pytest
 
 from tests.identify.arm_benches import chain_device, five_bar_columns, five_bar_device, random_five_bar
 from tests.identify.arm_truth import chain_results, five_bar_results, held, link_parameters, one_chain, true_values
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
+from zwidth.errors import DeviceError
 from zwidth.identify import Parameters, base_parameters, check_sampling, identify_arm, record_of
 from zwidth.identify.arm import COLUMNS
 from zwidth.identify.arm.checks import channels_of

@@ -11,7 +11,8 @@ from tests.cli.command_runner import run_command
 from tests.identify.arm_truth import one_chain
 from tests.study_sizes import EVERYDAY_SEEDS, outside_case, study_size
 from zwidth.device.load import load
-from zwidth.identify import Estimate, IdentificationError, identify_arm, read_record
+from zwidth.errors import NoAnswerError
+from zwidth.identify import Estimate, identify_arm, read_record
 from zwidth.identify.arm import COLUMNS, ArmIdentification
 from zwidth.identify.arm.checks import Channels, Survey, sign_check, velocity_check
 from zwidth.identify.arm.smoothing import Kernel
@@ -56,7 +57,7 @@ def test_the_answer_says_that_noise_in_the_positions_is_not_in_its_intervals():
 
 
 def test_no_device_gets_the_numbers_of_an_arm():
-    with pytest.raises(IdentificationError):
+    with pytest.raises(NoAnswerError):
         found_arm().settings  # noqa: B018
 
 

@@ -12,7 +12,8 @@ import zwidth
 from tests.identify.boundary_cases import measured, random_device, record
 from zwidth.chart import EdgeChords
 from zwidth.contact import StabilityTrial, StableExtent, measure_edges
-from zwidth.device import DeviceError, address
+from zwidth.device import address
+from zwidth.errors import DeviceError
 from zwidth.identify import BoundaryParameters, identify_boundary, read_record
 from zwidth.identify.boundary.identify import COLUMNS
 

@@ -7,8 +7,9 @@ import pytest
 
 import zwidth
 from tests.identify.boundary_cases import measured, random_device, record, toml
-from zwidth.chart import ChartError, EdgeChords
+from zwidth.chart import EdgeChords
 from zwidth.device import address
+from zwidth.errors import ChartError
 from zwidth.identify import BoundaryModel, BoundaryParameters, fit_boundary, identify_boundary, read_points
 from zwidth.study import Plan, measure_boundary
 

@@ -7,8 +7,9 @@ import pytest
 
 import zwidth
 from tests.identify.boundary_cases import record
-from zwidth.contact import StabilityTrial, TrialError
+from zwidth.contact import StabilityTrial
 from zwidth.contact.stability_trial import LEVELS, LONGER
+from zwidth.errors import ArgumentError
 from zwidth.identify import identify_boundary, read_points
 from zwidth.identify.boundary.checks import check_circumstances
 from zwidth.identify.boundary.trials import TrialPlan
@@ -81,7 +82,7 @@ def test_the_last_look_takes_the_time_that_was_watched():
     loop = rough().at().contact_loop
     trial = StabilityTrial(loop, watch_time=8.0)
     assert trial.first_samples * LONGER ** (LEVELS - 1) * loop.period == pytest.approx(8.0, rel=0.01)
-    with pytest.raises(TrialError, match="watch_time must be positive"):
+    with pytest.raises(ArgumentError, match="watch_time must be positive"):
         StabilityTrial(loop, watch_time=0.0)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 from zwidth.identify.boundary.parameters import DeviceNumbers
 
 PATHS = ["plant.mass_kg.0.0", "plant.damping_Ns_per_m.0.1", "loop.delay_samples"]

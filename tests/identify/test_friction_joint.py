@@ -11,7 +11,7 @@ from identify.virtual_joint import Joint, records_of
 from paddle import PADDLE
 
 import zwidth
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 from zwidth.identify import identify_friction, identify_mass, record_of
 from zwidth.identify.joint.friction import COLUMNS
 

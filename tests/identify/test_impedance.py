@@ -9,7 +9,7 @@ import pytest
 
 from tests.identify.impedance_bench import bench, pushed
 from tests.identify.modes_bench import readings
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 from zwidth.identify import identify_impedance, record_of
 from zwidth.identify.impedance.identify import COLUMNS
 from zwidth.identify.impedance.spectra import MeasuredImpedance, octave_bands

@@ -11,8 +11,8 @@ import pytest
 from tests import systems
 from tests.identify.modes_bench import columns, quantised, random_bench, readings, two_mass_device
 from tests.identify.record_benches import three_masses
-from zwidth.device import DeviceError
 from zwidth.device.load import load
+from zwidth.errors import DeviceError
 from zwidth.identify import record_of
 from zwidth.identify.modes.identify import COLUMNS, identify_modes
 from zwidth.identify.modes.model import sampled_response

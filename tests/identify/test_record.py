@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 import xarray as xr
 
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 from zwidth.identify import Columns, read_record, record_of
 from zwidth.identify.records import record as record_module
 from zwidth.identify.records.record import averaged_rows

@@ -8,6 +8,7 @@ import numpy as np
 
 from tests.model.model_cases import KINDS, random_five_bar, some_postures
 from tests.model.random_mechanisms import JOINTS, random_mechanism
+from zwidth.errors import EquilibriumError
 from zwidth.loop import Butterworth, Controller, OperatingPoint
 from zwidth.model import (
     AXIS,
@@ -17,7 +18,6 @@ from zwidth.model import (
     POINT,
     REVOLUTE,
     DriveNonlinearity,
-    EquilibriumError,
     GivenDamping,
     Load,
     ModalDamping,

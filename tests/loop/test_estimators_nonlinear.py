@@ -11,6 +11,7 @@ import scipy.optimize
 import scipy.signal
 
 from tests.loop.estimators_cases import METHODS, polynomials
+from zwidth.errors import NonlinearError
 from zwidth.loop import (
     BackwardDifference,
     Controller,
@@ -20,7 +21,6 @@ from zwidth.loop import (
     WindowedDifference,
     velocity_of,
 )
-from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.estimators.kernels import foaw_estimate, levant_estimate
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")

@@ -10,6 +10,7 @@ from scipy.linalg import matrix_balance
 from systems import mass, published, random_loop, two_mass
 
 from tests.control_apart import ControlledLoop, random_controlled_loop
+from zwidth.errors import HysteresisError, ModelError, UnmovedError
 from zwidth.loop import (
     AlphaBeta,
     Butterworth,
@@ -18,15 +19,12 @@ from zwidth.loop import (
     FirstOrder,
     Foaw,
     ForceSensor,
-    HysteresisError,
     LocalLoop,
     Loop,
     MultiLoop,
-    UnmovedError,
     WindowedDifference,
     feedforward_response,
 )
-from zwidth.loop.closed_plant import ForceSensorError
 from zwidth.loop.loop import unobserved_instability
 from zwidth.loop.pole_zero_form import PoleZeroForm
 from zwidth.model import MultiPlant, Operator, attach
@@ -247,13 +245,13 @@ def test_what_grows_by_itself_and_no_wall_moves_is_named():
 
 def test_a_force_sensor_needs_a_handle_and_what_it_carries_a_device():
     bare = replace(two_mass(0.26, 0.025, 15620.0), handle=None)
-    with pytest.raises(ForceSensorError, match="sits at the handle"):
+    with pytest.raises(ModelError, match="sits at the handle"):
         _ = Loop(bare, Controller(T, force_sensor=ForceSensor(0.5))).sections
-    with pytest.raises(ForceSensorError, match=r"mass_beyond is 0.3 kg, and must be less than .* 0.2616 kg"):
+    with pytest.raises(ModelError, match=r"mass_beyond is 0.3 kg, and must be less than .* 0.2616 kg"):
         _ = published(force_sensor=ForceSensor(0.5, mass_beyond=0.3)).sections
     # the arm of a rigid grasp is no part of the device
     held = attach(mass(0.3), FIRM)
-    with pytest.raises(ForceSensorError, match=r"0.3 kg, of which"):
+    with pytest.raises(ModelError, match=r"0.3 kg, of which"):
         _ = Loop(held, Controller(T, force_sensor=ForceSensor(0.5, mass_beyond=0.5))).sections
 
 

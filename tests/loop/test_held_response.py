@@ -19,10 +19,11 @@ from tests.measured_handle_cases import (
     random_plant,
 )
 from zwidth.chart import largest_stiffness
+from zwidth.errors import OperatorError, ResponseError
 from zwidth.loop import Controller, Loop, OperatingPoint
 from zwidth.loop.measured.held_response import held_response, operator_stiffness
 from zwidth.measures import felt_impedance
-from zwidth.model import MeasuredHandle, Operator, OperatorError, Plant, Response, ResponseError, attach
+from zwidth.model import MeasuredHandle, Operator, Plant, Response, attach
 
 T = 0.00125
 PLANT = systems.published().plant

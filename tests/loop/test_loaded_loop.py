@@ -13,8 +13,9 @@ from tests.loaded_apart import LoadedDevice, SimulatedDevice, root_errors
 from tests.loop.loaded_cases import MADE, random_load, random_points, random_screw
 from tests.model.model_cases import KINDS, drives_on, five_bar, some_postures, with_fixed_foot
 from zwidth.device.load import load as load_device
+from zwidth.errors import EquilibriumError, PostureError
 from zwidth.loop import Controller, LocalLoop, OperatingPoint, SidewaysMotion
-from zwidth.model import PRISMATIC, EquilibriumError, Load, Operator, PostureError, solve_posture
+from zwidth.model import PRISMATIC, Load, Operator, solve_posture
 
 ROOTS = 1e-6  # share of a root's size; most are alike to 1e-10
 ROUNDING = 1e-11  # share of a matrix to which the judge's differences are known

@@ -7,22 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from zwidth.chart import multi_chart, stability_chart
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
 from zwidth.device.load import load
-from zwidth.loop import (
-    Controller,
-    Loop,
-    MultiLoop,
-    NoMechanismError,
-    OperatingPoint,
-    OperatingPointError,
-    SeveralDirectionsError,
-)
+from zwidth.errors import DeviceError, NoMechanismError, OperatingPointError, OutOfReach, SeveralDirectionsError
+from zwidth.loop import Controller, Loop, MultiLoop, OperatingPoint
 from zwidth.model import (
     OK,
     OUT_OF_REACH,
     Operator,
-    OutOfReach,
     Plant,
     attach,
     reduce_directions,

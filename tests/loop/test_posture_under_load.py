@@ -10,7 +10,8 @@ import pytest
 from tests.model.beam_devices import planar_arm, with_beams
 from zwidth.device import from_document
 from zwidth.device.load import load as load_device
-from zwidth.model import NO_EQUILIBRIUM, OK, EquilibriumError, Load, LoadError, loaded_posture
+from zwidth.errors import EquilibriumError, LoadError
+from zwidth.model import NO_EQUILIBRIUM, OK, Load, loaded_posture
 from zwidth.study import find_variant, what_if
 
 MOTORS = Load(push=-3.0, posture_of="motors")

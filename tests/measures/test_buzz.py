@@ -9,8 +9,8 @@ import pytest
 from systems import mass, two_mass
 
 from zwidth.device.load import load
+from zwidth.errors import MeasureError
 from zwidth.loop import Controller, OperatingPoint
-from zwidth.measures import MeasureError
 from zwidth.measures.buzz import detection_threshold
 from zwidth.model import Counter, Friction, Nonlinear
 

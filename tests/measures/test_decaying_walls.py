@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from systems import FEATURES, mass, random_loop, reference_transition_matrix
 
-from zwidth.chart import ChartError, largest_stiffness, stability_chart
+from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import DECAY, STIFFEST, chart_numbers
 from zwidth.chart.edge_memory import FOUND, NO_WALL
 from zwidth.device.load import load
-from zwidth.loop import Controller, Loop, UnmovedError, table_of_loops
-from zwidth.measures import NO_VALUE, OK, MeasureError
+from zwidth.errors import ChartError, MeasureError, UnmovedError
+from zwidth.loop import Controller, Loop, table_of_loops
+from zwidth.measures import NO_VALUE, OK
 
 KINDS = ("chain", "dense", "coupled", "apart")
 

@@ -11,10 +11,10 @@ from systems import mass, two_mass
 from zwidth.contact import Hand, Tremor
 from zwidth.contact.environments import wall
 from zwidth.contact.loop_simulation import simulate
+from zwidth.errors import FeedbackError, MeasureError
 from zwidth.loop import (
     Butterworth,
     Controller,
-    FeedbackError,
     Feedforward,
     FirstOrder,
     ForceSensor,
@@ -22,7 +22,7 @@ from zwidth.loop import (
     Loop,
     OperatingPoint,
 )
-from zwidth.measures import MeasureError, felt_impedance, free_motion_mass, static_stiffness
+from zwidth.measures import felt_impedance, free_motion_mass, static_stiffness
 from zwidth.measures.felt import felt_chart
 from zwidth.measures.handle_impedance import free_impedance
 

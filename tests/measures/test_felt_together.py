@@ -9,8 +9,9 @@ from systems import random_plant
 
 import zwidth
 from zwidth.chart import largest_stiffness
+from zwidth.errors import MeasureError
 from zwidth.loop import Butterworth, Controller, FirstOrder, Loop, OperatingPoint
-from zwidth.measures import NO_VALUE, OK, MeasureError, felt_impedance, free_motion_impedance
+from zwidth.measures import NO_VALUE, OK, felt_impedance, free_motion_impedance
 from zwidth.measures.handle_motion import HandleMotion
 from zwidth.model import Plant
 

@@ -12,8 +12,9 @@ from systems import mass, random_loop, random_operator, two_mass
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of
 from zwidth.chart import judge, largest_stiffness
+from zwidth.errors import HandleError
 from zwidth.loop import Controller, OperatingPoint
-from zwidth.measures import HandleError, felt_impedance, static_stiffness
+from zwidth.measures import felt_impedance, static_stiffness
 from zwidth.measures.felt import felt_wall
 from zwidth.show import json_value
 

@@ -69,7 +69,7 @@ def test_the_force_across_is_the_hands(device):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_without_a_load_they_are_not_there(device, name):
-    with pytest.raises(zwidth.MeasureError, match=f"{name} needs a load.*give load"):
+    with pytest.raises(zwidth.errors.MeasureError, match=f"{name} needs a load.*give load"):
         device.measure(name)
 
 

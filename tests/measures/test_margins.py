@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import zwidth
+from zwidth.errors import MeasureError
 from zwidth.loop import Controller, OperatingPoint
-from zwidth.measures import NO_VALUE, OK, MeasureError
+from zwidth.measures import NO_VALUE, OK
 from zwidth.study.designs.study import as_key
 
 MARGINS = {"stiffness_margin": 0.2, "damping_margin": 0.3, "delay_margin": 0.5}

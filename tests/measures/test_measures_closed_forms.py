@@ -11,17 +11,9 @@ from numpy.testing import assert_allclose
 import zwidth
 from tests.systems import mass, published, two_mass
 from zwidth.chart import spectral_radius, stability_chart
+from zwidth.errors import MeasureError
 from zwidth.loop import Controller, FirstOrder, Loop, OperatingPoint, WindowedDifference
-from zwidth.measures import (
-    MEASURES,
-    NO_VALUE,
-    OK,
-    OUT_OF_REACH,
-    MeasureError,
-    WantedWall,
-    optimal_mass,
-    structural_distortion,
-)
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, WantedWall, optimal_mass, structural_distortion
 from zwidth.measures.evaluation import evaluate
 from zwidth.model import Operator
 

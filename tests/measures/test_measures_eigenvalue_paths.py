@@ -8,9 +8,10 @@ from numpy.testing import assert_allclose
 
 from tests.systems import mass, published, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart import stability_chart
+from zwidth.errors import NoAnswerError
 from zwidth.loop import Controller, Loop
 from zwidth.measures import loop_paths, wall_paths
-from zwidth.measures.root_paths import LONG, SHORT, PathError, eigenvalue_paths
+from zwidth.measures.root_paths import LONG, SHORT, eigenvalue_paths
 
 FEATURES = ("lag", "electrical", "estimator")
 
@@ -135,9 +136,9 @@ def test_what_stays_on_the_circle_crosses_nothing():
 
 def test_what_cannot_be_followed():
     loop = published()
-    with pytest.raises(PathError, match="5 eigenvalues at 0 and 6 at 1"):
+    with pytest.raises(NoAnswerError, match="5 eigenvalues at 0 and 6 at 1"):
         loop_paths(lambda late: published(delay=late), [0.0, 1.0], 100.0, 1.0)
-    with pytest.raises(PathError, match="not finite"):
+    with pytest.raises(NoAnswerError, match="not finite"):
         eigenvalue_paths(lambda a: [[1.0 / a]] if a else [[np.inf]], [-1.0, 0.0])
     with pytest.raises(ValueError, match="finite"):
         wall_paths(loop, 100.0, [0.0, np.inf])

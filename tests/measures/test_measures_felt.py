@@ -20,9 +20,9 @@ from tests.systems import (
 )
 from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.device.load import load
+from zwidth.errors import HandleError
 from zwidth.loop import Butterworth, Controller, FirstOrder, Loop, WindowedDifference
 from zwidth.measures import (
-    HandleError,
     commanded_impedance,
     felt_impedance,
     free_motion_impedance,

@@ -8,7 +8,8 @@ import scipy.optimize
 
 import zwidth
 from zwidth.device import bundled_names
-from zwidth.measures import OK, MeasureError
+from zwidth.errors import MeasureError
+from zwidth.measures import OK
 from zwidth.measures.geometry import (
     limit_margin,
     link_distance,

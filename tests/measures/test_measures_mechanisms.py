@@ -21,7 +21,8 @@ from tests.measures.dexterity_cases import (
 from tests.model.model_cases import KINDS, five_bar, some_postures
 from zwidth.device import from_document
 from zwidth.device.load import load
-from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, MeasureError, dexterity, find_measure
+from zwidth.errors import MeasureError
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, dexterity, find_measure
 from zwidth.measures.evaluation import evaluate
 from zwidth.model import GivenDamping, reduce_directions
 from zwidth.model.effective_mass import effective_parameters

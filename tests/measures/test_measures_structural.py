@@ -10,7 +10,8 @@ import scipy.integrate
 from numpy.testing import assert_allclose
 
 from tests.systems import mass, random_plant, two_mass, with_lagged_dampers
-from zwidth.measures import HandleError, deformation_ratio, structural_distortion
+from zwidth.errors import HandleError
+from zwidth.measures import deformation_ratio, structural_distortion
 
 
 def random_structure(rng, kind="chain", ratios=(0.001, 0.01, 0.05, 0.3, 1.0)):

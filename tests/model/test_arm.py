@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
+from zwidth.errors import DeviceError, OperatorError
 from zwidth.model import Load, Motions, natural_frequencies, pack
-from zwidth.model.arm import ArmError, attach_arm
+from zwidth.model.arm import attach_arm
 
 SHOULDER = np.array([0.45, 0.05, 0.0])
 LENGTHS = 0.3, 0.26
@@ -206,11 +207,11 @@ def test_faults_of_an_arm_are_named(changes, key, text):
 
 
 def test_an_arm_that_cannot_hold_the_handle_says_so():
-    with pytest.raises(ArmError, match="does not reach"):
+    with pytest.raises(OperatorError, match="does not reach"):
         device(arm=arm(shoulder_m=[2.0, 0.0, 0.0])).at().plant  # noqa: B018
     stretched = arm(posture={"joints_rad": {"humerus": 0.3, "forearm": 0.0}})
     del stretched["shoulder_m"]
-    with pytest.raises(ArmError, match="stretched"):
+    with pytest.raises(OperatorError, match="stretched"):
         device(arm=stretched).at().plant  # noqa: B018
     with pytest.raises(DeviceError, match="only one of them"):
         device(arm=arm(), operator={"arm_mass_kg": 1.0, "grasp": "rigid"})

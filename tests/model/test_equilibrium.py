@@ -19,7 +19,8 @@ from tests.model.joints_apart import FOURTH, Joints
 from tests.model.model_engines import mjcf, moving_links, quaternion
 from zwidth.device import from_document
 from zwidth.device.load import load as load_device
-from zwidth.model import BALL_X, NO_EQUILIBRIUM, OK, OUT_OF_REACH, EquilibriumError, Load
+from zwidth.errors import EquilibriumError
+from zwidth.model import BALL_X, NO_EQUILIBRIUM, OK, OUT_OF_REACH, Load
 
 # --- an arm on one joint ----------------------------------------------------------------------------------
 

@@ -21,7 +21,8 @@ from tests.model.beam_devices import (
 from tests.model.frame_elements import modes_of
 from tests.model.framed_devices import framed
 from zwidth.device import from_document
-from zwidth.model import EquilibriumError, Load, loaded_postures
+from zwidth.errors import EquilibriumError
+from zwidth.model import Load, loaded_postures
 
 L, SOFT, STIFF = 0.3, 8.0, 20.0
 EULER = np.pi**2 * SOFT / L**2

@@ -7,10 +7,18 @@ import copy
 import numpy as np
 import pytest
 
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
 from zwidth.device.load import load as load_device
-from zwidth.loop import OperatingPoint, OperatingPointError, SeveralDirectionsError
-from zwidth.model import EquilibriumError, Load, LoadError, ModelError
+from zwidth.errors import (
+    DeviceError,
+    EquilibriumError,
+    LoadError,
+    ModelError,
+    OperatingPointError,
+    SeveralDirectionsError,
+)
+from zwidth.loop import OperatingPoint
+from zwidth.model import Load
 
 
 @pytest.mark.parametrize(

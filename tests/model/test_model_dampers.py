@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from model_cases import KINDS, drives_on, five_bar, some_postures
 
+from zwidth.errors import ModelError
 from zwidth.model import (
     OK,
     GivenDamping,
     LaggedDamper,
     ModalDamping,
-    ModelError,
     Plant,
     reduce_mechanism,
     reduce_plant,

@@ -7,11 +7,10 @@ import pytest
 from model_cases import KINDS, X, Y, five_bar, some_postures
 from scipy.linalg import block_diag
 
+from zwidth.errors import DirectionError, ModelError
 from zwidth.model import (
-    DirectionError,
     GivenDamping,
     ModalDamping,
-    ModelError,
     ProportionalDamping,
     decompose,
     reduce_directions,

@@ -129,7 +129,8 @@ def test_a_wrist_finds_the_joints_of_an_orientation(seed):
 
 
 def test_a_platform_that_cannot_turn_renders_no_moment():
-    from zwidth.model import DirectionError, solve_posture
+    from zwidth.errors import DirectionError
+    from zwidth.model import solve_posture
 
     device = paddle(0.08)
     assert solve_posture(device.mechanism).angular_jacobian[:, 0] == pytest.approx([0, 0, 1])
@@ -139,7 +140,7 @@ def test_a_platform_that_cannot_turn_renders_no_moment():
 
 def test_what_cannot_be_meant_is_refused_in_a_sentence():
     device, wrist = paddle(0.08), from_document(WRIST)
-    from zwidth.device import DeviceError
+    from zwidth.errors import DeviceError
 
     for case, sentence in (
         ({"axis": [0, 0, 0]}, "has zero length"),

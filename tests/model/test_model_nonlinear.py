@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tests.model.model_cases import KINDS, five_bar
+from zwidth.errors import ModelError
 from zwidth.loop import Controller, Loop
 from zwidth.model import (
     Brake,
@@ -18,7 +19,6 @@ from zwidth.model import (
     DriveNonlinearity,
     Friction,
     ModalDamping,
-    ModelError,
     Nonlinear,
     Operator,
     Plant,

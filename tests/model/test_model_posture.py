@@ -22,9 +22,10 @@ from model_cases import (
 )
 from scipy import ndimage
 
-from zwidth.model import OK, OUT_OF_REACH, Mechanism, OutOfReach, Singular, inertia_terms, pack, solve_posture
+from zwidth.errors import LoopOpen, OutOfReach, Singular
+from zwidth.model import OK, OUT_OF_REACH, Mechanism, inertia_terms, pack, solve_posture
 from zwidth.model.handle_position import check_mobility, drives_fit
-from zwidth.model.posture import SINGULAR, LoopOpen, _references
+from zwidth.model.posture import SINGULAR, _references
 
 
 def paddle(length=0.1):

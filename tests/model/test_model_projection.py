@@ -6,7 +6,8 @@ import pytest
 
 from tests.paddle import LENGTH, paddle
 from zwidth.device.load import load
-from zwidth.model import OK, OUT_OF_REACH, OutOfReach, solve_posture
+from zwidth.errors import OutOfReach
+from zwidth.model import OK, OUT_OF_REACH, solve_posture
 
 
 @pytest.fixture(scope="module")

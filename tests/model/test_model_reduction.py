@@ -8,10 +8,10 @@ import sympy
 from model_cases import KINDS, Y, five_bar, some_postures
 from scipy.linalg import eigh, null_space
 
+from zwidth.errors import ModelError
 from zwidth.model import (
     GivenDamping,
     ModalDamping,
-    ModelError,
     Plant,
     ProportionalDamping,
     natural_frequencies,

@@ -8,8 +8,8 @@ import pytest
 from tests import systems
 from tests.measured_cases import chirp, encoder_readings, sampled_response
 from zwidth.chart import measured_chart, stability_chart
+from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth, Controller, Loop
-from zwidth.model import ResponseError
 from zwidth.model.raw_sweep import sweep_response
 
 T = 0.001

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from model_cases import KINDS, five_bar
 
-from zwidth.model import OK, OUT_OF_REACH, OutOfReach, pack, posture_batch, solve_posture
+from zwidth.errors import OutOfReach
+from zwidth.model import OK, OUT_OF_REACH, pack, posture_batch, solve_posture
 from zwidth.model.posture import UNSOLVED
 from zwidth.model.posture_batch import outside_shells, shells
 from zwidth.model.roadmap import roadmap

@@ -5,7 +5,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from zwidth.model import ResponseError, sweep_response_of_blocks
+from zwidth.errors import ResponseError
+from zwidth.model import sweep_response_of_blocks
 from zwidth.model.raw_sweep import block_length, sweep_response
 
 PERIOD = 1e-3

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.device.device_cases import ARM_FILE
-from zwidth.contact import MotionError
 from zwidth.device import from_document
+from zwidth.errors import ArgumentError
 from zwidth.model import OK, RatioTable, modes_in_general, natural_frequencies
 from zwidth.model.effective_mass import effective_parameters
 
@@ -118,7 +118,7 @@ def test_the_functions_of_the_model_look_the_ratio_up():
 
 def test_the_large_motion_refuses_a_table():
     with pytest.raises(
-        MotionError, match="not simulated with a transmission whose ratio changes; simulate the plant"
+        ArgumentError, match="not simulated with a transmission whose ratio changes; simulate the plant"
     ):
         two_links(CHANGING).at().move()
 

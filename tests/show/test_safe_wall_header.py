@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from zwidth.device.load import load
+from zwidth.errors import OutputError
 from zwidth.loop import BackwardDifference, Butterworth, FirstOrder, ForceSensor, WindowedDifference
-from zwidth.show import HEADER_NAME, OutputError, header_text
+from zwidth.show import HEADER_NAME, header_text
 from zwidth.show.safe_walls_header import sketch_obstacle, sketch_text, write_sketch
 from zwidth.study import safe_walls
 

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from scipy.io import loadmat
 
-from zwidth.show import OutputError
+from zwidth.errors import OutputError
 from zwidth.show.dataset import write_dataset
 
 

@@ -17,19 +17,10 @@ from tests.systems import mass
 from zwidth.chart import spectral_radius, stability_chart
 from zwidth.chart.arcs import simple_rings
 from zwidth.device.load import load
+from zwidth.errors import OutputError
 from zwidth.loop import Controller, Loop
 from zwidth.model import Plant
-from zwidth.show import (
-    GREY,
-    OutputError,
-    draw_chart,
-    draw_decay_contours,
-    draw_frequency,
-    draw_models,
-    figure,
-    label,
-    save,
-)
+from zwidth.show import GREY, draw_chart, draw_decay_contours, draw_frequency, draw_models, figure, label, save
 from zwidth.show.figures.mechanism_motion import draw_chain, draw_mechanism
 from zwidth.show.figures.stability import corners, edges_of, round_radii, tenfold_time
 from zwidth.show.figures.style import fitted_columns, inline_svg, number_logarithmic

@@ -8,6 +8,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import PathPatch
 
 from zwidth.device.load import load
+from zwidth.errors import NoValueError
 from zwidth.measures import (
     BEYOND_LIMIT,
     FAILED,
@@ -19,7 +20,6 @@ from zwidth.measures import (
     SINGULAR,
     UNDECIDED,
     Measure,
-    NoValueError,
 )
 from zwidth.show import MARKS, area_text, draw_map, figure, map_figure, percent, save
 from zwidth.study import common_area, parse_requirement, plane_of, workspace_map

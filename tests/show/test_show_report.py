@@ -13,10 +13,9 @@ from html.parser import HTMLParser
 import pytest
 from markupsafe import Markup
 
-from zwidth.chart import ChartError
 from zwidth.device import from_document
 from zwidth.device.load import load
-from zwidth.model import OutOfReach
+from zwidth.errors import ChartError, OutOfReach
 from zwidth.show import gather, json_text
 from zwidth.show.report import facts as facts_module
 from zwidth.show.report.report import keep_units, page, write_report

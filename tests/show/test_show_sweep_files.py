@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from tests.study.study_cases import TWO_MASS, axis, study
-from zwidth.memory_limit import TooLarge
-from zwidth.show import OutputError, csv_text, dataset, json_text
+from zwidth.errors import OutputError, TooLarge
+from zwidth.show import csv_text, dataset, json_text
 from zwidth.show.dataset import write_sweep_csv, write_sweep_zarr, write_zarr
 from zwidth.study import Sweep, run_study
 from zwidth.study.designs import sweep_data

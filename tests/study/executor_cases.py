@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from zwidth.measures import FAILED, NO_VALUE, OK, MeasureError, Note
+from zwidth.errors import MeasureError
+from zwidth.measures import FAILED, NO_VALUE, OK, Note
 from zwidth.study import CellValues
 
 LEFT_OUT = "is a multiple of seven"

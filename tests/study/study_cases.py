@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 from zwidth.measures import OK
 from zwidth.study import Study, study_of
 

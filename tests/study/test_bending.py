@@ -23,7 +23,7 @@ from tests.model.beam_devices import (
 )
 from zwidth.device import from_document
 from zwidth.device.new_file import new_device
-from zwidth.loop import MissingNumbersError, OperatingPointError
+from zwidth.errors import MissingNumbersError, OperatingPointError
 from zwidth.model import natural_frequencies
 from zwidth.study.bending import DAMPING, FIRST_ROOT, LEAST_SHARE, SHARE, THICKEST, WALL, with_rigid_links
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.study.study_cases import study_document
-from zwidth.device import DeviceError
 from zwidth.device.load import load
+from zwidth.errors import DeviceError
 from zwidth.study import run_study, study_of
 
 MOTORS = """name,inertia_kg_m2,torque_Nm,price

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
-from zwidth.chart import ChartError, Tracer, largest_stiffness
+from zwidth.chart import Tracer, largest_stiffness
 from zwidth.device import from_document
 from zwidth.device.load import load
+from zwidth.errors import ChartError, NoAnswerError
 from zwidth.loop import table_of_loops
 from zwidth.study import optimum, sensitivities
 from zwidth.study.sensitivity import changed_devices
 from zwidth.study.sensitivity.changed_devices import ChangedDevices
-from zwidth.study.sensitivity.optimum import OptimumError
 
 FILTER = "loop.velocity.filter={type='butterworth', order=2, cutoff_Hz=20.0}"
 # Bundled device, changes of it, and where it is asked: positions [m] or joint angles [rad].
@@ -82,7 +82,7 @@ def test_the_edge_of_many_loops_moves_as_that_of_each():
         try:
             peak = largest_stiffness(loop)
             pairs += [] if peak is None else [(loop, optimum(loop, peak))]
-        except (ChartError, OptimumError):
+        except (ChartError, NoAnswerError):
             continue
     loops = [loop for loop, _ in pairs]
     table = table_of_loops(*loops)

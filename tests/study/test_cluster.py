@@ -14,11 +14,11 @@ import pytest
 
 from tests.study.cluster_cases import running_cluster
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
+from zwidth.errors import CannotStart, ClusterEnded, ClusterError
 from zwidth.measures import FAILED, OUT_OF_TIME
-from zwidth.study import CannotStart, RecoveredWarning, Store, open_executor, pack_job, run
+from zwidth.study import RecoveredWarning, Store, open_executor, pack_job, run
 from zwidth.study.jobs import cluster as clusters
 from zwidth.study.jobs import workers
-from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 

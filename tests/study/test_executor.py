@@ -20,8 +20,8 @@ from tests.study.executor_cases import (
     RootsJob,
     same_cells,
 )
-from zwidth.measures import FAILED, MISSING, NO_VALUE, MeasureError, Note
-from zwidth.memory_limit import TooLarge
+from zwidth.errors import MeasureError, TooLarge
+from zwidth.measures import FAILED, MISSING, NO_VALUE, Note
 from zwidth.study import Store, pack_job, run
 from zwidth.study.jobs import executor
 from zwidth.study.jobs.executor import batch_size

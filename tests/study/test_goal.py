@@ -13,9 +13,10 @@ from scipy.optimize import brentq
 from tests.frozen.mechanisms import mechanism_file
 from tests.frozen.plants import plant_file
 from tests.frozen.toml_text import toml_text
-from zwidth.chart import ChartError, largest_stiffness
-from zwidth.device import DeviceError, address, from_document
+from zwidth.chart import largest_stiffness
+from zwidth.device import address, from_document
 from zwidth.device.load import load
+from zwidth.errors import ChartError, DeviceError
 from zwidth.study import numbers_for_goal, sensitivities
 from zwidth.study.sensitivity.sensitivities import property_numbers
 

@@ -10,7 +10,7 @@ import pytest
 
 import zwidth
 from zwidth.device.new_file import new_device
-from zwidth.loop import NoMechanismError
+from zwidth.errors import NoMechanismError
 from zwidth.measures import fastest_sideways_motion
 from zwidth.model import Load
 from zwidth.study import load_path

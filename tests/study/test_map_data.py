@@ -7,7 +7,8 @@ import pytest
 
 from tests.cli.command_runner import document_of, run_command
 from zwidth.device.load import load
-from zwidth.measures import Measure, NoValueError
+from zwidth.errors import NoValueError
+from zwidth.measures import Measure
 from zwidth.show import csv_text, json_value
 from zwidth.study import (
     common_area,

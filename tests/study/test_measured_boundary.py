@@ -9,11 +9,12 @@ import pytest
 
 from tests.systems import published
 from zwidth.chart import stability_chart
-from zwidth.contact import StableExtent, TrialError
+from zwidth.contact import StableExtent
 from zwidth.contact.boundary_experiment import EdgePoint
 from zwidth.device import from_document
 from zwidth.device.load import load
-from zwidth.study import Experiment, JournalError, MeasuredPoint, Plan, UserPoint, measure_boundary
+from zwidth.errors import ArgumentError, StoreError
+from zwidth.study import Experiment, MeasuredPoint, Plan, UserPoint, measure_boundary
 from zwidth.study.boundary.experiment import run_experiment
 from zwidth.study.boundary.measured_boundary import Cause
 
@@ -67,7 +68,7 @@ def test_what_is_done_is_kept_and_not_computed_again(point, boundary_and_file, m
 def test_a_file_that_holds_something_else_is_left_alone(point, tmp_path):
     notes = tmp_path / "notes.txt"
     notes.write_text("my notes\n")
-    with pytest.raises(JournalError, match="is not the journal of a run"):
+    with pytest.raises(StoreError, match="is not the journal of a run"):
         measure_boundary(point, FEWEST, file=notes)
     assert notes.read_text() == "my notes\n"
 
@@ -95,10 +96,10 @@ def test_parts_that_are_not_linear_are_left_out_one_by_one_unless_not_wanted():
 
 
 def test_subjects_need_somebody_who_holds_the_device(point):
-    with pytest.raises(TrialError, match="subjects differ in the arm that holds the device") as caught:
+    with pytest.raises(ArgumentError, match="subjects differ in the arm that holds the device") as caught:
         measure_boundary(point, replace(FEWEST, subjects=2))
     assert caught.value.argument == "subjects"
-    with pytest.raises(TrialError, match="give an operator") as caught:
+    with pytest.raises(ArgumentError, match="give an operator") as caught:
         measure_boundary(point, replace(FEWEST, reflex=True))
     assert caught.value.argument == "reflex"
 
@@ -108,12 +109,12 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
 
     def held_by(loop, operator, *_):
         asked.append((loop, operator))
-        raise TrialError("push", "is asked about no further")
+        raise ArgumentError("push", "is asked about no further")
 
     monkeypatch.setattr("zwidth.study.boundary.experiment.run_experiment", held_by)
     held = load("published-two-mass").at(operator="thesis-arm")
     for one in (held, held.without_operator, held.in_model("motor-mass")):
-        with pytest.raises(TrialError):
+        with pytest.raises(ArgumentError):
             measure_boundary(one, FEWEST)
     (bare, arm), (_, nobody), (_, fixed) = asked
     assert bare.plant.mass.shape == held.ungripped_plant.mass.shape
@@ -132,7 +133,7 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
     ],
 )
 def test_a_plan_that_cannot_be_meant_is_refused(numbers, argument, says):
-    with pytest.raises(TrialError, match=f"{argument} {says}") as caught:
+    with pytest.raises(ArgumentError, match=f"{argument} {says}") as caught:
         Plan(**numbers)
     assert (caught.value.argument, caught.value.reason[: len(says)]) == (argument, says)
 

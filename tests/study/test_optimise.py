@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from tests.study.study_cases import axis, study_document
-from zwidth.device import OPERATORS, DeviceError, bundled_names
+from zwidth.device import OPERATORS, bundled_names
 from zwidth.device.load import load
+from zwidth.errors import DeviceError, StoreError
 from zwidth.measures import OK, OUT_OF_REACH
 from zwidth.study import (
     Judge,
-    StoreError,
     gradients,
     neighbours,
     problem_of,

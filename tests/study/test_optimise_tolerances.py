@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.study.study_cases import axis, study_document
-from zwidth.device import OPERATORS, DeviceError, bundled_names
+from zwidth.device import OPERATORS, bundled_names
+from zwidth.errors import DeviceError
 from zwidth.show import percent
 from zwidth.show.report.optimisation import sentences
 from zwidth.study import Judge, member_changes, problem_of, run, study_of, values_at

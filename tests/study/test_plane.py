@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm
-from zwidth.device import DeviceError, from_document
+from zwidth.device import from_document
 from zwidth.device.load import load
-from zwidth.model import Singular, reachable_positions, solve_posture
-from zwidth.study import PlaneError, plane_of
+from zwidth.errors import DeviceError, Singular, WorkspaceError
+from zwidth.model import reachable_positions, solve_posture
+from zwidth.study import plane_of
 from zwidth.study.workspace.plane_grid import reachable_set, rounded_outwards
 
 
@@ -149,7 +150,7 @@ def test_a_tilted_planar_device_gets_its_own_plane(planar):
     leaning = solve_posture(tilted, plane.positions, device.reference_assembly)
     assert (straight.status == 0).sum() > 100
     np.testing.assert_array_equal(straight.status, leaning.status)
-    with pytest.raises(PlaneError, match="in a line; leave axes out"):
+    with pytest.raises(WorkspaceError, match="in a line; leave axes out"):
         plane_of(device, "xy")
 
 
@@ -175,7 +176,7 @@ def test_what_is_reached_is_reached(spatial):
     ],
 )
 def test_a_plane_that_cannot_be_mapped(planar, asked, said):
-    with pytest.raises(PlaneError, match=said) as caught:
+    with pytest.raises(WorkspaceError, match=said) as caught:
         plane_of(planar, **asked)
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(
         caught.value

@@ -14,10 +14,11 @@ import pytest
 
 from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
-from zwidth.measures import FAILED, OUT_OF_TIME, MeasureError
-from zwidth.study import CannotStart, RecoveredWarning, Store, open_executor, pack_job, run
+from zwidth.errors import CannotStart, MeasureError, OutOfTime, WorkerLost
+from zwidth.measures import FAILED, OUT_OF_TIME
+from zwidth.study import RecoveredWarning, Store, open_executor, pack_job, run
 from zwidth.study.jobs import workers
-from zwidth.study.jobs.workers import OutOfTime, WorkerLost, WorkerProcess, compute_range
+from zwidth.study.jobs.workers import WorkerProcess, compute_range
 
 NO_PATIENCE = -1.0
 TRUE_CELLS = RootsJob(40).compute(0, 40)

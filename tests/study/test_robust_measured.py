@@ -7,10 +7,10 @@ import pytest
 
 from tests.measured_handle_cases import COLLOCATED, frequencies, measured_device
 from zwidth.chart.verdict import STABLE, UNSTABLE
-from zwidth.device import DeviceError
 from zwidth.device.load import load
+from zwidth.errors import DeviceError, RangeError
 from zwidth.model import Plant
-from zwidth.study import Family, Range, RangeError, robust_study
+from zwidth.study import Family, Range, robust_study
 
 T = 0.001
 LOOP = "[loop]\nsampling_period_s = 0.001\n{}"

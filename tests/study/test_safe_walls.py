@@ -10,8 +10,9 @@ import pytest
 
 from tests.study.safe_wall_cases import largest_radii, random_device, search_table, try_table
 from zwidth.device.load import load
+from zwidth.errors import WorkspaceError
 from zwidth.measures import NO_VALUE, OK, OUT_OF_REACH, UNDECIDED
-from zwidth.study import PlaneError, SafeWallsError, Store, run, safe_walls
+from zwidth.study import Store, run, safe_walls
 from zwidth.study.wall_tables.cell_walls import cell_walls
 from zwidth.study.wall_tables.safe_walls import SafeWallsJob, compute_table, safe_walls_job
 from zwidth.study.wall_tables.table import rounded
@@ -294,7 +295,7 @@ def test_questions_differ_where_cells_do():
     ],
 )
 def test_arguments_that_are_not_allowed_are_named(arguments, message):
-    with pytest.raises(SafeWallsError, match=message):
+    with pytest.raises(WorkspaceError, match=message):
         safe_walls(load(MECHANISM), **({"cells": (2, 2)} | arguments))
 
 
@@ -309,7 +310,7 @@ def test_arguments_that_are_not_allowed_are_named(arguments, message):
     ],
 )
 def test_cells_that_cannot_be_are_named(arguments, message):
-    with pytest.raises(PlaneError, match=message):
+    with pytest.raises(WorkspaceError, match=message):
         safe_walls(load(MECHANISM), **arguments)
 
 
@@ -330,13 +331,13 @@ def test_arguments_of_another_kind_are_named(arguments, message):
 
 
 def test_devices_that_have_no_table_are_refused_with_what_to_do():
-    with pytest.raises(SafeWallsError, match="one direction, got 2 parts of directions; leave out directions"):
+    with pytest.raises(WorkspaceError, match="one direction, got 2 parts of directions; leave out directions"):
         safe_walls(load(TWO_MASS), directions=2)
-    with pytest.raises(PlaneError, match="no workspace; its walls are the same everywhere"):
+    with pytest.raises(WorkspaceError, match="no workspace; its walls are the same everywhere"):
         safe_walls(load(TWO_MASS), x=(0.0, 1.0))
-    with pytest.raises(SafeWallsError, match=r"a device without load.*leave the load out, with set='load=unset'"):
+    with pytest.raises(WorkspaceError, match=r"a device without load.*leave the load out, with set='load=unset'"):
         safe_walls(load(MECHANISM).under((0.0, -5.0)))
-    with pytest.raises(PlaneError, match=r"one drive and moves along a curve.*as a \[plant\]"):
+    with pytest.raises(WorkspaceError, match=r"one drive and moves along a curve.*as a \[plant\]"):
         safe_walls(load("hapkit"))
 
 

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from tests.study.executor_cases import RootsJob
-from zwidth.study import JobSeries, StoreError
+from zwidth.errors import StoreError
+from zwidth.study import JobSeries
 from zwidth.study.jobs.series import remove_stores
 
 

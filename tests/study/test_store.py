@@ -10,8 +10,9 @@ import pytest
 import zarr
 
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
+from zwidth.errors import StoreError
 from zwidth.measures import MISSING, STATUS
-from zwidth.study import Store, StoreError, run
+from zwidth.study import Store, run
 
 
 def partial_store(path, job, batches, size=5):

@@ -18,7 +18,8 @@ import pytest
 from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
-from zwidth.study import FolderLock, Store, StoreError, run
+from zwidth.errors import StoreError
+from zwidth.study import FolderLock, Store, run
 from zwidth.study.jobs import executor
 from zwidth.study.jobs.store import StoredCells, owner_of
 

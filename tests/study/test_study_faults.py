@@ -16,9 +16,8 @@ from tests.study.study_cases import (
     study,
     study_document,
 )
-from zwidth.device import DeviceError
 from zwidth.device.new_file import new_device
-from zwidth.memory_limit import TooLarge
+from zwidth.errors import DeviceError, TooLarge
 from zwidth.study import read_study, study_of
 
 DELAY = axis("loop.delay_samples", 0.0, 1.0)

@@ -14,7 +14,8 @@ import pytest
 from zwidth.chart import judge
 from zwidth.device import address, from_document
 from zwidth.device.load import load
-from zwidth.study import Family, FamilyMember, Range, RangeError, RobustError, robust_study
+from zwidth.errors import NoAnswerError, RangeError
+from zwidth.study import Family, FamilyMember, Range, robust_study
 from zwidth.study.robust.robust_study import sample_walls
 
 PAGE = Path(__file__).parents[2] / "docs" / "robust.md"
@@ -254,7 +255,7 @@ def test_members_that_cannot_be_built_are_counted_and_named():
 def test_nobody_to_chart_is_an_error(monkeypatch):
     fam = family(one_mass_device(), Range("plant.mass_kg", 0.1, 0.2))
     monkeypatch.setattr(Family, "loop", lambda self, point: (_ for _ in ()).throw(ValueError("no such thing")))
-    with pytest.raises(RobustError, match="none of 3 members could be charted; the first: no such thing"):
+    with pytest.raises(NoAnswerError, match="none of 3 members could be charted; the first: no such thing"):
         robust_study(fam, 4, 4)
 
 

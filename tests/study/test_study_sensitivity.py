@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.systems import random_loop
-from zwidth.chart import ChartError, Peak, Tracer, closed_rings, largest_stiffness, stability_chart
+from zwidth.chart import Peak, Tracer, closed_rings, largest_stiffness, stability_chart
 from zwidth.chart.arcs import MINUS, PAIR, PLUS
 from zwidth.device import address, from_document
 from zwidth.device.load import device_of_point, load
+from zwidth.errors import ChartError
 from zwidth.loop import Loop
 from zwidth.model import Plant
 from zwidth.study import optimum, sensitivities

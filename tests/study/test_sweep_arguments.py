@@ -10,9 +10,9 @@ import pytest
 
 import zwidth
 from tests.study.study_cases import FIVE_BAR, RIGHT_LENGTH, TWO_MASS, axis, study
-from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.measures import FAILED, OK, Measure, MeasureError
+from zwidth.errors import DeviceError, MeasureError
+from zwidth.measures import FAILED, OK, Measure
 from zwidth.study import plane_of, run_study, study_over, sweep, sweep_job
 
 PERIOD, DELAY = "loop.sampling_period_s", "loop.delay_samples"

@@ -6,8 +6,7 @@ import pytest
 
 import zwidth
 from tests.study.tolerance_cases import tolerance_document, tolerance_faults, uniform
-from zwidth.device import DeviceError
-from zwidth.memory_limit import TooLarge
+from zwidth.errors import DeviceError, TooLarge
 from zwidth.study import question_of, study_of, tolerance
 
 LENGTH = "links.upper-right.length_m"

@@ -10,7 +10,7 @@ from scipy import stats
 
 import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, free_mass, tolerance_document, tolerance_faults
-from zwidth.device import DeviceError
+from zwidth.errors import DeviceError
 from zwidth.study import question_over, tolerance
 
 NORMAL, LOGNORMAL = {"distribution": "normal"}, {"distribution": "lognormal"}

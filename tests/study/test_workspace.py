@@ -10,23 +10,11 @@ import numpy as np
 import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm
-from zwidth.device import DeviceError
 from zwidth.device.load import load
-from zwidth.measures import (
-    FAILED,
-    MEASURES,
-    NO_VALUE,
-    OK,
-    OUT_OF_REACH,
-    STATUS,
-    Measure,
-    MeasureError,
-    NoValueError,
-    WantedWall,
-)
+from zwidth.errors import DeviceError, MeasureError, NoValueError, PostureError, WorkspaceError
+from zwidth.measures import FAILED, MEASURES, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, WantedWall
 from zwidth.measures.evaluation import evaluate_safely
-from zwidth.model import PostureError
-from zwidth.study import PlaneError, Store, map_job, over_the_workspace, plane_of, workspace_map
+from zwidth.study import Store, map_job, over_the_workspace, plane_of, workspace_map
 from zwidth.study.designs.column import positions
 from zwidth.study.workspace.map import MapJob, as_dataset
 
@@ -240,7 +228,7 @@ def test_questions_that_cannot_be_meant(device, asked, error, said):
 def test_a_plane_beside_the_workspace(device):
     plane = plane_of(device, x=(1.0, 1.1), y=(0.0, 1.0), cells=(4, 4))
     with pytest.raises(
-        PlaneError, match=r"reaches no point of this plane .*; it reaches x from -0\.346 to 0\.346 m"
+        WorkspaceError, match=r"reaches no point of this plane .*; it reaches x from -0\.346 to 0\.346 m"
     ):
         workspace_map(device, ["isotropy"], plane)
 

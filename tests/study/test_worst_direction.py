@@ -7,8 +7,9 @@ import pytest
 
 from tests.model.model_cases import random_five_bar, spatial_arm, spatial_loop
 from zwidth.device.load import load
+from zwidth.errors import MeasureError, NoValueError
 from zwidth.loop import OperatingPoint
-from zwidth.measures import MEASURES, NO_VALUE, OK, Measure, MeasureError, NoValueError
+from zwidth.measures import MEASURES, NO_VALUE, OK, Measure
 from zwidth.model import solve_posture
 from zwidth.study import extreme_over_directions, parse_requirement
 from zwidth.study.designs.column import Requirement

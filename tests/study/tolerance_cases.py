@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from zwidth.device import Device, DeviceError, from_document
+from zwidth.device import Device, from_document
+from zwidth.errors import DeviceError
 from zwidth.study import question_of
 
 PERIOD, MASS = 0.001, 0.1

@@ -6,7 +6,6 @@ from .chart import stability_chart as stability_chart
 from .chart_base import BoundaryArc as BoundaryArc
 from .chart_batch import ALL_NUMBERS as ALL_NUMBERS
 from .decay import FastestDecay as FastestDecay
-from .edge_by_eigenvalues import ChartError as ChartError
 from .edge_by_eigenvalues import closed_rings as closed_rings
 from .edge_crossings import EdgeChords as EdgeChords
 from .edge_crossings import exact_edge as exact_edge

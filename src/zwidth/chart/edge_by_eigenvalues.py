@@ -35,6 +35,7 @@ from zwidth.chart.real_root_lines import wall_on_line
 from zwidth.chart.tracer import CIRCLE_TOLERANCE, ROOTS, Tracer
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled
+from zwidth.errors import ChartError
 from zwidth.loop.circle_factors import COMPUTER, CircleFactors, wall_with_slopes
 from zwidth.loop.loop_table import LoopTable
 
@@ -52,10 +53,6 @@ SAME_CROSSING, SAME_PLACE = 1e-6, 1e-5
 HALVINGS: Final = 50
 # Stages that `_stage` runs.
 SAMPLE, WALLS, FLAGS, CORNERS, PAIR_ARCS, LINE_PIECES, LINE_ARCS, JOIN = range(8)
-
-
-class ChartError(RuntimeError):
-    """The edge of the stable set could not be closed."""
 
 
 def closed_rings(tracer: Tracer, extra_angles: Floats | None = None) -> tuple[Arcs, float]:

@@ -58,16 +58,16 @@ from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.nyquist import terms_along
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
+from zwidth.errors import HysteresisError, ResponseError
 from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import table_of_loops
-from zwidth.loop.sections import HysteresisError
 from zwidth.model.argument_checks import require
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant
-from zwidth.model.response import Response, ResponseError, integrators_of
+from zwidth.model.response import Response, integrators_of
 
 # Pairs of aliases summed, and how many for each that the highest natural frequency lies above: what is left out
 # falls off with the third power.

@@ -33,12 +33,13 @@ from zwidth.chart.area import Peak
 from zwidth.chart.chart_batch import ALL_NUMBERS, memory_of, read_first
 from zwidth.chart.curve import trace
 from zwidth.chart.edge_arcs import SAME_CORNER
-from zwidth.chart.edge_by_eigenvalues import ChartError, EdgeRings, arcs_of_rings, closed_rings, rings_of
+from zwidth.chart.edge_by_eigenvalues import EdgeRings, arcs_of_rings, closed_rings, rings_of
 from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING, SAMPLES, EdgeMemory
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import CIRCLE_TOLERANCE, Tracer
 from zwidth.chart.verdict import distances_from_circle
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
+from zwidth.errors import ChartError
 from zwidth.loop.circle_factors import DEGREE
 from zwidth.loop.realisation import StateSpace
 

@@ -12,19 +12,16 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import FOUND
 from zwidth.chart.edge_memory import NO_WALL as NONE_FOUND
 from zwidth.chart.point_chart import numbers_of_points
+from zwidth.errors import ChartError, DirectionError, LoadError, ModelError, UnmovedError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_text import check_several_directions
-from zwidth.loop.sections import UnmovedError
 from zwidth.model.argument_checks import check_choice, require
-from zwidth.model.load import LoadError
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import DirectionError, ModelError
 from zwidth.progress import Progress
 from zwidth.result import Result
 

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.verdict import spectral_radius
 from zwidth.conditions import (
     abbott_okamura,
@@ -34,6 +33,7 @@ from zwidth.conditions import (
 )
 from zwidth.conditions.assumptions import Bound, case_of
 from zwidth.conditions.traits import ground_friction, reading_step
+from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_number, require

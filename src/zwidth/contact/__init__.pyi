@@ -32,9 +32,7 @@ from .loop_simulation import Run as Run
 from .loop_simulation import simulate as simulate
 from .loop_simulation import simulate_batch as simulate_batch
 from .mechanism.motion import MechanismMotion as MechanismMotion
-from .mechanism.motion_inputs import MotionError as MotionError
 from .mechanism.simulate_mechanism import SurfaceEnvironment as SurfaceEnvironment
-from .mechanism.simulate_mechanism import SurfaceOutOfReach as SurfaceOutOfReach
 from .mechanism.simulate_mechanism import SurfaceWall as SurfaceWall
 from .mechanism.simulate_mechanism import simulate_mechanism as simulate_mechanism
 from .mechanism.surfaces import Box as Box
@@ -42,12 +40,8 @@ from .mechanism.surfaces import Plane as Plane
 from .mechanism.surfaces import Sphere as Sphere
 from .mechanism.surfaces import depth_and_normal as depth_and_normal
 from .passivity_controller import PassivityController as PassivityController
-from .point_contact import ContactArgumentError as ContactArgumentError
-from .point_contact import NoForceError as NoForceError
-from .point_contact import OutOfWorkspaceError as OutOfWorkspaceError
 from .point_contact import simulate_contact as simulate_contact
 from .stability_trial import StabilityTrial as StabilityTrial
-from .stability_trial import TrialError as TrialError
 from .stability_trial import observe as observe
 from .time_response import SOURCES as SOURCES
 from .time_response import Judgement as Judgement
@@ -60,6 +54,4 @@ from .touch_step import touch as touch
 from .touch_step import touch_obstacle as touch_obstacle
 from .touch_step import touch_periods as touch_periods
 from .wall_limit_cycles import LimitCyclePrediction as LimitCyclePrediction
-from .wall_limit_cycles import NoEncoderStepsError as NoEncoderStepsError
-from .wall_limit_cycles import NothingNonlinearError as NothingNonlinearError
 from .wall_limit_cycles import predict_limit_cycles as predict_limit_cycles

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeKind
-from zwidth.contact.stability_trial import LEVELS, Observation, StabilityTrial, TrialError, observe
+from zwidth.contact.stability_trial import LEVELS, Observation, StabilityTrial, observe
+from zwidth.errors import ArgumentError, NoAnswerError
 from zwidth.model.modes import least_deforming_motion
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
@@ -44,10 +45,6 @@ FIRST_ZOOM: Final = 3e-4  # share of the stiffness to which the first round meas
 TIP_SHARE: Final = 0.93  # share of the largest stiffness from which on the tip is measured
 HALVED: Final = 5  # times the start of a tip is lowered
 ACCURACY: Final = 1e-4  # of the range of stable dampings, or of the stiffness
-
-
-class NoStableWallError(ValueError):
-    """No stable wall was found."""
 
 
 class SearchWindow(NamedTuple):
@@ -100,7 +97,7 @@ def find_stable_walls(
 
     progress  called with the number of steps done, and of all six
     box     look here only; None: everywhere between millionths and all of what the device's mass allows
-    Raises  NoStableWallError  where no stable wall with K > 0 is found
+    Raises  NoAnswerError  where no stable wall with K > 0 is found
     """
     _check(box)
     tell = progress or (lambda done, of: None)
@@ -110,7 +107,7 @@ def find_stable_walls(
     columns = _columns(trial, patch, box)
     tell(2, ZOOMS + 2)
     if not columns:
-        raise NoStableWallError(_none(box))
+        raise NoAnswerError(_none(box))
     reach = max(B for B, _, _ in columns)
     best = max(columns, key=lambda column: column[1])
     within = _within(box)
@@ -135,7 +132,7 @@ def find_stable_walls(
         if not fresh:  # seen for longer, nothing there is stable
             columns.remove(best)
             if not columns:
-                raise NoStableWallError(_none(box))
+                raise NoAnswerError(_none(box))
             best = max(columns, key=lambda column: column[1])
             continue
         best = max(fresh, key=lambda column: column[1])
@@ -154,10 +151,10 @@ def _check(box: SearchWindow | None) -> None:
         return
     for name, unit, span in zip(("stiffness", "damping"), ("N/m", "N s/m"), box, strict=True):
         if not all(map(isfinite, span)) or not span[0] < span[1]:
-            raise TrialError(name, f"must be a range LOW < HIGH [{unit}], got {span[0]:g} to {span[1]:g}")
+            raise ArgumentError(name, f"must be a range LOW < HIGH [{unit}], got {span[0]:g} to {span[1]:g}")
     if not box.stiffness[1] > 0.0:
         got = f"got {box.stiffness[0]:g} to {box.stiffness[1]:g}"
-        raise TrialError("stiffness", f"must reach above 0 [N/m], {got}")
+        raise ArgumentError("stiffness", f"must reach above 0 [N/m], {got}")
 
 
 def _within(box: SearchWindow | None) -> tuple[float, float]:
@@ -197,7 +194,7 @@ def _raster_region(trial: StabilityTrial, box: SearchWindow | None) -> tuple[Flo
         if stable.any():
             break
     else:
-        raise NoStableWallError(_none(box))
+        raise NoAnswerError(_none(box))
     names, _ = label(stable.reshape(len(K), len(B)))
     sizes = np.bincount(names.ravel())[1:]
     return K, B, np.asarray(names == 1 + int(np.argmax(sizes)))

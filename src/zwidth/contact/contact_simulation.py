@@ -21,7 +21,7 @@ from zwidth.contact.hand import Hand
 from zwidth.contact.loop_simulation import LARGEST_MOTION
 from zwidth.contact.passivity_controller import rendered_stiffness
 from zwidth.contact.time_response import SOURCES, Behaviour, Judgement, TimeResponse, as_key, judge_response
-from zwidth.loop.estimator import NonlinearError
+from zwidth.errors import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import unheld_positions
 from zwidth.loop.operating_point import OperatingPoint

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.conditions.diolaiti import dimensionless_friction
 from zwidth.conditions.traits import ground_friction, reading_step, traits
+from zwidth.loop.controller import refuse_feedback, refuse_load
 from zwidth.loop.loop import Loop
-from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 
 PASSIVE: Final = "passive"
 SMALL: Final = "small vibrations"

@@ -31,30 +31,15 @@ from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
 from zwidth.contact.loop_simulation import SUBSTEPS, Run, simulate_batch
 from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.time_response import TimeResponse, judge_response
+from zwidth.errors import ArgumentError, NoAnswerError, PostureError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_choice, check_number, require
 from zwidth.model.operator import Operator
-from zwidth.model.posture import PostureError
 from zwidth.progress import Progress
 
 WallSides = Literal["two-sided", "one-sided"]
 
 DEPTH: Final = 1e-3  # m, at the start: inside what acts everywhere, outside what has a surface
-
-
-class NoForceError(ValueError):
-    """An environment returned no finite force for a position and a velocity that are numbers.
-
-    environment            its name;   time  of the first such sample [s]
-    penetration, velocity  that it was called with [m], [m/s]
-    """
-
-    def __init__(self, environment: str, time: float, penetration: float, velocity: float) -> None:
-        self.environment, self.time, self.penetration, self.velocity = environment, time, penetration, velocity
-        super().__init__(
-            f"{environment} gave no finite force at {time:.6g} s, where it was given a position of "
-            f"{penetration:.6g} m and {velocity:.6g} m/s; have it return a number there"
-        )
 
 
 def simulate_contact(
@@ -106,10 +91,10 @@ def simulate_contact(
     trail              keep the handle's position after each substep
     seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]
     progress           called with "simulating", the samples done, and all samples
-    Raises  ContactArgumentError  for arguments that do not go together, that the environment does not take, or
+    Raises  ArgumentError  for arguments that do not go together, that the environment does not take, or
                                   that need an operator
-            OutOfWorkspaceError   (one of these) for a start or a wall that the handle cannot be moved to
-            NoForceError          where the environment returns no number
+            ArgumentError   (one of these) for a start or a wall that the handle cannot be moved to
+            NoAnswerError          where the environment returns no number
             TooLarge              (memory_limit) for more samples than there is memory for
             ValueError            for numbers that are out of range
             what `OperatingPoint.plant` raises
@@ -251,84 +236,58 @@ def _under_load(
 ) -> tuple[WallSides, str | Environment | None, Mapping[str, float]]:
     """The wall under load: the one-sided one is that on which the hand leans; parameters with its load.
 
-    Raises  ContactArgumentError  for anything but a wall, on which no hand leans
+    Raises  ArgumentError  for anything but a wall, on which no hand leans
     """
     if environment is not None:
-        raise ContactArgumentError("environment", "does not go with a load, which the wall holds; leave one out")
+        raise ArgumentError("environment", "does not go with a load, which the wall holds; leave one out")
     if wall == "two-sided":
         return wall, None, parameters
     load = -point.equilibrium.wall_force
     if not load:
-        raise ContactArgumentError("wall", "is one-sided, and no hand leans on it; give a load with a force")
+        raise ArgumentError("wall", "is one-sided, and no hand leans on it; give a load with a force")
     return "two-sided", ENVIRONMENTS["pressed_wall"], {"load": load, **parameters}
 
 
 def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stiffness: bool) -> str | Environment:
     """The other environment, or the wall that acts on these sides.
 
-    Raises  ContactArgumentError  where both are given, or the wall has no stiffness
+    Raises  ArgumentError  where both are given, or the wall has no stiffness
     """
     check_choice("wall", wall, ("two-sided", "one-sided"))
     if environment is not None and wall == "one-sided":
-        raise ContactArgumentError("wall", "is one-sided beside another environment; leave one out")
+        raise ArgumentError("wall", "is one-sided beside another environment; leave one out")
     if environment is None and not has_stiffness:
-        raise ContactArgumentError("stiffness", "is missing; a wall needs one [N/m]")
+        raise ArgumentError("stiffness", "is missing; a wall needs one [N/m]")
     own = ENVIRONMENTS["one_sided_wall" if wall == "one-sided" else "wall"]
     return own if environment is None else environment
 
 
 def _distance_from_path(point: OperatingPoint, position: float, argument: str) -> float | None:
     """How far from a position the handle's path passes [m]; None for a device without a mechanism. Raises
-    OutOfWorkspaceError where the handle cannot be moved so far."""
+    ArgumentError where the handle cannot be moved so far."""
     try:
         return point.distance_from_path(position)
     except PostureError as error:
-        raise OutOfWorkspaceError(argument, position, error) from None
+        place = f"{PLACES[argument]} lies {position:g} m along the direction"
+        raise ArgumentError(argument, f"{place}, out of the workspace: {error}") from None
 
 
 def _check_forces(responses: Sequence[TimeResponse], environment: Environment) -> None:
-    """Raise NoForceError where the environment, called with numbers, returned none."""
+    """Raise NoAnswerError where the environment, called with numbers, returned none."""
     for response in responses:
         called = np.isfinite(response.reading) & np.isfinite(response.velocity)
         silent = np.flatnonzero(called & ~np.isfinite(response.force))
         if len(silent):
             first = silent[0]
-            raise NoForceError(
-                environment.name,
-                float(response.time[first]),
-                float(response.penetration[first]),
-                float(response.velocity[first]),
+            raise NoAnswerError(
+                f"{environment.name} gave no finite force at {response.time[first]:.6g} s, where it was given a "
+                f"position of {response.penetration[first]:.6g} m and {response.velocity[first]:.6g} m/s; have it "
+                "return a number there"
             )
 
 
 PUSH: Final = 2.0  # N, against what has a surface
 PLACES: Final = {"wall_position": "the wall", "start_position": "the start"}
-
-
-class ContactArgumentError(ValueError):
-    """An argument of a contact that cannot be meant.
-
-    argument  its name
-    reasons   what is wrong with it, each a fault of its own
-    missing   the argument that is to be given with it; None: none
-    """
-
-    def __init__(self, argument: str, *reasons: str, missing: str | None = None) -> None:
-        self.argument, self.reasons, self.missing = argument, reasons, missing
-        advice = "" if missing is None else f"; give {missing}"
-        super().__init__("\n".join(f"{argument}: {reason}{advice}" for reason in reasons))
-
-
-class OutOfWorkspaceError(ContactArgumentError):
-    """The handle of a mechanism cannot be moved to the start, or to the wall.
-
-    argument  "start_position" or "wall_position";   position  along the direction [m]
-    """
-
-    def __init__(self, argument: str, position: float, why: PostureError) -> None:
-        self.position = position
-        place = f"{PLACES[argument]} lies {position:g} m along the direction"
-        super().__init__(argument, f"{place}, out of the workspace: {why}")
 
 
 def environment_with_values(
@@ -344,7 +303,7 @@ def environment_with_values(
     environment  or what `load_environment` finds it by
     parameters   by name; those left out have the environment's defaults
     stiffness, damping, no_pull  three of them; None and False: not given here
-    Raises       ContactArgumentError  for an unknown environment, a file that does not serve, parameters that it
+    Raises       ArgumentError  for an unknown environment, a file that does not serve, parameters that it
                                        does not take or that are given twice
 
     >>> environment_with_values("slot", {"width": 0.01}, stiffness=500.0)[1].tolist()
@@ -357,14 +316,14 @@ def environment_with_values(
             continue
         if name not in chosen.names:
             has = ", ".join(chosen.names) or "none"
-            raise ContactArgumentError(name, f"{chosen.name} has no such parameter; it has {has}")
+            raise ArgumentError(name, f"{chosen.name} has no such parameter; it has {has}")
         if name in given:
-            raise ContactArgumentError("parameters", f"{name} is given twice")
+            raise ArgumentError("parameters", f"{name} is given twice")
         given[name] = value
     try:
         return chosen, chosen.values(**given)
     except ValueError as error:
-        raise ContactArgumentError("parameters", *str(error).splitlines()) from None
+        raise ArgumentError("parameters", *str(error).splitlines()) from None
 
 
 def _environment(environment: str | Environment) -> Environment:
@@ -374,7 +333,7 @@ def _environment(environment: str | Environment) -> Environment:
     try:
         return load_environment(environment)
     except ValueError as error:
-        raise ContactArgumentError("environment", *str(error).splitlines()) from None
+        raise ArgumentError("environment", *str(error).splitlines()) from None
 
 
 def active_hand(
@@ -388,14 +347,14 @@ def active_hand(
 ) -> Hand:
     """The operator with what he does; `surface` says whether there is one to push against.
 
-    Raises  ContactArgumentError  for what needs an arm, or a push
+    Raises  ArgumentError  for what needs an arm, or a push
     """
     for name, movement in (("reach", reach), ("reflex", reflex)):
         if movement is not None and operator is None:
-            raise ContactArgumentError(name, "needs an arm, and nobody holds the device", missing="operator")
+            raise ArgumentError(name, "needs an arm, and nobody holds the device", missing="operator")
     if push is None:
         push = PUSH if surface and reach is None else 0.0
     if ramp and not push:
         why = "is the time in which a push grows, and no push is given"
-        raise ContactArgumentError("ramp", why, missing="push")
+        raise ArgumentError("ramp", why, missing="push")
     return Hand(operator, push, ramp, reach, tremor, reflex)

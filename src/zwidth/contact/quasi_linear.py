@@ -24,10 +24,10 @@ from zwidth.contact.vibration_kernel import (
     transition,
     vibrations,
 )
+from zwidth.loop.controller import refuse_feedback, refuse_load
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.realisation import FilterStates, filter_states
-from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.nonlinear import Counter, Nonlinear
 
 SAME = 1e-11  # relative change of all sizes at which the shape agrees with the gains

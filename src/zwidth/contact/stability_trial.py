@@ -26,6 +26,7 @@ from zwidth.contact.environments.walls import one_sided_wall, wall
 from zwidth.contact.hand import Hand
 from zwidth.contact.loop_simulation import SUBSTEPS, Run, simulate_batch
 from zwidth.contact.time_response import STEADY, Behaviour, Judgement, TimeResponse, judge_response
+from zwidth.errors import ArgumentError
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.loop import Loop
@@ -43,21 +44,6 @@ BOUND_FACTOR: Final = 1e3  # times the disturbance
 AT_ONCE: Final = 1_500_000  # samples kept at a time
 
 
-class TrialError(ValueError):
-    """An experiment that cannot be meant.
-
-    reason    why not, and what to do
-    argument  the number or choice that it is about
-    """
-
-    def __init__(self, argument: str, reason: str) -> None:
-        super().__init__(argument, reason)
-        self.argument, self.reason = argument, reason
-
-    def __str__(self) -> str:
-        return f"{self.argument} {self.reason}"
-
-
 @dataclass(frozen=True)
 class StabilityTrial:
     """A virtual experiment: device, disturbance, hand, and what counts as stable.
@@ -71,7 +57,7 @@ class StabilityTrial:
     seed         of the noise
     substeps     between samples, where something is nonlinear
     watch_time   for so long it is watched, and then judged [s]; None: as long as it takes
-    Raises       TrialError  for numbers that cannot be meant
+    Raises       ArgumentError  for numbers that cannot be meant
     """
 
     loop: Loop
@@ -87,18 +73,20 @@ class StabilityTrial:
     def __post_init__(self) -> None:
         for name, value in (("disturbance", self.disturbance), ("visible", self.visible), ("speed", self.speed)):
             if not isfinite(value) or (name != "speed" and value < 0.0):
-                raise TrialError(name, f"must be finite{' and not negative' * (name != 'speed')}, got {value!r}")
+                raise ArgumentError(
+                    name, f"must be finite{' and not negative' * (name != 'speed')}, got {value!r}"
+                )
         if self.watch_time is not None and not (isfinite(self.watch_time) and self.watch_time > 0.0):
-            raise TrialError("watch_time", f"must be positive and finite [s], got {self.watch_time!r}")
+            raise ArgumentError("watch_time", f"must be positive and finite [s], got {self.watch_time!r}")
         if self.one_sided:
             if not self.hand.push > 0.0:
-                raise TrialError(
+                raise ArgumentError(
                     "push",
                     f"must be positive [N] for a one-sided wall, got {self.hand.push!r}; without it the device "
                     "leaves the wall",
                 )
         elif not self.disturbance > max(self.visible, 0.0):
-            raise TrialError(
+            raise ArgumentError(
                 "disturbance",
                 f"must be larger than what counts as visible, {self.visible!r} m, got {self.disturbance!r} m; "
                 "give a larger one",

@@ -59,10 +59,10 @@ from zwidth.contact.energy_ledger import energy_of
 from zwidth.contact.engine_inputs import HeldDevice, pack_plants, start_states
 from zwidth.contact.hand import Hand
 from zwidth.contact.plant_step import PlantState, dot, read_sensor, step_with_frictions
+from zwidth.errors import UnmovedError
 from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.fixed_feedback import acts
 from zwidth.loop.loop import Loop
-from zwidth.loop.sections import UnmovedError
 from zwidth.model.operator import Operator
 
 # Sizes at the beginning of `counts`: coordinates n, states N, elements E, parts P, encoders C, whole samples of

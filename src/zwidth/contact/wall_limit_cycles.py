@@ -26,9 +26,10 @@ from zwidth.contact.friction_quantisation_plane import device_plane
 from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle, harmonic_balance, with_harmonics
 from zwidth.contact.loop_simulation import LARGEST_MOTION, Run, simulate_batch
 from zwidth.contact.time_response import Behaviour, Judgement, TimeResponse, judge_response
+from zwidth.errors import ArgumentError, NoAnswerError
+from zwidth.loop.controller import refuse_feedback, refuse_load
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.argument_checks import check_number, require
 from zwidth.model.modes import least_deforming_motion
 from zwidth.progress import Progress
@@ -56,23 +57,6 @@ BY_HARMONICS: Final = (
 )
 
 
-class NothingNonlinearError(ValueError):
-    """Nothing in a device depends on the amplitude, so that no vibration keeps its size."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "nothing in this device depends on the amplitude, so it has no limit cycle; give it dry "
-            "friction, encoder steps or a largest force"
-        )
-
-
-class NoEncoderStepsError(ValueError):
-    """A device without encoder steps, for which a place between two steps was given."""
-
-    def __init__(self) -> None:
-        super().__init__("offset lies between two encoder steps, and the device has none; leave it at 0")
-
-
 def predict_limit_cycles(
     point: OperatingPoint,
     stiffness: float,
@@ -90,8 +74,8 @@ def predict_limit_cycles(
               that a constant push can do
     simulate  simulate from near each stable cycle within the range, or from close by where there is none
     progress  called with a stage's name, steps done, steps of all
-    Raises    NothingNonlinearError   where nothing depends on the amplitude
-              NoEncoderStepsError     for an offset where no encoder has steps
+    Raises    NoAnswerError   where nothing depends on the amplitude
+              ArgumentError     for an offset where no encoder has steps
               ValueError              for a wall that is not finite, an offset beyond half a step
               HysteresisError, UnmovedError  (loop.sections) for plants that no wall moves, or not in time
               what `OperatingPoint.plant` raises
@@ -162,9 +146,12 @@ def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str
     _ = loop.sections  # refuses plants that no wall moves, or not in time
     parts = tuple(name for name in loop.nonlinear.kinds if name not in NOT_PREDICTED)
     if not parts:
-        raise NothingNonlinearError
+        raise NoAnswerError(
+            "nothing in this device depends on the amplitude, so it has no limit cycle; give it dry friction, "
+            "encoder steps or a largest force"
+        )
     if offset and "encoder steps" not in parts:
-        raise NoEncoderStepsError
+        raise ArgumentError("offset", "lies between two encoder steps, and the device has none; leave it at 0")
     return parts
 
 

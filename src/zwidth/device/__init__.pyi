@@ -1,6 +1,5 @@
 from .address import edited_text as edited_text
 from .device import Device as Device
-from .faults import DeviceError as DeviceError
 from .load import from_document as from_document
 from .new_file import new_device as new_device
 from .numbers import DeviceNumber as DeviceNumber

@@ -16,9 +16,10 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, TypeGuard
 
-from zwidth.device.faults import SETTINGS, DeviceError, Fault, KeyPath, comma_list, dotted, fail, nearest, quote
+from zwidth.device.faults import SETTINGS, Fault, KeyPath, comma_list, dotted, fail, nearest, quote
 from zwidth.device.read import device_text, within_depth
 from zwidth.device.schema import device_file as schema
+from zwidth.errors import DeviceError
 
 UNSET: Final = object()
 

@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.device.address import is_number, table
-from zwidth.device.faults import DeviceError, KeyMessages, KeyPath, comma_list
+from zwidth.device.faults import KeyMessages, KeyPath, comma_list
 from zwidth.device.legs import members
+from zwidth.errors import DeviceError
 from zwidth.loop.controller import NotKnown
 
 if TYPE_CHECKING:
@@ -186,9 +187,10 @@ def _mode_messages(device: Device) -> dict[str, tuple[KeyPath, str]]:
 def _first_frequencies(device: Device) -> dict[int, float]:
     """The first frequency [Hz] at which each beam bends alone, the other links rigid and the motors held, at the
     reference; {} where that is no posture."""
+    from zwidth.errors import PostureError
     from zwidth.model.mechanism_arrays import pack
     from zwidth.model.motions import Motions
-    from zwidth.model.posture import OK, PostureError
+    from zwidth.model.posture import OK
 
     assert device.mechanism is not None
     with suppress(DeviceError, PostureError):

@@ -19,15 +19,16 @@ from zwidth.arrays import Flags, Floats
 from zwidth.device.address import table
 from zwidth.device.design_checks import certainly_valid, masses_moved
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath
+from zwidth.device.faults import KeyPath
 from zwidth.device.legs import members
 from zwidth.device.load import build_device, check
 from zwidth.device.schema.value_types import Section
+from zwidth.errors import DeviceError, PostureError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import PROJECTION_TOLERANCE
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.mechanism import Mechanism
-from zwidth.model.posture import UNSOLVED, Posture, PostureError, join_postures, solve_posture
+from zwidth.model.posture import UNSOLVED, Posture, join_postures, solve_posture
 from zwidth.model.reduction import Model
 
 _DRIVE: Final = [

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.arrays import Floats
-from zwidth.device.faults import DeviceError, fail, quote, suggestion
+from zwidth.device.faults import fail, quote, suggestion
 from zwidth.device.missing import missing_numbers
 from zwidth.device.posture_arguments import joint_angles, positions, rotations, screws, unit_vectors
+from zwidth.errors import DeviceError
 from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
 from zwidth.model.mechanism import Mechanism
@@ -178,7 +179,7 @@ class Device:
         gravity     (2,) or (3,) [m/s^2], with a load or without; left out: as the file says
         Raises  DeviceError   with what cannot be meant for this device, or a mechanism that cannot be assembled or
                               driven as the file says
-                MatrixError   (loop.wall_matrices) for what is no matrix of a wall law
+                ArgumentError   (loop.wall_matrices) for what is no matrix of a wall law
                 PostureError  (model.posture) where a single position has no posture: out of reach, or singular
                 EquilibriumError, LoadError  (model.equilibrium) where a single position has no equilibrium
         """
@@ -543,7 +544,7 @@ class Device:
             )
             raise fail(self.label, "assembly", message)
         name = assembly or self.reference_assembly
-        from zwidth.model.posture import LoopOpen, PostureError
+        from zwidth.errors import LoopOpen, PostureError
 
         try:
             yield name

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Final
+
+from zwidth.errors import DeviceError
 
 KeyPath = tuple[str | int, ...]
 KeyMessages = Iterator[tuple[KeyPath, str]]
@@ -32,17 +34,6 @@ class Fault:
 
     def __str__(self) -> str:
         return ": ".join(one_line(part) for part in (self.file, self.key, self.message) if part)
-
-
-class DeviceError(ValueError):
-    """A device cannot be made from what was given; `faults` says everything that is wrong with it."""
-
-    def __init__(self, faults: Iterable[Fault]) -> None:
-        self.faults: list[Fault] = list(dict.fromkeys(faults))
-        super().__init__("\n".join(map(str, self.faults)))
-
-    def __reduce__(self) -> tuple[type[DeviceError], tuple[list[Fault]]]:
-        return type(self), (self.faults,)
 
 
 def fail(file: str, key: str, message: str) -> DeviceError:

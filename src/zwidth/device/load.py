@@ -14,7 +14,7 @@ from zwidth.arrays import Floats
 from zwidth.device import address, build
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail
+from zwidth.device.faults import Fault, KeyPath, dotted, fail
 from zwidth.device.legs import members
 from zwidth.device.operator_choice import NOBODY, document_held_by, document_under, load_of_table
 from zwidth.device.plausibility import warn_of_implausible
@@ -25,8 +25,8 @@ from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.schema.operator import ArmSection
 from zwidth.device.text_file import refuse_newer, without_version
 from zwidth.device.validation_messages import refuse_unsupported, validation_messages
+from zwidth.errors import BeamError, DeviceError
 from zwidth.model.argument_checks import wrong_type
-from zwidth.model.flexible_body import BeamError
 from zwidth.model.load import Load
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.operator import Operator

@@ -13,10 +13,11 @@ from typing import Any, Final, Literal, TypeAlias
 
 from zwidth.device import address
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, dotted
+from zwidth.device.faults import KeyPath, dotted
 from zwidth.device.load import check
 from zwidth.device.schema import device_file as schema
 from zwidth.device.schema.device_file import key_unit
+from zwidth.errors import DeviceError
 
 # Numbers of a device file that choose a posture, or help to find it, and are no property of the device.
 CIRCUMSTANCES: Final = {

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from zwidth.device.consistency import DEVICE_KEYS, operator_inconsistencies
-from zwidth.device.faults import DeviceError, Fault, dotted, fail
+from zwidth.device.faults import Fault, dotted, fail
 from zwidth.device.read import OPERATORS, read
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.value_types import VERSION, Section, WholeNumber
 from zwidth.device.text_file import KEY, without_version
 from zwidth.device.validation_messages import validation_messages
-from zwidth.model.load import Load, LoadError
+from zwidth.errors import DeviceError, LoadError
+from zwidth.model.load import Load
 from zwidth.model.operator import Operator
 
 NOBODY: Final = "none"

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device.faults import comma_list, fail, nearest
-from zwidth.device.text_file import UnreadableFileError, read_text, refuse_newer
+from zwidth.device.text_file import read_text, refuse_newer
+from zwidth.errors import FileError
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
 def _text(label: str, shelf: BundledFiles, pipes: bool) -> str:
     try:
         return read_text(label, LARGEST_FILE, pipes=pipes)
-    except UnreadableFileError as error:
+    except FileError as error:
         wrong = _not_found(label, shelf) if error.missing else f"{error}; give {shelf.file_noun} or a bundled name"
         raise fail(label, "", wrong) from None
 

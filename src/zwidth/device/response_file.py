@@ -12,11 +12,12 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.faults import DeviceError, Fault, fail, plural, quote
+from zwidth.device.faults import Fault, fail, plural, quote
 from zwidth.device.schema.plant import ResponseSection
-from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, header_fault, non_blank_rows, read_text
+from zwidth.device.text_file import LARGEST_TABLE, header_fault, non_blank_rows, read_text
+from zwidth.errors import DeviceError, FileError, ResponseError
 from zwidth.model.raw_sweep import sweep_response
-from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, ResponseError, mean_path
+from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, mean_path
 
 Table = dict[str, Floats]  # columns, with the line of each row under LINE
 Cause = tuple[
@@ -405,6 +406,6 @@ def _lies_in(folder: Path, path: Path) -> bool:
 def _text(path: Path) -> str:
     try:
         return read_text(path, LARGEST_TABLE)
-    except UnreadableFileError as error:
+    except FileError as error:
         hint = "response.file is a path from the device file's folder" if error.missing else "give a CSV file"
         raise fail(str(path), "", f"{error}; {hint}") from None

@@ -12,33 +12,23 @@ from typing import Any, Final
 
 from zwidth._version import __version__
 from zwidth.device.faults import fail
+from zwidth.errors import FileError
 
 LARGEST_TABLE: Final = 200_000_000  # bytes of CSV: some millions of lines, an hour of samples at 1 kHz
 SEPARATORS: Final = {";": "';'", "\t": "tabs", "|": "'|'"}  # that tables are written with instead of commas
 _KINDS: Final = ((stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
 
 
-class UnreadableFileError(ValueError):
-    """A file that is not read; the text says why, without its name and its contents.
-
-    missing  is there no such file?
-    """
-
-    def __init__(self, text: str, *, missing: bool = False) -> None:
-        self.missing = missing
-        super().__init__(text)
-
-
 def read_plain(path: str | os.PathLike[str], largest: int, *, pipes: bool = False) -> bytes:
     """Bytes of a plain file, found by its path, of at most `largest` bytes; links are followed.
 
     pipes   are waited for, too: only where the user names the file, as in `--points <(program)`
-    Raises  UnreadableFileError  where there is none, for anything else than a plain file, for one that is larger,
+    Raises  FileError  where there is none, for anything else than a plain file, for one that is larger,
                                  and where the system refuses to read it
     """
     data = read_head(path, largest + 1, pipes=pipes)
     if len(data) > largest:
-        raise UnreadableFileError(f"is larger than {largest // 1_000_000} MB")
+        raise FileError(f"is larger than {largest // 1_000_000} MB")
     return data
 
 
@@ -46,18 +36,18 @@ def read_head(path: str | os.PathLike[str], most: int, *, pipes: bool = False) -
     """The first bytes of a plain file, at most so many; as `read_plain`, but for its size."""
     try:
         if wrong := _no_plain_file(os.stat(path).st_mode, pipes):
-            raise UnreadableFileError(wrong)
+            raise FileError(wrong)
         with open(path, "rb") as stream:
             return stream.read(most)
     except FileNotFoundError:
-        raise UnreadableFileError("no such file", missing=True) from None
+        raise FileError("no such file", missing=True) from None
     except OSError as error:
         reason = error.strerror or str(error)
-        raise UnreadableFileError(f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
+        raise FileError(f"cannot be read: {reason[:1].lower() + reason[1:]}") from None
     except ValueError as error:
-        if isinstance(error, UnreadableFileError):
+        if isinstance(error, FileError):
             raise
-        raise UnreadableFileError("cannot be read: its name holds a zero byte") from None
+        raise FileError("cannot be read: its name holds a zero byte") from None
 
 
 def _no_plain_file(mode: int, pipes: bool) -> str:
@@ -74,21 +64,21 @@ def read_text(path: str | os.PathLike[str], largest: int, *, pipes: bool = False
     """Text of a plain file in UTF-8, with or without a byte order mark.
 
     pipes   as in `read_plain`
-    Raises  UnreadableFileError  as `read_plain`, and for what is not such text
+    Raises  FileError  as `read_plain`, and for what is not such text
     """
     return decode(read_plain(path, largest, pipes=pipes))
 
 
 def decode(data: bytes) -> str:
-    """Text of bytes in UTF-8, with or without a byte order mark. Raises UnreadableFileError for anything else."""
+    """Text of bytes in UTF-8, with or without a byte order mark. Raises FileError for anything else."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise UnreadableFileError("is UTF-16 text, not UTF-8")
+        raise FileError("is UTF-16 text, not UTF-8")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise UnreadableFileError(f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x})") from None
+        raise FileError(f"is not UTF-8 text (byte {error.start} is 0x{data[error.start]:02x})") from None
     if "\x00" in text:
-        raise UnreadableFileError(f"is a binary file (byte {data.index(0)} is zero)")
+        raise FileError(f"is a binary file (byte {data.index(0)} is zero)")
     return text
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
+from zwidth.errors import ChartError
 from zwidth.guarantees.coupling import couplings, no_couplings
 from zwidth.guarantees.guarantees import COLGATE, EXACT, NO_STABLE, Guarantee, Guarantees
 from zwidth.guarantees.passive import passive_region

@@ -12,9 +12,9 @@ from zwidth.arrays import Flags, Floats
 from zwidth.chart.robust.instability import unstable
 from zwidth.chart.robust.members import Member, chart_member, member_polygons
 from zwidth.chart.tracer import Tracer
+from zwidth.errors import UnmovedError
 from zwidth.guarantees.port import hold_fixed
 from zwidth.loop.loop import Loop
-from zwidth.loop.sections import UnmovedError
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 

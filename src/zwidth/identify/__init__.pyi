@@ -8,7 +8,6 @@ from .boundary.parameters import BoundaryParameters as BoundaryParameters
 from .boundary.points import read_points as read_points
 from .identification import Estimate as Estimate
 from .identification import Identification as Identification
-from .identification import IdentificationError as IdentificationError
 from .impedance.identify import identify_impedance as identify_impedance
 from .joint.friction import identify_friction as identify_friction
 from .joint.friction import identify_mass as identify_mass

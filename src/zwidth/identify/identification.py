@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import ceil, inf, isfinite, log10, nan
 from typing import Any
 
+from zwidth.errors import NoAnswerError
 from zwidth.result import Result
 
 
@@ -69,10 +70,6 @@ class Estimate:
         }
 
 
-class IdentificationError(ValueError):
-    """A number was asked for that the data do not give; the text says why."""
-
-
 @dataclass(frozen=True, repr=False)
 class Identification(Result):
     """Numbers of a device from measurements of it.
@@ -108,12 +105,12 @@ class Identification(Result):
         return "; ".join(failed) or "the data tell no number"
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of this name or path. Raises IdentificationError."""
+        """The estimate of this name or path. Raises NoAnswerError."""
         for estimate in self.estimates:
             if name in (estimate.name, estimate.path):
                 return estimate
         names = ", ".join(estimate.path or estimate.name for estimate in self.estimates)
-        raise IdentificationError(f"{name!r} was not identified: {self.reason or f'identified are {names}'}")
+        raise NoAnswerError(f"{name!r} was not identified: {self.reason or f'identified are {names}'}")
 
     @property
     def listed(self) -> tuple[Estimate, ...]:
@@ -124,10 +121,10 @@ class Identification(Result):
     def settings(self) -> dict[str, float]:
         """Path -> value of all numbers that a device file holds, as `Device.with_` takes them.
 
-        Raises IdentificationError  where no device file may get them, see `not_written`
+        Raises NoAnswerError  where no device file may get them, see `not_written`
         """
         if self.not_written:
-            raise IdentificationError(self.not_written)
+            raise NoAnswerError(self.not_written)
         return {one.path: one.value for one in self.estimates if one.path and one.told != "no"}
 
     @property

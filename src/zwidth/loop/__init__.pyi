@@ -26,14 +26,6 @@ from .loop import SidewaysMotion as SidewaysMotion
 from .loop_table import table_of_loops as table_of_loops
 from .multi_loop import MultiLoop as MultiLoop
 from .operating_point import OperatingPoint as OperatingPoint
-from .point_text import MissingNumbersError as MissingNumbersError
-from .point_text import NoMechanismError as NoMechanismError
-from .point_text import OperatingPointError as OperatingPointError
-from .point_text import SeveralDirectionsError as SeveralDirectionsError
 from .realisation import CHAINED as CHAINED
-from .sections import HysteresisError as HysteresisError
-from .sections import UnmovedError as UnmovedError
 from .sections import section_rows as section_rows
-from .unsupported_feedback import FeedbackError as FeedbackError
-from .wall_matrices import MatrixError as MatrixError
 from .wall_matrices import WallMatrices as WallMatrices

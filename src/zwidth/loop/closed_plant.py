@@ -25,6 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats
+from zwidth.errors import ModelError, UnmovedError, UnresolvedError
 from zwidth.loop.controller import Controller, split_delay
 from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.estimators import LinearMethod
@@ -36,27 +37,22 @@ from zwidth.loop.low_pass import LowPass
 from zwidth.loop.plant_states import PlantStates, SampledInput, plant_states
 from zwidth.loop.pole_zero_form import PoleZeroForm, pole_zero_form
 from zwidth.loop.realisation import FilterStates, filter_states
-from zwidth.loop.sections import Sections, UnmovedError, UnresolvedError, refuse_loss_factor
+from zwidth.loop.sections import Sections, refuse_loss_factor
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import ModelError
 
 SAMPLE, SLOW, FAST, END = range(4)  # what happens in a period, in this order at one instant
 SAME_INSTANT = 1e-12  # shares of the period within which two instants are one
-
-
-class ForceSensorError(ModelError):
-    """A force sensor that cannot be where it is said to be."""
 
 
 def measured_force(plant: Plant, sensor: ForceSensor) -> Floats:
     """What a sensor between device and hand reads per x'', x' and x (3, n): the hand's force, less what the mass
     between them takes,  f = f_hand - mass_beyond h . x''.
 
-    Raises  ForceSensorError  for a plant without a handle, or with less mass there than beyond the sensor
+    Raises  ModelError  for a plant without a handle, or with less mass there than beyond the sensor
     """
     h = plant.handle
     if h is None:
-        raise ForceSensorError(
+        raise ModelError(
             "a force sensor sits at the handle, and the plant has none; give plant.handle, choose a model with a "
             "handle, or leave force_sensor out"
         )
@@ -64,7 +60,7 @@ def measured_force(plant: Plant, sensor: ForceSensor) -> Floats:
     device = plant.mass + np.outer(h, rows[0])  # without the arm of a rigid grasp
     at_handle = 1.0 / float(h @ np.linalg.solve(device, h))
     if not sensor.mass_beyond < at_handle:
-        raise ForceSensorError(
+        raise ModelError(
             f"mass_beyond is {sensor.mass_beyond:.6g} kg, and must be less than the device's mass at the handle, "
             f"{at_handle:.6g} kg, of which it is a part"
         )
@@ -76,7 +72,7 @@ def close_plant(plant: Plant, controller: Controller) -> tuple[SampledForm, Plan
     """The sampled plant with all fixed feedback of a computer closed, and the plant's own states.
 
     Returns  a form without states where the force moves nothing that shows in a reading
-    Raises   ForceSensorError  for a force sensor where none can be
+    Raises   ModelError  for a force sensor where none can be
     """
     local, sensor = controller.local_loop, controller.force_sensor
     fast = local.rate_multiple if local is not None and acts(local) else 1
@@ -383,7 +379,7 @@ def closed_sections(plant: Plant, controller: Controller) -> ClosedSections:
 
     Raises  UnmovedError      where the wall moves nothing that the sensor reads
             UnresolvedError   where it moves so little of it that rounding hides it
-            ForceSensorError  for a force sensor where none can be
+            ModelError  for a force sensor where none can be
     """
     refuse_loss_factor(plant)
     form, states = close_plant(plant, controller)

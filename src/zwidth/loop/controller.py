@@ -1,4 +1,7 @@
-"""The controller: what the computer does between reading the encoder and setting the force."""
+"""The controller: what the computer does between reading the encoder and setting the force.
+
+The refusal of answers that are not known with feedback beside the wall law.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
+from zwidth.errors import FeedbackError
 from zwidth.loop.estimators import BackwardDifference, VelocityMethod
 from zwidth.loop.fixed_feedback import (
     Feedforward,
@@ -25,6 +29,7 @@ from zwidth.loop.low_pass import FirstOrder as FirstOrder
 from zwidth.loop.low_pass import LowPass, check_cutoff
 from zwidth.model.argument_checks import check_number, wrong_type
 from zwidth.model.design_axes import Number
+from zwidth.model.plant import Plant
 
 ROUNDING: Final = 1e-12  # samples by which a delay may fall short of a whole number by rounding
 
@@ -154,3 +159,21 @@ class Controller:
         if self.force_sensor is None and self.feedforward is None and self.local_loop is None:
             return self
         return replace(self, force_sensor=None, feedforward=None, local_loop=None)
+
+
+def refuse_feedback(controller: Controller, what: str, instead: str) -> None:
+    """Raise FeedbackError for a computer with feedback beside the wall law, Coulomb feedforward included.
+
+    what     the answer, such as "limit cycles are not predicted"
+    instead  what to do, such as "simulate"
+    """
+    names = controller.feedback_names if controller.fixed_feedback or controller.feeds_friction else ()
+    if names:
+        raise FeedbackError(f"{what} with {' and '.join(names)}; {instead}")
+
+
+def refuse_load(plant: Plant, what: str, instead: str) -> None:
+    """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as
+    before."""
+    if plant.is_loaded:
+        raise FeedbackError(f"{what} under load; {instead}")

@@ -45,24 +45,6 @@ class Estimator:
     window: Floats = field(default_factory=lambda: np.ones(1))
 
 
-class NonlinearError(ValueError):
-    """A velocity estimate that is not linear has no transfer function w(z).
-
-    estimate  its name, such as "Levant's differentiator"
-    """
-
-    def __init__(self, estimate: str) -> None:
-        self.estimate = estimate
-        super().__init__(
-            f"{estimate} is not linear: it has no chart; simulate it, measure its boundary, or for the chart of "
-            "another estimate set loop.velocity.method to backward-difference"
-        )
-
-    def __reduce__(self) -> tuple[type[NonlinearError], tuple[str]]:
-        """How pickle rebuilds the error in another process: from the estimate's name."""
-        return type(self), (self.estimate,)
-
-
 def mean_difference(weights: Floats, period: float) -> Estimator:
     """The mean of backward differences; weights (n,) of the newest to the oldest, of sum 1.
 

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.arrays import Complexes, Floats
+from zwidth.errors import OperatingPointError
 from zwidth.loop.closed_plant import ClosedSections, close_plant, closed_sections, closed_table
 from zwidth.loop.controller import Controller, NotKnown
 from zwidth.loop.estimator import Estimator
@@ -34,7 +35,6 @@ from zwidth.loop.hold import denominator
 from zwidth.loop.linear_omissions import with_computer
 from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.motion_names import motion_name
-from zwidth.loop.point_text import OperatingPointError
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections, plant_rows, sampled_sections
 from zwidth.model.argument_checks import require

@@ -14,19 +14,20 @@ from numpy.typing import ArrayLike
 
 from zwidth import _verbs
 from zwidth.arrays import Floats
+from zwidth.errors import ModelError, OperatingPointError, ResponseError
 from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
 from zwidth.loop.loop import Loop, has_inertia_share, with_inertia_of
 from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.point_text import OperatingPointError, check_several_directions, point_text
+from zwidth.loop.point_text import check_several_directions, point_text
 from zwidth.loop.posed_device import NO_MODEL, PosedDevice
 from zwidth.model.arm import attach_arm
 from zwidth.model.loaded_plant import LoadedPlants, counting_all, linearise, set_apart
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import ModelError, reduce_mechanism, reduce_plant
-from zwidth.model.response import Response, ResponseError, handle_obstacle
+from zwidth.model.reduction import reduce_mechanism, reduce_plant
+from zwidth.model.response import Response, handle_obstacle
 
 if TYPE_CHECKING:
     from zwidth.chart.chart_base import Chart
@@ -134,7 +135,7 @@ class OperatingPoint(PosedDevice):
 
     def _attach_arm(self, plant: Plant, force: Floats, gravity: Floats) -> Plant:
         """A full plant with the arm at its handle, which pushes with a force (3,) under gravity (3,). Raises
-        ModelError for a reduced model, ArmError where the arm cannot hold the handle."""
+        ModelError for a reduced model, OperatorError where the arm cannot hold the handle."""
         if self.model not in ("full", None):
             raise ModelError(
                 f"an arm that is a chain of bodies holds the full model alone, not {self.model!r}; leave the "

@@ -11,8 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Floats
+from zwidth.errors import (
+    EquilibriumError,
+    MissingNumbersError,
+    NoMechanismError,
+    OperatingPointError,
+    OperatorError,
+)
 from zwidth.loop.controller import Controller
-from zwidth.loop.point_text import MissingNumbersError, NoMechanismError, OperatingPointError, points_text
+from zwidth.loop.point_text import points_text
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.arm import Arm
@@ -20,13 +27,13 @@ from zwidth.model.damping import Damping, GivenDamping
 from zwidth.model.design_axes import change_designs, design_shape
 from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
-from zwidth.model.equilibrium import Equilibrium, EquilibriumError, solve_equilibrium
+from zwidth.model.equilibrium import Equilibrium, solve_equilibrium
 from zwidth.model.load import Load, unit_of_push
 from zwidth.model.loaded_posture import loaded_postures
 from zwidth.model.mechanism import Drives, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
-from zwidth.model.operator import ABOUT_AN_AXIS, Operator, OperatorError
+from zwidth.model.operator import ABOUT_AN_AXIS, Operator
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
 from zwidth.model.ratio_table import drives_at

@@ -12,6 +12,7 @@ import numpy as np
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
+from zwidth.errors import HysteresisError, UnmovedError, UnresolvedError
 from zwidth.loop.controller import Controller, whole_samples
 from zwidth.loop.coupled_hold import SampledForm, exact_rows, form_rows, rows_error, sample_form, separate_rows
 from zwidth.loop.hold import held_row, lagged_row, modal_row
@@ -36,18 +37,6 @@ SAME_POLES = 1e-6
 # unit circle, which moves by about as much, would else be off it by what eigenvalues see (1e-9). By more than the
 # second it is tried pole by pole; by more than the third, two ways to write it tell nothing of the plant.
 KEPT_DIGITS, FEW_DIGITS, LOST_DIGITS = 1e-12, 1e-8, 1e-4
-
-
-class UnmovedError(ValueError):
-    """A plant of which the wall moves nothing that the sensor reads."""
-
-
-class UnresolvedError(UnmovedError):
-    """A plant of which the wall moves so little that the sensor reads that rounding hides it."""
-
-
-class HysteresisError(ValueError):
-    """A plant with a loss factor, which describes steady vibration and not motion in time."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
+from zwidth.errors import ArgumentError
 from zwidth.model.argument_checks import describe_value
 
 # Entries are symmetric, and eigenvalues not negative, to this share of the largest entry.
@@ -24,21 +25,6 @@ ROUNDING: Final = 1e-12
 # Along a direction that has the one, stiffness or damping, of the other is at least this much of its largest, or
 # none.
 LEAST: Final = 1e-9
-
-
-class MatrixError(ValueError):
-    """A matrix that is none of a wall law.
-
-    name     of the argument that gave it
-    problem  what is wrong with it
-    """
-
-    def __init__(self, name: str, problem: str) -> None:
-        super().__init__(name, problem)
-        self.name, self.problem = name, problem
-
-    def __str__(self) -> str:
-        return f"{self.name} {self.problem}"
 
 
 @dataclass(frozen=True)
@@ -85,7 +71,7 @@ class WallMatrices:
                             all 0; None: the same along each direction
         relative_damping    the same; None: as relative_stiffness
         count               number of directions m; None: as many as are given
-        Raises  MatrixError  for what is no such matrix
+        Raises  ArgumentError  for what is no such matrix
 
         >>> print(WallMatrices.of([5.0, 1.0]))
         stiffness and damping 1 : 0.2
@@ -103,7 +89,7 @@ class WallMatrices:
                 problem = (
                     f"must be 0 or at least {LEAST:g} times the other along each direction, got {faint[0]:.3g}"
                 )
-                raise MatrixError(f"relative_{name}", f"{problem} times; give 0")
+                raise ArgumentError(f"relative_{name}", f"{problem} times; give 0")
         return law
 
     def __str__(self) -> str:
@@ -142,27 +128,27 @@ class WallMatrices:
 
 
 def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
-    """One matrix, its largest entry 1. Raises MatrixError for what is no matrix of a law."""
+    """One matrix, its largest entry 1. Raises ArgumentError for what is no matrix of a law."""
     wanted = (
         f"must be {count} numbers, one for each direction, or a matrix of {count} rows and columns"
         if count != 1
         else "must be 1 number, or a matrix of 1 row and column"
     )
     if isinstance(given, np.ndarray) and np.iscomplexobj(given):  # NumPy would drop the imaginary parts
-        raise MatrixError(name, f"{wanted}, got complex numbers")
+        raise ArgumentError(name, f"{wanted}, got complex numbers")
     try:
         entries = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise MatrixError(name, f"{wanted}, got {describe_value(given)}") from None
+        raise ArgumentError(name, f"{wanted}, got {describe_value(given)}") from None
     if entries.shape not in ((count,), (count, count)):
-        raise MatrixError(name, f"{wanted}, got {_shape_text(entries.shape)}")
+        raise ArgumentError(name, f"{wanted}, got {_shape_text(entries.shape)}")
     if not np.isfinite(entries).all():
-        raise MatrixError(name, f"must be finite numbers, got {entries[~np.isfinite(entries)][0]:g}")
+        raise ArgumentError(name, f"must be finite numbers, got {entries[~np.isfinite(entries)][0]:g}")
     if entries.ndim == 1 and (entries < 0.0).any():
-        raise MatrixError(name, f"must not be negative, got {entries[entries < 0.0][0]:g}")
+        raise ArgumentError(name, f"must not be negative, got {entries[entries < 0.0][0]:g}")
     largest = float(np.max(np.abs(entries)))
     if largest == 0.0:
-        raise MatrixError(name, "must not be 0 along all directions")
+        raise ArgumentError(name, "must not be 0 along all directions")
     # scaled before anything is added, so that no sum is infinite
     matrix = (np.diag(entries) if entries.ndim == 1 else entries) / largest
     off = np.abs(matrix - matrix.T)
@@ -172,11 +158,11 @@ def _scaled_matrix(name: str, given: ArrayLike, count: int) -> Floats:
             f"{entries[i, j]:g} in row {i + 1}, column {j + 1} and "
             f"{entries[j, i]:g} in row {j + 1}, column {i + 1}"
         )
-        raise MatrixError(name, f"must be symmetric, got {pair}")
+        raise ArgumentError(name, f"must be symmetric, got {pair}")
     matrix = (matrix + matrix.T) / 2.0
     least = float(np.linalg.eigvalsh(matrix)[0])
     if least < -ROUNDING:
-        raise MatrixError(name, f"must have no negative eigenvalue, got one of {least * largest:g}")
+        raise ArgumentError(name, f"must have no negative eigenvalue, got one of {least * largest:g}")
     return np.asarray(matrix / float(np.max(matrix)))
 
 

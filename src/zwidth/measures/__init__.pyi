@@ -12,10 +12,8 @@ from .definition import SINGULAR as SINGULAR
 from .definition import STATUS as STATUS
 from .definition import UNDECIDED as UNDECIDED
 from .definition import Measure as Measure
-from .definition import MeasureError as MeasureError
 from .definition import MeasureValues as MeasureValues
 from .definition import Note as Note
-from .definition import NoValueError as NoValueError
 from .definition import WantedWall as WantedWall
 from .deformation import deformation_ratio as deformation_ratio
 from .deformation import structural_distortion as structural_distortion
@@ -37,7 +35,6 @@ from .forces import force_along as force_along
 from .forces import force_component as force_component
 from .forces import friction_along as friction_along
 from .forces import resolution_along as resolution_along
-from .handle_impedance import HandleError as HandleError
 from .handle_impedance import commanded_impedance as commanded_impedance
 from .handle_impedance import felt_impedance as felt_impedance
 from .handle_impedance import free_motion_impedance as free_motion_impedance

@@ -24,15 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
-from zwidth.contact.wall_limit_cycles import (
-    NothingNonlinearError,
-    amplitude_dependent,
-    predict_limit_cycles,
-    settles,
-)
+from zwidth.contact.wall_limit_cycles import amplitude_dependent, predict_limit_cycles, settles
+from zwidth.errors import FeedbackError, MeasureError, NoAnswerError, NoValueError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import FeedbackError
-from zwidth.measures.definition import MeasureError, NoValueError, WantedWall
+from zwidth.measures.definition import WantedWall
 from zwidth.measures.deformation import deformation_ratio
 from zwidth.measures.preconditions import wall_of
 
@@ -47,7 +42,7 @@ def buzz_at(point: OperatingPoint, wanted: WantedWall) -> float:
     wall = wall_of(wanted)
     try:
         parts = amplitude_dependent(point)
-    except NothingNonlinearError as error:
+    except NoAnswerError as error:
         raise MeasureError(f"has nothing to measure: {error}") from None
     except FeedbackError as error:
         raise NoValueError(str(error)) from None

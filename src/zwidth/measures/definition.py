@@ -8,7 +8,7 @@ Each number is an argument in Python, a key of a study file, an option of `zwidt
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
 from math import isfinite
@@ -163,14 +163,10 @@ __all__ = [
     "UNREACHED",
     "Better",
     "Measure",
-    "MeasureError",
     "MeasureValues",
-    "NoValueError",
     "Note",
-    "Spelling",
     "WantedWall",
     "WantedWalls",
-    "as_argument",
 ]
 
 Better = Literal["higher", "lower"]
@@ -201,55 +197,6 @@ STATUS: Final = {
     OUT_OF_TIME: "out of time",
     MISSING: "not computed",
 }
-
-
-Spelling = Callable[[str, str | None], str]
-
-
-def as_argument(name: str, value: str | None) -> str:
-    """An argument as Python spells it.
-
-    >>> as_argument("stiffness", None), as_argument("model", "rigid")
-    ('stiffness', "model='rigid'")
-    """
-    return name if value is None else f"{name}={value!r}"
-
-
-class MeasureError(ValueError):
-    """A measure that this device does not have in any posture; the text follows the measure's name.
-
-    reason        why not
-    arguments     what to give instead: name and value of each, None for any value
-    alternatives  whether one of the arguments is enough
-    """
-
-    def __init__(
-        self, reason: str, arguments: Sequence[tuple[str, str | None]] = (), alternatives: bool = False
-    ) -> None:
-        super().__init__(reason, arguments, alternatives)
-        self.reason, self.arguments, self.alternatives = reason, tuple(arguments), alternatives
-
-    def __str__(self) -> str:
-        return self.spelled(as_argument)
-
-    def spelled(self, spelling: Spelling) -> str:
-        """The message, with arguments spelled as in Python, as options or as keys of a file.
-
-        >>> MeasureError("needs a wanted wall", [("stiffness", None), ("damping", None)]).spelled(as_argument)
-        'needs a wanted wall; give stiffness and damping'
-        """
-        if not self.arguments:
-            return self.reason
-        joined = " or " if self.alternatives else " and "
-        return f"{self.reason}; give {joined.join(spelling(*argument) for argument in self.arguments)}"
-
-    def with_name(self, measure: str) -> MeasureError:
-        """The same error with the measure's name before its text."""
-        return MeasureError(f"{measure} {self.reason}", self.arguments, self.alternatives)
-
-
-class NoValueError(ValueError):
-    """A measure has no value at this operating point; the text says why."""
 
 
 @dataclass(frozen=True)

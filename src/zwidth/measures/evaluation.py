@@ -9,12 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL, NO_WALL
-from zwidth.loop.estimator import NonlinearError
+from zwidth.errors import (
+    ChartError,
+    EquilibriumError,
+    HysteresisError,
+    MeasureError,
+    MissingNumbersError,
+    ModelError,
+    NoMechanismError,
+    NonlinearError,
+    NoValueError,
+    UnmovedError,
+)
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_text import MissingNumbersError, NoMechanismError
-from zwidth.loop.sections import HysteresisError, UnmovedError
 from zwidth.measures.catalogue import find_measure
 from zwidth.measures.definition import (
     FAILED,
@@ -23,15 +31,11 @@ from zwidth.measures.definition import (
     OK,
     UNDECIDED,
     Measure,
-    MeasureError,
     MeasureValues,
     Note,
-    NoValueError,
     WantedWall,
 )
 from zwidth.model.argument_checks import require
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.reduction import ModelError
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
 FAILURES = (

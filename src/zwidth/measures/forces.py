@@ -22,8 +22,9 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats
 from zwidth.conditions.traits import ground_friction, reading_step
+from zwidth.errors import MeasureError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
+from zwidth.measures.definition import WantedWall, WantedWalls
 from zwidth.measures.preconditions import numbers_of
 from zwidth.model.effective_mass import screw, unit_directions
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats, Ints
+from zwidth.errors import MeasureError, NoAnswerError, NoMechanismError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_text import NoMechanismError
-from zwidth.measures.definition import MeasureError, WantedWall, WantedWalls
+from zwidth.measures.definition import WantedWall, WantedWalls
 from zwidth.measures.dexterity import isotropy, jacobian_by_drives
 from zwidth.measures.preconditions import numbers_of
 from zwidth.model.mechanism import FIXED, FRAME, POSE, PRISMATIC, Mechanism
@@ -27,10 +27,6 @@ from zwidth.model.posture import Posture, link_points
 
 SAME_POINT: Final = 1e-9  # m, within which two points are one
 SHORT: Final = 1e-30  # squared length [m^2] below which a rod is a point
-
-
-class NoRodsError(ValueError):
-    """The links of a mechanism have no length, and carry nothing away from their joints."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +98,7 @@ def bodies(mechanism: Mechanism) -> Ints:
 def rods_of(mechanism: Mechanism, posture: Posture) -> Rods:
     """The links as rods; those of no length anywhere are left out, and so are those fixed to the base.
 
-    Raises  NoRodsError  where none is left
+    Raises  NoAnswerError  where none is left
     """
     links, closures, placed = mechanism.links, mechanism.closures, link_points(mechanism, posture)
     body = bodies(mechanism)
@@ -132,7 +128,7 @@ def rods_of(mechanism: Mechanism, posture: Posture) -> Rods:
                 firsts.append(start)
                 lasts.append(end)
     if not owner:
-        raise NoRodsError("its links have no length")
+        raise NoAnswerError("its links have no length")
     return Rods(np.array(owner, dtype=np.int64), np.stack(firsts, axis=-2), np.stack(lasts, axis=-2))
 
 
@@ -181,7 +177,7 @@ def link_distance(
     posture  (...)
     pairs    of bodies, by the index of a link of each; None: all that are no neighbours
     Returns  (...)  [m]; inf where there is no such pair, nan where the posture is not OK
-    Raises   NoRodsError  as `rods_of`
+    Raises   NoAnswerError  as `rods_of`
     """
     rods, body = rods_of(mechanism, posture), bodies(mechanism)
     own = sorted(set(rods.link.tolist()))
@@ -215,7 +211,7 @@ def largest_distance(mechanism: Mechanism, posture: Posture, axes: Sequence[int]
     posture  (...)
     axes     0 for x, 1 for y, 2 for z; one: the distance along it
     Returns  (...)  [m]; nan where the posture is not OK
-    Raises   NoRodsError  as `rods_of`
+    Raises   NoAnswerError  as `rods_of`
     """
     rods, links, closures = rods_of(mechanism, posture), mechanism.links, mechanism.closures
     shape = rods.first.shape[:-2]
@@ -368,7 +364,7 @@ def _links_of_a_length() -> Iterator[None]:
     """Say what to give where no link has a length."""
     try:
         yield
-    except NoRodsError:
+    except NoAnswerError:
         raise MeasureError("needs links with a length; give length_m of the links, or handle.point_m") from None
 
 

@@ -55,12 +55,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Complexes, Flags, Floats
+from zwidth.errors import HandleError
 from zwidth.loop.closed_plant import path_responses
-from zwidth.loop.controller import Controller
+from zwidth.loop.controller import Controller, refuse_feedback, refuse_load
 from zwidth.loop.factor_response import factor_response, feedforward_response, sensor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
-from zwidth.loop.unsupported_feedback import refuse_feedback, refuse_load
 from zwidth.model.argument_checks import broadcast_walls, require
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
@@ -73,10 +73,6 @@ FREE = 1e-12
 
 UNKNOWN: Final = "the impedance at the handle is not known"
 LEAVE_OUT: Final = "leave the load out"
-
-
-class HandleError(ValueError):
-    """The plant has no handle at which an impedance could be felt."""
 
 
 def refuse_local_loop(controller: Controller) -> None:

@@ -27,6 +27,7 @@ from zwidth.chart.point_chart import numbers_of_points
 from zwidth.chart.table_radii import radii_at_points, slowest_roots
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, eigenvalues, judge
 from zwidth.compiled import compiled
+from zwidth.errors import FeedbackError, MeasureError, NoValueError
 from zwidth.loop.circle_factors import (
     COMPUTER,
     CircleFactors,
@@ -43,8 +44,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import modes_of_points, table_of_points
-from zwidth.loop.unsupported_feedback import FeedbackError
-from zwidth.measures.definition import OK, MeasureError, MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.definition import OK, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_charts, complete_pointwise
 from zwidth.measures.handle_impedance import felt_impedance, free_impedance, refuse_local_loop
 from zwidth.measures.preconditions import numbers_of, plant_with_handle

@@ -16,29 +16,25 @@ from typing import Final
 import numpy as np
 
 from zwidth.chart.chart import largest_stiffness
+from zwidth.errors import MeasureError, NoAnswerError, NoValueError
 from zwidth.loop.loop import SidewaysMotion
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MeasureError, NoValueError
 from zwidth.model.loaded_plant import moved_motions
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
-
-
-class NoWallError(ValueError):
-    """No wall is stable, so that there is no stiffest one; the text says with load or without."""
 
 
 def load_change(point: OperatingPoint) -> float:
     """Relative change of the largest stiffness by all of the load, the hand's force and gravity.
 
     point   a single one, under load
-    Raises  NoWallError  where no wall is stable, under load or without it
+    Raises  NoAnswerError  where no wall is stable, under load or without it
     """
     loaded, unloaded = largest_stiffness(point.loop), largest_stiffness(without_load(point).loop)
     if unloaded is None:
-        raise NoWallError(f"{NONE_STABLE} without load")
+        raise NoAnswerError(f"{NONE_STABLE} without load")
     if loaded is None:
-        raise NoWallError(f"{NONE_STABLE} under load")
+        raise NoAnswerError(f"{NONE_STABLE} under load")
     return (loaded.stiffness - unloaded.stiffness) / unloaded.stiffness
 
 
@@ -70,7 +66,7 @@ def load_change_at(point: OperatingPoint) -> float:
     _require_load(point)
     try:
         return load_change(point)
-    except NoWallError as error:
+    except NoAnswerError as error:
         raise NoValueError(str(error)) from None
 
 

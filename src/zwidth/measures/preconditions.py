@@ -8,13 +8,12 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PLAIN, WALL_ALONE, ConditionCase, case_of
-from zwidth.loop.estimator import NonlinearError
+from zwidth.errors import HandleError, MeasureError, ModelError, NonlinearError
 from zwidth.loop.loop import Loop, with_inertia_of
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import WANTED_BY_NAME, MeasureError, WantedWall, WantedWalls
-from zwidth.measures.handle_impedance import HandleError, handle_of
+from zwidth.measures.definition import WANTED_BY_NAME, WantedWall, WantedWalls
+from zwidth.measures.handle_impedance import handle_of
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import ModelError
 
 # One mass in place of a mechanism, where only the computer matters.
 UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(1))

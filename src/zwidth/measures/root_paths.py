@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.verdict import BAND
+from zwidth.errors import NoAnswerError
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
 from zwidth.result import Result
@@ -32,10 +33,6 @@ SHORT: Final = 1e-3
 # Halvings of one step at most, where eigenvalues jump.
 HALVINGS: Final = 40
 SHOWN: Final = 4  # crossings that a repr names
-
-
-class PathError(ValueError):
-    """Eigenvalues that cannot be followed."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +113,7 @@ def eigenvalue_paths(matrix_at: Callable[[float], ArrayLike], values: ArrayLike)
 
     matrix_at  value -> matrix, of one size and continuous along the way
     values     (k,)  at least two, rising or falling
-    Raises     PathError   where the number of eigenvalues changes, or a matrix is not finite
+    Raises     NoAnswerError   where the number of eigenvalues changes, or a matrix is not finite
                ValueError  for values that neither rise nor fall
 
     >>> paths = eigenvalue_paths(lambda a: [[0.0, 1.0], [-a, 1.0]], [0.0, 1.2])    # z^2 - z + a
@@ -189,14 +186,14 @@ class _PathTracer:
         """Eigenvalues in any order."""
         matrix = np.asarray(self.matrix_at(value), dtype=np.float64)
         if not np.all(np.isfinite(matrix)):
-            raise PathError(f"the transition matrix at {value:g} is not finite")
+            raise NoAnswerError(f"the transition matrix at {value:g} is not finite")
         return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
 
     def trace_to(self, end: float, unordered: Complexes, halvings: int) -> None:
         """Step from the last value to `end`."""
         start, z = self.steps[-1]
         if len(z) != len(unordered):
-            raise PathError(
+            raise NoAnswerError(
                 f"there are {len(z)} eigenvalues at {start:g} and {len(unordered)} at {end:g}: a motion or a "
                 "delayed sample comes or goes between, and paths would begin or end; choose values on one side"
             )

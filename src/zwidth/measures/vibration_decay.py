@@ -36,9 +36,10 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.chart.table_radii import radii_at_points
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, Verdicts, judge, spectral_radius
+from zwidth.errors import NoValueError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MeasureValues, NoValueError, WantedWall, WantedWalls
+from zwidth.measures.definition import MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_pointwise
 from zwidth.measures.preconditions import walls_of
 from zwidth.model.plant import Plant

@@ -19,21 +19,17 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
+from zwidth.errors import OperatorError
 from zwidth.model.continuation import moved_posture
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
-from zwidth.model.operator import OperatorError
 from zwidth.model.plant import Plant
 
 STEPS: Final = 100  # of the search for the arm's posture
 LARGEST_STEP: Final = 0.2  # of a joint at once [rad], [m]
 REACHED: Final = 1e-12  # m
 STRETCHED: Final = 1e-6  # share of the hand's largest motion below which the arm cannot move it along
-
-
-class ArmError(OperatorError):
-    """An arm that cannot hold the handle."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,7 @@ def attach_arm(plant: Plant, arm: Arm, handle: Floats, place: Floats, force: Flo
     place    (3,)    of the handle [m]
     force    (3,)    of the hand on the handle [N], 0 without load;   gravity (3,) on the arm [m/s^2]
     Returns  Plant, the arm's joints among its last coordinates
-    Raises   ArmError  where the arm cannot reach the handle, or cannot move with it
+    Raises   OperatorError  where the arm cannot reach the handle, or cannot move with it
     """
     motions = Motions(pack(arm.mechanism), _posture(arm, place))
     hand, links, joints = motions.handle, arm.mechanism.links, motions.unknowns
@@ -92,7 +88,7 @@ def _together(handle: Floats, hand: Floats) -> Floats:
     rank = int(np.count_nonzero(size > STRETCHED * size[0])) if len(size) else 0
     lost = handle.T @ left[:, rank:]
     if np.max(np.abs(lost), initial=0.0) > STRETCHED * np.max(np.abs(handle), initial=0.0):
-        raise ArmError(
+        raise OperatorError(
             "the arm cannot move its hand in every direction in which the handle moves; is it stretched, or does "
             "it need another joint? Bend it in its posture, or give it an elastic grasp"
         )
@@ -130,7 +126,7 @@ def _posture(arm: Arm, place: Floats) -> Floats:
     left = float(np.linalg.norm(goal - Motions(mech, angles).handle.position))
     if left <= 1e-9:
         return angles
-    raise ArmError(
+    raise OperatorError(
         f"the arm does not reach the handle from its shoulder: {left:.4g} m are left; move shoulder_m, or give "
         "the posture in which it holds the handle"
     )

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats, Ints
+from zwidth.errors import BeamError
 from zwidth.model.argument_checks import check_choice, describe_value
 from zwidth.model.beam_integrals import (
     BOUNDARIES,
@@ -38,7 +39,7 @@ from zwidth.model.beam_integrals import (
     rod_inertia,
 )
 from zwidth.model.beam_section import BeamProperties
-from zwidth.model.flexible_body import BeamError, FlexibleBody, FlexibleLink, Method
+from zwidth.model.flexible_body import FlexibleBody, FlexibleLink, Method
 from zwidth.model.mechanism import FIXED, Mechanism
 
 # Stations are one, and a station is at the base or the tip, within this share of the length

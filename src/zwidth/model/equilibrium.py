@@ -24,8 +24,9 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
+from zwidth.errors import EquilibriumError, LoadError, SidewaysForceError
 from zwidth.model.drive_motion import CountedPosture, DriveMotion, counted_posture
-from zwidth.model.load import ALONG, Load, LoadError, unit_of_push, vector_text
+from zwidth.model.load import ALONG, Load, unit_of_push, vector_text
 from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Drives, Mechanism, kinks
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.motions import Motions
@@ -37,14 +38,6 @@ LARGEST_STEP: Final = 1.0  # of a deflection [rad], [m]
 BENT: Final = 1e-12  # change of the links' bending, in shares of it, below which it is found
 SETTLED: Final = 1e-12  # share of the torques by which the balance may be off
 UNBALANCED: Final = 1e-7  # share of the torques that counts as a joint that nothing balances
-
-
-class EquilibriumError(LoadError):
-    """There is no equilibrium under a load, or none that the device holds."""
-
-
-class SidewaysForceError(EquilibriumError):
-    """The load has another part across the rendered direction than the posture needs, which no wall holds."""
 
 
 @dataclass(frozen=True)

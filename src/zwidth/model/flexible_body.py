@@ -135,17 +135,6 @@ def symmetric(matrices: Floats) -> Floats:
 Method = Literal["assumed-modes", "finite-elements", "lumped"]
 
 
-class BeamError(ValueError):
-    """A beam that its link cannot be.
-
-    link  its name;   key  of its table that is wrong: "mass_kg", "inertia_kg_m2" or "beam.modes"
-    """
-
-    def __init__(self, link: str, key: str, message: str) -> None:
-        self.link, self.key = link, key
-        super().__init__(message)
-
-
 @dataclass(frozen=True)
 class FlexibleLink:
     """A beam in place of a rigid link.

@@ -11,15 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
+from zwidth.errors import LoadError
 from zwidth.model.argument_checks import check_choice
 
 HandForce = Literal["dead", "follower", "neglected"]
 PostureOf = Literal["handle", "motors"]
 ALONG: Final = 1e-9  # share of a load across the rendered direction that is rounding
-
-
-class LoadError(ValueError):
-    """A load that cannot be meant."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
+from zwidth.errors import EquilibriumError, LoadError
 from zwidth.model.closure import equations, passive_rates
 from zwidth.model.continuation import moved_posture
 from zwidth.model.design_axes import change_designs
-from zwidth.model.equilibrium import Balance, Equilibrium, EquilibriumError
+from zwidth.model.equilibrium import Balance, Equilibrium
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
-from zwidth.model.load import Load, LoadError, unit_of_push
+from zwidth.model.load import Load, unit_of_push
 from zwidth.model.mechanism import BALL_X, POSITION, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture import NO_EQUILIBRIUM, OK, Posture

@@ -8,14 +8,10 @@ from typing import Final, Literal
 import numpy as np
 
 from zwidth.arrays import Floats
+from zwidth.errors import OperatorError
 from zwidth.model.argument_checks import check_choice, check_number, require
 from zwidth.model.design_axes import Number, stack_numbers
 from zwidth.model.plant import Plant
-
-
-class OperatorError(ValueError):
-    """An operator that cannot be attached to this plant."""
-
 
 ABOUT_AN_AXIS: Final = (
     "is a hand in N/m, N s/m and kg, which holds the handle along a direction; about an axis it would have to be "

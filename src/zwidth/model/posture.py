@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
+from zwidth.errors import LoopOpen, OutOfReach
 from zwidth.model.argument_checks import require
 from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import (
@@ -42,15 +43,7 @@ from zwidth.model.posture_batch import (
     solve_batch,
     solve_from_starts,
 )
-from zwidth.model.posture_failure import (
-    BeyondLimit,
-    LoopOpen,
-    OutOfReach,
-    PostureError,
-    Singular,
-    posture_failure,
-    singular_throughout,
-)
+from zwidth.model.posture_failure import posture_failure, singular_throughout
 from zwidth.model.roadmap import roadmap
 from zwidth.model.rotations import rotation_matrix, rotation_vector
 
@@ -61,13 +54,8 @@ __all__ = [
     "OUT_OF_REACH",
     "SINGULAR",
     "UNSOLVED",
-    "BeyondLimit",
     "LinkPoints",
-    "LoopOpen",
-    "OutOfReach",
     "Posture",
-    "PostureError",
-    "Singular",
     "handle_motions",
     "handle_range",
     "inertia_terms",

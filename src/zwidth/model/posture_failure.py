@@ -9,6 +9,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled
+from zwidth.errors import BeyondLimit, OutOfReach, PostureError, Singular
 from zwidth.model.continuation import (
     BEYOND_LIMIT,
     OUT_OF_REACH,
@@ -23,34 +24,6 @@ from zwidth.model.ratio_table import RatioTable
 from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix
 
 ALIKE: Final = 1e-9  # m and degrees that are not worth saying
-
-
-class PostureError(ValueError):
-    """The mechanism has no posture that answers the question."""
-
-
-class OutOfReach(PostureError):
-    """The handle cannot get there in this assembly without passing a singularity.
-
-    nearest  (3,)  a position that is answered [m], found by descent from the requested one and not shown to be the
-             nearest; None where none is known, or the drives control its orientation
-    """
-
-    def __init__(self, message: str, nearest: Floats | None = None) -> None:
-        super().__init__(message)
-        self.nearest = nearest
-
-
-class Singular(PostureError):
-    """At this position the drives lose, or do not have, control of the handle."""
-
-
-class BeyondLimit(PostureError):
-    """In the posture a joint is beyond its limit."""
-
-
-class LoopOpen(PostureError):
-    """A loop of the mechanism cannot be closed near the assembly's joint angles."""
 
 
 def singular_throughout(assembly: str, uncontrolled: str) -> Singular:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Flags, Floats
+from zwidth.errors import ResponseError
 from zwidth.model.local_polynomials import (
     MOST_TILES,
     NARROWEST,
@@ -23,7 +24,7 @@ from zwidth.model.local_polynomials import (
     merged_windows,
     window_widths,
 )
-from zwidth.model.response import Response, ResponseError
+from zwidth.model.response import Response
 
 SHORTEST_SEGMENT = 64  # samples
 EXCITED = 1e-7  # power of the force, over its largest, below which a frequency was not excited

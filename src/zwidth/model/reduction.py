@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats, Ints
+from zwidth.errors import DirectionError, ModelError
 from zwidth.model.argument_checks import require
 from zwidth.model.damping import (
     Damping,
@@ -46,14 +47,6 @@ Model = Literal["full", "two-mass", "motor-mass", "rigid"]
 Encoders = Literal["motor", "link"]
 MODELS: Final = get_args(Model)
 READING_TOLERANCE: Final = 1e-6  # relative difference of two readings of a rigid motion that still counts as none
-
-
-class ModelError(ValueError):
-    """The chosen model does not apply to this device or this direction."""
-
-
-class DirectionError(ModelError):
-    """The handle cannot move along the direction, so that no model renders it."""
 
 
 def reduce_mechanism(

@@ -22,6 +22,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Flags, Floats
+from zwidth.errors import ResponseError
 
 LEAST_COHERENCE: Final = 0.5  # below it more of the reading is noise than is answer to the force
 SAME_FREQUENCY: Final = 1e-9  # relative difference of two frequencies that are one
@@ -31,10 +32,6 @@ UNSURE: Final = 0.5  # relative error of the response, up to which the lowest fr
 CLEAR, CONTRADICTED = np.radians(44.0), np.radians(75.0)
 SETTLED = np.radians(5.0)  # the same phase, below which nothing else is asked
 UNLIKE = 0.75  # by which the exponent of |P| may differ from the one that its phase tells
-
-
-class ResponseError(ValueError):
-    """A measured response that no chart can be made from; the text says why and what to do."""
 
 
 @dataclass(frozen=True)

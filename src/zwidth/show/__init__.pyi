@@ -32,7 +32,6 @@ from .figures.style import label as label
 from .figures.style import legend_above as legend_above
 from .figures.style import save as save
 from .figures.tolerance import band_path as band_path
-from .output import OutputError as OutputError
 from .output import csv_text as csv_text
 from .output import json_text as json_text
 from .output import json_value as json_value

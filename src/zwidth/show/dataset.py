@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.show.output import OutputError, csv_text, replacing
+from zwidth.errors import OutputError
+from zwidth.show.output import csv_text, replacing
 from zwidth.study.designs.sweep_data import (
     DESIGN,
     column_attributes,

@@ -11,14 +11,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
+from zwidth.errors import OutputError
+
 DATA: Final = (".csv", ".json")
 FIGURES: Final = (".png", ".svg", ".pdf")
 ARRAYS: Final = (".nc", ".mat")  # what `dataset.write_dataset` writes: maps and sweeps
 FOLDERS: Final = (".zarr",)  # what `dataset.write_zarr` writes; one that is there is never replaced
-
-
-class OutputError(Exception):
-    """A file, or standard output, cannot be written; the text says which, why, and what to do."""
 
 
 def json_value(value: Any) -> Any:

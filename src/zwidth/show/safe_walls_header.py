@@ -18,9 +18,10 @@ import numpy as np
 
 from zwidth._version import __version__
 from zwidth.device.faults import comma_list
+from zwidth.errors import OutputError
 from zwidth.loop.controller import Controller
 from zwidth.show.circumstances import wall_law_parts
-from zwidth.show.output import OutputError, printable, write_text
+from zwidth.show.output import printable, write_text
 from zwidth.study.wall_tables.table import EVERYWHERE, SafeWalls
 
 WIDTH: Final = 110  # letters of a line of numbers

@@ -21,6 +21,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.contact.time_response import QUIET, TimeResponse, dominant_frequency
+from zwidth.errors import NoAnswerError
 from zwidth.show.output import replacing
 
 Pitch = float | Literal["auto"] | None
@@ -37,10 +38,6 @@ PEAK: Final = 10.0 ** (-1.0 / 20.0)  # of full scale, -1 dBFS
 FINER: Final = 4  # points of the trail for each of the sound, where there are more
 FEWEST: Final = 16  # points of the trail
 LARGEST_NUMBER: Final = 32767  # of 16 bits, at full scale
-
-
-class Silence(ValueError):
-    """There is nothing to hear."""
 
 
 @dataclass(frozen=True)
@@ -106,9 +103,9 @@ def sound_of(response: TimeResponse, pitch: Pitch = None, full_scale: float | No
 
     pitch       factor by which all frequencies are raised; or a rule (see `speed_for`)
     full_scale  velocity of the handle that is a sample of 1 [m/s]; None: as loud as it goes, the peak at PEAK
-    Raises  Silence     where nothing vibrates, the run is too short to tell, or the full scale is so large that
-                        16 bits hold nothing of it
-            ValueError  for a run without its trail
+    Raises  NoAnswerError  where nothing vibrates, the run is too short to tell, or the full scale is so large
+                           that 16 bits hold nothing of it
+            ValueError     for a run without its trail
     """
     time, position, unit = _handle_motion(response)
     coarse = min(float(RATE), 2.0 / response.period)
@@ -116,14 +113,14 @@ def sound_of(response: TimeResponse, pitch: Pitch = None, full_scale: float | No
     velocity = _velocity(time, position, RATE / speed)
     size = float(np.abs(velocity).max(initial=0.0))
     if len(velocity) < FEWEST or not size * (time[-1] - time[0]) > QUIET:
-        raise Silence("nothing vibrates: there is nothing to hear")
+        raise NoAnswerError("nothing vibrates: there is nothing to hear")
     once = _faded(velocity)
     peak = float(np.abs(once).max())
     # full scale in units of `once`, since velocities of a run that grows without bounds overflow in m/s
     limit = peak / PEAK if full_scale is None else full_scale / unit
     if 2.0 * LARGEST_NUMBER * peak < limit:
         text = f"the vibration, of at most {peak * unit:.3g} m/s, is below the resolution of the file"
-        raise Silence(f"{text} at a full scale of {full_scale:g} m/s")
+        raise NoAnswerError(f"{text} at a full scale of {full_scale:g} m/s")
     repeats = max(1, ceil(SHORTEST * RATE / len(once)))
     samples = np.tile(np.clip(once, -limit, limit) / limit, repeats)
     return Sound(
@@ -187,7 +184,7 @@ def _handle_motion(response: TimeResponse) -> tuple[Floats, Floats, float]:
     position = np.concatenate([response.handle[:1], response.trail])
     known = int(np.argmin(np.isfinite(position))) if not np.all(np.isfinite(position)) else len(position)
     if known < FEWEST:
-        raise Silence("the run is too short to be heard")
+        raise NoAnswerError("the run is too short to be heard")
     farthest = float(np.abs(position[:known]).max()) or 1.0
     return time[:known], position[:known] / farthest, farthest
 

@@ -4,7 +4,6 @@ from .boundary.experiment import measure_boundary as measure_boundary
 from .boundary.measured_boundary import Experiment as Experiment
 from .boundary.measured_boundary import MeasuredPoint as MeasuredPoint
 from .boundary.measured_boundary import Plan as Plan
-from .boundary.points_file import PointsError as PointsError
 from .boundary.points_file import UserPoint as UserPoint
 from .boundary.points_file import compare_points as compare_points
 from .boundary.points_file import read_points as read_points
@@ -29,13 +28,10 @@ from .jobs.executor import open_executor as open_executor
 from .jobs.executor import run as run
 from .jobs.job import CellValues as CellValues
 from .jobs.journal import Journal as Journal
-from .jobs.journal import JournalError as JournalError
 from .jobs.journal import fingerprint as fingerprint
 from .jobs.series import JobSeries as JobSeries
 from .jobs.store import FolderLock as FolderLock
 from .jobs.store import Store as Store
-from .jobs.store import StoreError as StoreError
-from .jobs.workers import CannotStart as CannotStart
 from .jobs.workers import pack_job as pack_job
 from .load_path import LoadPath as LoadPath
 from .load_path import load_path as load_path
@@ -55,8 +51,6 @@ from .optimisation.search import values_at as values_at
 from .robust.family import Family as Family
 from .robust.family import FamilyMember as FamilyMember
 from .robust.family import Range as Range
-from .robust.family import RangeError as RangeError
-from .robust.robust_study import RobustError as RobustError
 from .robust.robust_study import RobustStudy as RobustStudy
 from .robust.robust_study import robust_study as robust_study
 from .sensitivity.goal import Goal as Goal
@@ -82,7 +76,6 @@ from .tolerances.tolerance_study import member_changes as member_changes
 from .tolerances.tolerance_study import run_tolerances as run_tolerances
 from .tolerances.tolerance_study import shares_of as shares_of
 from .tolerances.tolerance_study import tolerance as tolerance
-from .wall_tables.safe_walls import SafeWallsError as SafeWallsError
 from .wall_tables.safe_walls import safe_walls as safe_walls
 from .wall_tables.table import SafeWalls as SafeWalls
 from .workspace.common_area import common_area as common_area
@@ -92,5 +85,4 @@ from .workspace.map import map_job as map_job
 from .workspace.map import map_table as map_table
 from .workspace.map import why_no_cell as why_no_cell
 from .workspace.map import workspace_map as workspace_map
-from .workspace.plane_grid import PlaneError as PlaneError
 from .workspace.plane_grid import plane_of as plane_of

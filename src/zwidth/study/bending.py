@@ -22,23 +22,20 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.address import is_number, table
 from zwidth.device.build_mechanism import own_body
 from zwidth.device.device import Device
 from zwidth.device.legs import members, written
 from zwidth.device.load import from_document
 from zwidth.device.schema.beam import BeamSection
+from zwidth.errors import BeamError, ChartError, EquilibriumError, UnresolvedError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.sections import UnresolvedError
 from zwidth.measures.load_effect import NONE_STABLE
 from zwidth.model.argument_checks import require
 from zwidth.model.beam_bodies import carried_body
 from zwidth.model.beam_section import beam_properties, typical_material
 from zwidth.model.beam_section import tube as tube_section
 from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.flexible_body import BeamError
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant

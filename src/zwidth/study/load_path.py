@@ -21,19 +21,16 @@ from scipy.optimize import brentq
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, largest_stiffness, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
 from zwidth.device.load import device_of_point, device_without_load
+from zwidth.errors import ChartError, EquilibriumError, NoMechanismError, PostureError, UnresolvedError
 from zwidth.loop.loop import SidewaysMotion
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_text import NoMechanismError
-from zwidth.loop.sections import UnresolvedError
 from zwidth.measures.load_effect import NONE_STABLE, fastest_sideways_motion
 from zwidth.model.argument_checks import require
 from zwidth.model.effective_mass import screw
-from zwidth.model.equilibrium import Equilibrium, EquilibriumError
+from zwidth.model.equilibrium import Equilibrium
 from zwidth.model.load import HandForce, Load
-from zwidth.model.posture import PostureError
 from zwidth.progress import Progress
 from zwidth.result import Result
 

@@ -22,16 +22,15 @@ import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.tracer import Tracer
+from zwidth.errors import ChartError, LoadError, ModelError
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
-from zwidth.model.load import LoadError
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import Model, ModelError
+from zwidth.model.reduction import Model
 from zwidth.result import Result
 
 Interval = tuple[float, float]

@@ -14,8 +14,9 @@ from tests.measured_cases import frequency_grid, measured_response, sampled_resp
 from tests.study_sizes import study_size
 from zwidth.chart import MeasuredLoop, eigenvalues, measured_chart, stability_chart
 from zwidth.chart.measured.boundary import coarse_angles, nyquist_count, sample_boundary
+from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth, CentralDifference, Controller, LeastSquaresSlope, Loop, SavitzkyGolay
-from zwidth.model import Plant, Response, ResponseError, integrators_of
+from zwidth.model import Plant, Response, integrators_of
 from zwidth.model.raw_sweep import sweep_response
 
 DAMPED = (0.01, 0.05, 0.3, 1.0, 1.5)

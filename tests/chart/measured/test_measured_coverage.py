@@ -12,8 +12,9 @@ from tests.measured_cases import chirp
 from tests.noisy_benches import random_bench, readings
 from tests.study_sizes import study_size
 from zwidth.chart import eigenvalues, measured_chart, stability_chart
+from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth, Controller, Loop
-from zwidth.model import Plant, ResponseError, integrators_of
+from zwidth.model import Plant, integrators_of
 from zwidth.model.raw_sweep import sweep_response
 from zwidth.model.response import joint_radius
 

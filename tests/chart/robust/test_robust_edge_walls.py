@@ -10,7 +10,8 @@ from tests.apart import ExactLoop
 from tests.chart.exact_radii import is_off, joined_excess, walls_beside_origin
 from tests.chart.robust.test_robust import similar_loops
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
-from zwidth.chart import ChartError, robust_chart, stability_chart
+from zwidth.chart import robust_chart, stability_chart
+from zwidth.errors import ChartError
 
 OFF = 1e-9
 # Walls judged in 40 digits, of those that double precision finds off: the farthest off of each member.

@@ -9,7 +9,8 @@ from multi_loops import random_multi, random_unlike, reference_matrix, reference
 from systems import mass
 
 from zwidth.chart import multi_chart, stability_chart
-from zwidth.loop import Controller, Loop, MatrixError, MultiLoop, WallMatrices
+from zwidth.errors import ArgumentError
+from zwidth.loop import Controller, Loop, MultiLoop, WallMatrices
 from zwidth.model import MultiPlant
 
 # Walls closer to the edge than this share of the chart lie within the chords that draw it, and radii closer to 1
@@ -337,13 +338,13 @@ WANTED = "must be 2 numbers, one for each direction, or a matrix of 2 rows and c
 @pytest.mark.parametrize("name", ["relative_stiffness", "relative_damping"])
 def test_what_is_no_matrix_of_a_law_is_refused_in_one_sentence(name, given, problem):
     arguments = {"relative_stiffness": [1.0, 1.0], name: given}
-    with pytest.raises(MatrixError) as refused:
+    with pytest.raises(ArgumentError) as refused:
         WallMatrices.of(**arguments, count=2)
     assert str(refused.value) == f"{name} {problem}"
 
 
 def test_no_numbers_at_all_are_refused():
-    with pytest.raises(MatrixError, match=r"^relative_stiffness must be 1 number, or .* got 0 numbers$"):
+    with pytest.raises(ArgumentError, match=r"^relative_stiffness must be 1 number, or .* got 0 numbers$"):
         WallMatrices.of([])
 
 
@@ -360,7 +361,7 @@ def test_matrices_of_another_number_of_directions_are_refused():
     [([1.0, 1e-10], [1.0, 1.0], "relative_stiffness"), ([1.0, 1.0], [1e-11, 1.0], "relative_damping")],
 )
 def test_a_share_too_small_to_tell_from_none_is_refused(stiffness, damping, name):
-    with pytest.raises(MatrixError, match=rf"^{name} must be 0 or at least 1e-09 times the other .* give 0$"):
+    with pytest.raises(ArgumentError, match=rf"^{name} must be 0 or at least 1e-09 times the other .* give 0$"):
         WallMatrices.of(stiffness, damping)
     given = {"relative_stiffness": stiffness, "relative_damping": damping}
     least = {key: np.maximum(numbers, 1e-9) for key, numbers in given.items()}

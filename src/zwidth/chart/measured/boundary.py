@@ -23,7 +23,7 @@ from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.arcs import Window
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.compiled import compiled
-from zwidth.model.response import ResponseError
+from zwidth.errors import ResponseError
 
 NEAREST = 1e-5  # to an end of the curve or an asymptote, of the spacing there
 FAR = 1e9  # how far lines are drawn, in `large_wall_scale`

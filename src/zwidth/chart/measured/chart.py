@@ -48,10 +48,11 @@ from zwidth.chart.measured.stable_regions import (
     window_of_regions,
 )
 from zwidth.chart.traced_edge import TracedEdge
+from zwidth.errors import ResponseError
 from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
-from zwidth.model.response import CONFIDENCE, Response, ResponseError, joint_radius
+from zwidth.model.response import CONFIDENCE, Response, joint_radius
 
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
-from zwidth.model.response import ResponseError
+from zwidth.errors import ResponseError
 
 TRIED: Final = 0.5  # share of the largest stiffness at which the error is looked at: well within the stable walls
 

@@ -20,6 +20,7 @@ from zwidth.chart.measured.response_interpolation import (
     interpolate_response,
     smooth_part,
 )
+from zwidth.errors import ResponseError
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response, window_response
 from zwidth.loop.filters import force_filter, velocity_estimator
@@ -29,7 +30,6 @@ from zwidth.model.response import (
     UNSURE,
     LowFrequencies,
     Response,
-    ResponseError,
     integrators_of,
     joint_radius,
     low_frequencies,

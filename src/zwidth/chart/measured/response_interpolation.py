@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zwidth.arrays import Complexes, Flags, Floats, Ints
-from zwidth.model.response import ResponseError
+from zwidth.errors import ResponseError
 
 MIRRORED = 3  # points repeated beyond an end
 FEWEST = 6  # frequencies; fewer make no curve

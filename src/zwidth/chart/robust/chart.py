@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import ArcPoints
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_edge import common_edge
 from zwidth.chart.robust.instability import perhaps_unstable
@@ -29,6 +28,7 @@ from zwidth.chart.robust.members import (
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import CHORD
 from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge, sides_of_circle
+from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require, wrong_type
 

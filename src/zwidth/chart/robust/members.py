@@ -13,13 +13,12 @@ import shapely
 
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import MINUS, PLUS, signed_area
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.hurwitz import is_stable, work_array
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import ROOTS, Tracer
+from zwidth.errors import ChartError, UnmovedError
 from zwidth.loop.loop import Loop
-from zwidth.loop.sections import UnmovedError
 
 # Parts of a polygon smaller than this share of it are rounding.
 ROUNDING_AREA = 1e-12

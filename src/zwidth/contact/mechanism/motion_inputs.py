@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
+from zwidth.errors import ArgumentError
 from zwidth.loop.controller import Controller
 from zwidth.memory_limit import check_memory
 from zwidth.model.mechanism import Mechanism
@@ -18,17 +19,6 @@ from zwidth.model.posture import Posture
 
 ALONG: Final = 1e-9  # share of a velocity that may be beside what the handle can do
 MOST_SUBSTEPS: Final = 100_000
-
-
-class MotionError(ValueError):
-    """An argument of the simulation is not valid, or the motion cannot be simulated here.
-
-    argument  of `simulate_mechanism` that is not valid; "" where it is the device, or several together
-    """
-
-    def __init__(self, text: str, argument: str = "") -> None:
-        self.argument = argument
-        super().__init__(text)
 
 
 @dataclass(frozen=True)
@@ -49,11 +39,11 @@ def motion_inputs(
     substeps: int,
     drives: int,
 ) -> MotionInputs:
-    """The numbers of a motion. Raises MotionError."""
+    """The numbers of a motion. Raises ArgumentError."""
     if not (isinstance(duration, Real) and isfinite(duration) and duration > 0.0):
-        raise MotionError(f"duration must be positive and finite, in seconds, got {duration!r}")
+        raise ArgumentError("duration", f"must be positive and finite, in seconds, got {duration!r}")
     if not (isinstance(substeps, int | np.integer) and 1 <= substeps <= MOST_SUBSTEPS):
-        raise MotionError(f"substeps must be a whole number from 1 to {MOST_SUBSTEPS}, got {substeps}")
+        raise ArgumentError("substeps", f"must be a whole number from 1 to {MOST_SUBSTEPS}, got {substeps}")
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))
     check_memory(
         samples * (23.0 + 12.0 * drives),
@@ -68,7 +58,7 @@ def motion_inputs(
 def start_rates(posture: Posture, velocity: ArrayLike | None) -> tuple[Floats, Floats]:
     """The handle's velocity (3,) [m/s], and the drives' rates (d,) that give it [rad/s].
 
-    Raises MotionError  for a velocity that the handle cannot have
+    Raises ArgumentError  for a velocity that the handle cannot have
     """
     J = posture.jacobian
     if velocity is None:
@@ -77,16 +67,16 @@ def start_rates(posture: Posture, velocity: ArrayLike | None) -> tuple[Floats, F
     rates = np.linalg.lstsq(J, given, rcond=None)[0]
     left = float(np.linalg.norm(J @ rates - given))
     if left > ALONG * float(np.linalg.norm(given)):
-        raise MotionError(
-            f"the handle cannot move with start_velocity {given.tolist()} m/s: {left:.3g} m/s of it is across "
+        raise ArgumentError(
+            "start_velocity",
+            f"the handle cannot move with {given.tolist()} m/s: {left:.3g} m/s of it is across "
             "what the drives can do; give a velocity within the mechanism's plane of motion",
-            argument="start_velocity",
         )
     return given, np.asarray(rates)
 
 
 def _check_drives(mechanism: Mechanism) -> None:
-    """Raise MotionError for what the motion of a whole mechanism leaves out."""
+    """Raise ArgumentError for what the motion of a whole mechanism leaves out."""
     drives, links = mechanism.drives, mechanism.links
     present = {
         "links that bend": bool(mechanism.flexible),
@@ -99,9 +89,10 @@ def _check_drives(mechanism: Mechanism) -> None:
     }
     named = [name for name, there in present.items() if there]
     if named:
-        raise MotionError(
+        raise ArgumentError(
+            "",
             f"the motion of a whole mechanism is not simulated with {' and '.join(named)}; simulate the plant of "
-            "one direction instead"
+            "one direction instead",
         )
 
 
@@ -111,12 +102,15 @@ def _check_friction(mechanism: Mechanism) -> None:
         return
     for name, level in zip(mechanism.drives.names, parts.coulomb, strict=True):
         if not (isfinite(level) and level >= 0.0):
-            raise MotionError(f"drive {name!r}: coulomb friction must be at least 0 and finite [N m], got {level}")
+            raise ArgumentError(
+                "", f"drive {name!r}: coulomb friction must be at least 0 and finite [N m], got {level}"
+            )
     if np.any(parts.brake_damping > 0.0):
         name = mechanism.drives.names[int(np.argmax(parts.brake_damping > 0.0))]
-        raise MotionError(
+        raise ArgumentError(
+            "",
             f"drive {name!r} has a programmable brake, which nothing commands in the motion of a whole mechanism; "
-            "leave it out, or simulate the direction's plant"
+            "leave it out, or simulate the direction's plant",
         )
 
 
@@ -125,13 +119,15 @@ def _push(push: ArrayLike | None, samples: int) -> Floats:
         return np.zeros((1, 3))
     given = np.array(push, dtype=np.float64, order="C")
     if given.ndim == 2 and given.shape != (samples, 3):
-        raise MotionError(
-            f"push must be one force (3,) or one for each sample, ({samples}, 3), got an array of {given.shape}"
+        raise ArgumentError(
+            "push", f"must be one force (3,) or one for each sample, ({samples}, 3), got an array of {given.shape}"
         )
     if given.ndim != 2:
         return _vector("push", given, "N")[None]
     if not np.all(np.isfinite(given)):
-        raise MotionError(f"push must be finite [N]; row {int(np.argmin(np.isfinite(given).all(axis=1)))} is not")
+        raise ArgumentError(
+            "push", f"must be finite [N]; row {int(np.argmin(np.isfinite(given).all(axis=1)))} is not"
+        )
     return given
 
 
@@ -142,5 +138,5 @@ def _gravity(gravity: ArrayLike | None) -> Floats:
 def _vector(what: str, value: ArrayLike, unit: str) -> Floats:
     given = np.array(value, dtype=np.float64)
     if given.shape not in ((2,), (3,)) or not np.all(np.isfinite(given)):
-        raise MotionError(f"{what} must be two or three finite numbers [{unit}], got {given.tolist()}")
+        raise ArgumentError(what, f"must be two or three finite numbers [{unit}], got {given.tolist()}")
     return np.append(given, np.zeros(3 - given.size))

@@ -20,13 +20,13 @@ from zwidth.contact.computer import computers
 from zwidth.contact.environments import ENVIRONMENTS, Environment
 from zwidth.contact.mechanism import motion_kernel as kernel
 from zwidth.contact.mechanism.motion import MechanismMotion
-from zwidth.contact.mechanism.motion_inputs import MotionError, motion_inputs, start_rates
+from zwidth.contact.mechanism.motion_inputs import motion_inputs, start_rates
 from zwidth.contact.mechanism.rendering import rendering_inputs
 from zwidth.contact.mechanism.surfaces import Plane, Surface, depth_and_normal, packed
 from zwidth.contact.mechanism.system import System, system_of
+from zwidth.errors import ArgumentError, NoMechanismError
+from zwidth.loop.controller import refuse_feedback
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_text import NoMechanismError
-from zwidth.loop.unsupported_feedback import refuse_feedback
 from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
@@ -84,9 +84,8 @@ def simulate_mechanism(
     seed            of the encoders' noise
     progress        called with "simulating", the samples done, and all samples
     Returns  MechanismMotion; a motion that meets a singularity ends there, and says so
-    Raises   SurfaceOutOfReach  (a ValueError) for a surface that the handle never touches in this assembly
-             MotionError  (a ValueError) for inputs that cannot be meant
-             NoMechanismError    (loop.point_errors) for a device without a mechanism
+    Raises   ArgumentError  for inputs that cannot be meant, such as a surface that the handle never touches
+             NoMechanismError    for a device without a mechanism
              ValueError          for another word for torque_limits
              TooLarge     (a ValueError) for more samples than the machine has memory for
 
@@ -106,16 +105,22 @@ def simulate_mechanism(
         raise NoMechanismError
     point.require("dynamics", "sampling")
     if point.shape:
-        raise MotionError(f"one posture is moved at a time, got {point.shape}; take one of them by its index")
+        raise ArgumentError(
+            "", f"one posture is moved at a time, got {point.shape}; take one of them by its index"
+        )
     if posture.status != OK:
-        raise MotionError("the posture is out of reach or singular and no motion can start there; ask for another")
+        raise ArgumentError(
+            "", "the posture is out of reach or singular and no motion can start there; ask for another"
+        )
     if mechanism.design_shape:
-        raise MotionError(f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
+        raise ArgumentError("", f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
     check_choice("torque_limits", torque_limits, ("each", "together"))
     if seed < 0:
-        raise MotionError(f"seed must be zero or positive, got {seed}", "seed")
+        raise ArgumentError("seed", f"must be zero or positive, got {seed}")
     if (wall is None) != (surface is None):
-        raise MotionError("a wall needs a surface and a surface a wall; give both, or neither for a free device")
+        raise ArgumentError(
+            "", "a wall needs a surface and a surface a wall; give both, or neither for a free device"
+        )
     environment, values = None, np.zeros(0)
     if wall is not None and surface is not None:
         environment, values = rendered_environment(wall, surface)
@@ -248,12 +253,8 @@ TRIED: Final = 64  # postures nearest to the surface from which it is tried to t
 REACHES: Final = 4  # times that each goes on from where it got nearest
 
 
-class SurfaceOutOfReach(ValueError):
-    """The handle never touches the surface in this assembly."""
-
-
 def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, surface: Surface) -> None:
-    """Raise SurfaceOutOfReach unless the handle can touch the surface in the posture's assembly.
+    """Raise ArgumentError unless the handle can touch the surface in the posture's assembly.
 
     All postures of the assembly are known coarsely (`model.roadmap`). Where none of them is inside the wall, the
     ones nearest to it are taken to the point of the surface that they are nearest to.
@@ -283,9 +284,10 @@ def check_reach(mechanism: Mechanism, mech: MechanismArrays, posture: Posture, s
         else:
             break
     where = "(" + ", ".join(f"{x:.4g}" for x in nearest) + ") m"
-    raise SurfaceOutOfReach(
+    raise ArgumentError(
+        "surface",
         f"the handle never touches the surface in assembly {posture.assembly!r}: of the postures tried the "
-        f"closest is about {least:.3g} m away, at {where}; move the surface into the workspace"
+        f"closest is about {least:.3g} m away, at {where}; move the surface into the workspace",
     )
 
 
@@ -321,20 +323,20 @@ SurfaceRendering = SurfaceWall | SurfaceEnvironment
 
 
 def rendered_environment(wall: SurfaceRendering, surface: Surface) -> tuple[Environment, Floats]:
-    """The environment that renders a wall at this surface, and its parameters. Raises MotionError."""
+    """The environment that renders a wall at this surface, and its parameters. Raises ArgumentError."""
     if not isinstance(surface, Surface):
-        raise MotionError(f"the surface must be a Plane, a Sphere or a Box, got {type(surface).__name__}")
+        raise ArgumentError("surface", f"must be a Plane, a Sphere or a Box, got {type(surface).__name__}")
     two_sided = isinstance(surface, Plane) and surface.two_sided
     if isinstance(wall, SurfaceEnvironment):
         return wall.environment, _values(wall, two_sided)
     if not isinstance(wall, SurfaceWall):
-        raise MotionError(f"the wall must be a SurfaceWall or a SurfaceEnvironment, got {type(wall).__name__}")
+        raise ArgumentError("wall", f"must be a SurfaceWall or a SurfaceEnvironment, got {type(wall).__name__}")
     if not (isfinite(wall.stiffness) and wall.stiffness >= 0.0):
-        raise MotionError(f"the wall's stiffness must be at least 0 and finite [N/m], got {wall.stiffness}")
+        raise ArgumentError("wall", f"its stiffness must be at least 0 and finite [N/m], got {wall.stiffness}")
     if not isfinite(wall.damping):
-        raise MotionError(f"the wall's damping must be finite [N s/m], of either sign, got {wall.damping}")
+        raise ArgumentError("wall", f"its damping must be finite [N s/m], of either sign, got {wall.damping}")
     if two_sided and wall.no_pull:
-        raise MotionError("a two-sided plane always pulls; leave out no_pull or two_sided")
+        raise ArgumentError("", "a two-sided plane always pulls; leave out no_pull or two_sided")
     gains = {"stiffness": float(wall.stiffness), "damping": float(wall.damping)}
     if two_sided:
         return ENVIRONMENTS["wall"], ENVIRONMENTS["wall"].values(**gains)
@@ -345,13 +347,15 @@ def rendered_environment(wall: SurfaceRendering, surface: Surface) -> tuple[Envi
 def _values(wall: SurfaceEnvironment, two_sided: bool) -> Floats:
     names, values = wall.environment.names, np.array(wall.values, dtype=np.float64)
     if values.shape != (len(names),):
-        raise MotionError(
+        raise ArgumentError(
+            "",
             f"{wall.environment.name} takes {len(names)} values ({', '.join(names) or 'none'}), got an array of "
-            f"shape {values.shape}; make it by Environment.values"
+            f"shape {values.shape}; make it by Environment.values",
         )
     if two_sided:
-        raise MotionError(
+        raise ArgumentError(
+            "",
             f"two_sided is of a SurfaceWall; {wall.environment.name} says itself on which sides of the surface it "
-            "acts: leave two_sided out"
+            "acts: leave two_sided out",
         )
     return values

@@ -11,8 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.device.faults import DeviceError, Fault, fail
+from zwidth.device.faults import Fault, fail
 from zwidth.device.robot_files.robot import WARNING, Finding
+from zwidth.errors import DeviceError
 
 LEAST: Final = 1e-12  # of masses and moments that count as given, as in device files; MuJoCo allows 1e-15
 MESH_KINDS: Final = ("mjGEOM_MESH", "mjGEOM_HFIELD", "mjGEOM_SDF")

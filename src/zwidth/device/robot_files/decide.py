@@ -16,13 +16,14 @@ from pydantic import ValidationError
 
 from zwidth.arrays import Floats
 from zwidth.device.build_mechanism import mechanism as build_mechanism
-from zwidth.device.faults import DeviceError, Fault, comma_list, dotted, fail, suggestion
+from zwidth.device.faults import Fault, comma_list, dotted, fail, suggestion
 from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.device.validation_messages import validation_messages
+from zwidth.errors import DeviceError
 from zwidth.model.handle_position import constraints, handle_goal
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack

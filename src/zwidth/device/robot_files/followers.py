@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.faults import DeviceError, Fault
+from zwidth.device.faults import Fault
 from zwidth.device.robot_files.robot import (
     BASE,
     UNMOVED,
@@ -33,6 +33,7 @@ from zwidth.device.robot_files.robot import (
     RobotJoint,
     joint_motion,
 )
+from zwidth.errors import DeviceError
 
 OBLIQUE: Final = 0.1  # sine of the angle between two slides from which one wedge does
 ALIGNED: Final = 1e-9  # sine of the angle between axes that count as parallel, and error of a ratio of 1

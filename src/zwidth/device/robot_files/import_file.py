@@ -22,7 +22,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from zwidth.device.build import roll_pitch_yaw
-from zwidth.device.faults import DeviceError, Fault, comma_list, dotted, fail, suggestion
+from zwidth.device.faults import Fault, comma_list, dotted, fail, suggestion
 from zwidth.device.load import from_document
 from zwidth.device.missing import unknown_numbers
 from zwidth.device.plausibility import implausible
@@ -35,8 +35,9 @@ from zwidth.device.robot_files.read_model import read_bodies, read_urdf
 from zwidth.device.robot_files.robot import BASE, WARNING, Finding, Motor, Robot, RobotClosure
 from zwidth.device.schema.mechanism import LoopClosure
 from zwidth.device.schema.value_types import Section
-from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.text_file import read_text
 from zwidth.device.validation_messages import validation_messages
+from zwidth.errors import DeviceError, FileError
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix
 
@@ -195,7 +196,7 @@ def read_robot_text(path: str | os.PathLike[str]) -> str:
     label = os.fspath(path)
     try:
         return read_text(path, LARGEST_ROBOT_FILE)
-    except UnreadableFileError as error:
+    except FileError as error:
         raise fail(label, "", f"{error}; give an MJCF or URDF file") from None
 
 
@@ -236,7 +237,7 @@ def included_files(root: ElementTree.Element, folder: Path, label: str) -> None:
             seen.add(name)
             try:
                 text = read_text(folder / name, LARGEST_ROBOT_FILE)
-            except UnreadableFileError as error:
+            except FileError as error:
                 raise fail(label, f"include '{name}'", str(error)) from None
             if re.search(r"<!(DOCTYPE|ENTITY)", text):
                 raise fail(label, f"include '{name}'", "has a document type (<!DOCTYPE ...>); remove it")
@@ -268,7 +269,7 @@ def add_loops(robot: Robot, path: Path) -> None:
     label = str(path)
     try:
         document = parse_document(read_text(path, LARGEST_FILE), label)
-    except UnreadableFileError as error:
+    except FileError as error:
         raise DeviceError([Fault(label, "", str(error))]) from None
     try:
         section = LoopsFile.model_validate(document)

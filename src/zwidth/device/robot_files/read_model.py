@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.faults import DeviceError, Fault, comma_list, fail, suggestion
+from zwidth.device.faults import Fault, comma_list, fail, suggestion
 from zwidth.device.robot_files.compile_mjcf import Compiled, compile_mjcf, matrix_of_six, xml_text
 from zwidth.device.robot_files.robot import (
     UNMOVED,
@@ -27,6 +27,7 @@ from zwidth.device.robot_files.robot import (
     Site,
     rotation_of_quaternion,
 )
+from zwidth.errors import DeviceError
 from zwidth.model.rotations import rotation_vector
 
 KINDS = {0: "free", 1: "spherical", 2: "prismatic", 3: "revolute"}  # mjtJoint

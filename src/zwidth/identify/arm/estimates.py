@@ -184,7 +184,7 @@ def _given(device: Device, path: str) -> bool:
 
 def _addressable(device: Device, path: str) -> bool:
     """Whether a device file has a place for this path; a leg's copies have none of their own."""
-    from zwidth.device.faults import DeviceError
+    from zwidth.errors import DeviceError
 
     if not path:
         return False

@@ -13,6 +13,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.device.faults import comma_list
+from zwidth.errors import NoAnswerError
 from zwidth.identify.arm.estimates import ConsistentLinks, mass_columns
 from zwidth.identify.arm.parameters import BaseParameters
 from zwidth.identify.arm.regression import Regression
@@ -202,10 +203,6 @@ def validation_check(drives: Sequence[str], shares: Sequence[float], edge: float
 PART: Final = 20_000  # smoothed samples whose columns stand in memory at once
 
 
-class UnreachedError(ValueError):
-    """The mechanism cannot be where a record has it; the text says where."""
-
-
 @dataclass(frozen=True)
 class Compared:
     """Torques of one stretch, n samples.
@@ -244,7 +241,7 @@ class Comparison:
         """Torques and columns of a stretch.
 
         static   gravities (3,) of which further columns are made
-        Raises UnreachedError  where the mechanism cannot be
+        Raises NoAnswerError  where the mechanism cannot be
         """
         columns, further = list[Floats](), list[Floats]()
         angles = self.first_posture(stretch)
@@ -276,7 +273,7 @@ class Comparison:
         mech = self.base.parameters.mech
         links, places, reached = inertia_regressor(mech, angles, one.coordinates, rates, accelerations, gravity)
         if reached < len(one.time):
-            raise UnreachedError(self._where(one, reached))
+            raise NoAnswerError(self._where(one, reached))
         return links, places
 
     def _where(self, one: Stretch, row: int) -> str:
@@ -293,6 +290,6 @@ class Comparison:
             step = np.where(turns, step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)), step)
         moved = moved_posture(mech, self.start, step)
         if moved is None:
-            raise UnreachedError(self._where(stretch, 0))
+            raise NoAnswerError(self._where(stretch, 0))
         moved[own] = np.linalg.solve(mech.to_drive[0], stretch.coordinates[0])
         return moved

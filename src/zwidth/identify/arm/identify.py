@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, quote
+from zwidth.errors import NoAnswerError
 from zwidth.identify.arm.checks import (
     Channels,
     Side,
@@ -45,7 +46,6 @@ from zwidth.identify.arm.estimates import (
 from zwidth.identify.arm.fit_checks import (
     Compared,
     Comparison,
-    UnreachedError,
     consistency_check,
     excitation_check,
     gravity_check,
@@ -224,7 +224,7 @@ class _Work:
             weights = self._other_gravity()
             seen = _compared(comparison, fitted, weights)
             validation = _compared(comparison, unseen)
-        except UnreachedError as error:
+        except NoAnswerError as error:
             reason = f"{error}; check the angles' signs, zeros and unit (radians), and the assembly"
             return self._refused_with([*checks, Check("posture", False, reason)])
         checks.append(Check("posture", True, "every loop closes at every sample"))
@@ -377,7 +377,7 @@ class _Work:
                     yield _compared(
                         comparison, [_with_noise(*one, sign) for one in zip(fitted, noise, strict=True)]
                     )
-                except UnreachedError:  # at the edge of what the loops allow
+                except NoAnswerError:  # at the edge of what the loops allow
                     return
 
     def _fit_checks(

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeChords
-from zwidth.device.faults import DeviceError, comma_list, plural
+from zwidth.device.faults import comma_list, plural
+from zwidth.errors import DeviceError
 from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likelihood, ranges
 from zwidth.identify.boundary.model import BoundaryModel, Scatter
 from zwidth.identify.boundary.parameters import BoundaryParameters

@@ -17,7 +17,8 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, comma_list, fail, plural
+from zwidth.device.faults import comma_list, fail, plural
+from zwidth.errors import DeviceError
 from zwidth.identify.boundary.checks import (
     check_circumstances,
     check_explained,

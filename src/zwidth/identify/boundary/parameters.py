@@ -17,9 +17,10 @@ from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device import address
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, dotted, fail, quote
+from zwidth.device.faults import dotted, fail, quote
 from zwidth.device.plausibility import ImplausibleNumber
 from zwidth.device.schema.device_file import key_unit, may_be_zero
+from zwidth.errors import DeviceError
 from zwidth.identify.boundary.damping_models import DampingModel
 from zwidth.loop.operating_point import OperatingPoint
 

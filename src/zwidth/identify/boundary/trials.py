@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from zwidth.arrays import Flags, Floats
 from zwidth.contact.boundary_experiment import StableExtent, measure_edges, measure_tips
 from zwidth.contact.hand import Hand
-from zwidth.contact.stability_trial import StabilityTrial, TrialError
+from zwidth.contact.stability_trial import StabilityTrial
 from zwidth.device.faults import comma_list, fail
+from zwidth.errors import ArgumentError
 from zwidth.identify.boundary.fit import fit_boundary
 from zwidth.identify.boundary.model import BoundaryModel, Deviations, Scatter
 from zwidth.identify.boundary.parameters import BoundaryParameters
@@ -140,7 +141,7 @@ def _filled(values: Floats | None, count: int) -> Floats:
 
 
 def trial_of(how: Disturbing, parameters: BoundaryParameters, vector: Floats) -> StabilityTrial:
-    """The trial on the device with these numbers. Raises TrialError, and ValueError for no such device."""
+    """The trial on the device with these numbers. Raises ArgumentError, and ValueError for no such device."""
     return StabilityTrial(
         parameters.contact_loop(vector),
         Hand(operator=parameters.operator(vector), push=how.push),
@@ -258,7 +259,7 @@ def model_by_trials(
             if not np.max(np.abs(x - sloped_at)) < SAME_SLOPES:
                 slopes, sloped_at = _slopes(model.points, parameters, plan, x), x
             by_trials = _around(model, parameters, plan, x, slopes)
-        except (TrialError, ValueError) as error:
+        except (ArgumentError, ValueError) as error:
             raise fail(label, "", f"no trials can be simulated: {error}") from None
         if int(by_trials.points.on_edge.sum()) < len(x) + 1:
             edges = int(by_trials.points.on_edge.sum())

@@ -279,8 +279,8 @@ def _predicted(
     name: str, point: OperatingPoint, wall: tuple[float, float] | None, frequency: Floats
 ) -> Complexes | None:
     """What `felt` predicts; None where the device has no model or no handle, or where the wall is not known."""
-    from zwidth.loop.unsupported_feedback import FeedbackError
-    from zwidth.measures.handle_impedance import HandleError, felt_impedance, free_impedance
+    from zwidth.errors import FeedbackError, HandleError
+    from zwidth.measures.handle_impedance import felt_impedance, free_impedance
 
     if point.response is not None or (name == "on" and wall is None):
         return None

@@ -10,8 +10,9 @@ import numpy as np
 
 from zwidth.device.address import table
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, comma_list, dotted, fail, suggestion
+from zwidth.device.faults import comma_list, dotted, fail, suggestion
 from zwidth.device.legs import Member, members
+from zwidth.errors import DeviceError
 from zwidth.identify.records.record import Columns, Record
 
 COLUMNS: Final = Columns(
@@ -267,7 +268,7 @@ def _at_link(device: Device, link: Member, drives: dict[str, tuple[int, Member]]
 
 def _moved(device: Device, index: int) -> float:
     """Inertia at the shaft of a motor by the file, all other drives standing [kg m^2]; nan where it gives none."""
-    from zwidth.model.posture import PostureError
+    from zwidth.errors import PostureError
 
     assert device.mechanism is not None
     if "dynamics" in device.missing:

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from zwidth.arrays import Ints
-from zwidth.device.faults import DeviceError, Fault, comma_list, fail, plural
-from zwidth.device.text_file import UnreadableFileError, decode, header_fault, read_head
+from zwidth.device.faults import Fault, comma_list, fail, plural
+from zwidth.device.text_file import decode, header_fault, read_head
+from zwidth.errors import DeviceError, FileError
 
 Piece = dict[str, NDArray[Any]]  # columns of numbers, and those of words
 
@@ -187,7 +188,7 @@ def read_record(path: str | os.PathLike[str], wanted: Columns) -> Record:
         if file.suffix.lower() == ".mat":
             return _matlab(file, head, wanted)
         text = decode(head[: head.rfind(b"\n") + 1] or head)
-    except UnreadableFileError as error:
+    except FileError as error:
         raise fail(str(file), "", f"{error}; give a CSV or .mat file with columns {wanted.listed}") from None
     lines = csv.reader(text.splitlines())
     for header in lines:

@@ -15,6 +15,7 @@ from zwidth.arrays import Flags, Floats
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.hidden_walls import hidden_walls
 from zwidth.device.device import Device
+from zwidth.errors import ResponseError
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.modes.checks import FACTORS_LINEAR, NEAR, flip_check, order_check
 from zwidth.identify.modes.model import sampled_response
@@ -23,7 +24,7 @@ from zwidth.identify.records.sampling import check_sampling
 from zwidth.identify.response.sweep_blocks import LEAST_SHARED, SweepBlocks, SweepRange, shared_excitation
 from zwidth.loop.controller import Controller
 from zwidth.model.raw_sweep import block_length, sweep_response_of_blocks
-from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, ResponseError, mean_path
+from zwidth.model.response import LEAST_COHERENCE, MeasuredPath, Response, mean_path
 from zwidth.progress import Progress
 
 FORCES: Final = ("force_command_N", "force_N")

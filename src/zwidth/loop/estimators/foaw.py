@@ -8,7 +8,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.loop.estimator import Estimator, NonlinearError, check_period, check_positive, check_whole
+from zwidth.errors import NonlinearError
+from zwidth.loop.estimator import Estimator, check_period, check_positive, check_whole
 
 Fit = Literal["end-fit", "best-fit"]
 

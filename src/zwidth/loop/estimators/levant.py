@@ -8,7 +8,8 @@ from math import sqrt
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.loop.estimator import Estimator, NonlinearError, check_period, check_positive
+from zwidth.errors import NonlinearError
+from zwidth.loop.estimator import Estimator, check_period, check_positive
 
 # What the memory holds: the number of readings, the first of them, and the two states.
 READINGS, FIRST_READING, POSITION, VELOCITY = 0, 1, 2, 3

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from zwidth.arrays import Complexes, Flags, Floats
+from zwidth.errors import OperatorError
 from zwidth.loop.measured.measured_port import MeasuredPort, measured_port
-from zwidth.model.operator import Operator, OperatorError
+from zwidth.model.operator import Operator
 from zwidth.model.response import Response
 
 NODES: Final = 16  # angles at which the aliases beyond the nearest are summed; they vary little

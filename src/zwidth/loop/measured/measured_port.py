@@ -21,13 +21,13 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats
+from zwidth.errors import ResponseError
 from zwidth.loop.measured.pole_fit import PathData, PoleModel, fit_poles, hold_response
 from zwidth.model.response import (
     LEAST_COHERENCE,
     MeasuredHandle,
     MeasuredPath,
     Response,
-    ResponseError,
     handle_obstacle,
     integrators_of,
     relative_error,

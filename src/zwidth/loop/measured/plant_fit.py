@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats
+from zwidth.errors import ResponseError
 from zwidth.loop.measured.measured_port import path_data
 from zwidth.loop.measured.pole_fit import (
     PATHS,
@@ -28,7 +29,7 @@ from zwidth.loop.measured.pole_fit import (
     stacked,
 )
 from zwidth.model.plant import Plant
-from zwidth.model.response import Response, ResponseError
+from zwidth.model.response import Response
 
 POINTS: Final = 250  # frequencies to which a plant is fitted
 STEPS: Final = 300  # of the search

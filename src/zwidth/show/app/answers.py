@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device.read import first_bundled
+from zwidth.errors import NoAnswerError
 from zwidth.show.app.frames import pack_frame
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import (
@@ -23,7 +24,7 @@ from zwidth.show.app.request import (
     ViewRequest,
     Wall,
 )
-from zwidth.show.cli.errors import BadInput, NoAnswer, explain, translate_errors
+from zwidth.show.cli.errors import BadInput, explain, translate_errors
 from zwidth.show.cli.options import Question
 from zwidth.show.cli.progress import BAD_INPUT, NO_ANSWER
 
@@ -58,7 +59,7 @@ class Answers:
             with self._translated(request):
                 contents, arrays = self._contents(request)
             head |= contents
-        except NoAnswer as error:
+        except NoAnswerError as error:
             head |= {"ok": False, "status": STATUS[NO_ANSWER], "sentences": [str(error)]}
         except (Exception, RecursionError) as error:
             sentences, code = explain(error)

@@ -12,21 +12,19 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart_base import BoundaryArc, Chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.nyquist import terms_along
 from zwidth.chart.verdict import eigenvalues
 from zwidth.device.device import Device
 from zwidth.device.read import DEVICES, OPERATORS, bundled, bundled_names
+from zwidth.errors import ChartError, MissingNumbersError, OutOfReach
 from zwidth.guarantees.disks import response_disks
 from zwidth.guarantees.port import port
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.loop_table import table_of_loops
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_text import MissingNumbersError
 from zwidth.measures.catalogue import MEASURES
 from zwidth.model.operator import ABOUT_AN_AXIS
-from zwidth.model.posture_failure import OutOfReach
 from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State, Wall

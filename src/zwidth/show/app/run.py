@@ -146,7 +146,7 @@ def start_of_device(device: Device) -> dict[str, Any]:
 
 
 def _named_files(document: Mapping[str, Any], folder: Path) -> list[dict[str, str]]:
-    """The files of measurements that a device file names. Raises UnreadableFileError."""
+    """The files of measurements that a device file names. Raises FileError."""
     response = document.get("response", {})
     names = [response.get("file"), *response.get("files", ()), response.get("handle_file")]
     return [{"name": name, "text": read_text(folder / name, LARGEST_FILE)} for name in names if name]

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 
+from zwidth.errors import NoAnswerError
 from zwidth.show.cli.answer import Answer, deliver, heading
-from zwidth.show.cli.errors import NoAnswer, translate_errors
+from zwidth.show.cli.errors import translate_errors
 from zwidth.show.cli.first_use import announce_compiling
 from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
 from zwidth.show.cli.progress import show_progress
@@ -139,7 +140,7 @@ class Command:
         return {}
 
     def compute(self, case: CommandLine) -> Any:
-        """The result. Raises NoAnswer, BadInput, and what the computation raises (see `translate_errors`)."""
+        """The result. Raises NoAnswerError, BadInput, and what the computation raises (see `translate_errors`)."""
         raise NotImplementedError
 
     def document(self, case: CommandLine, result: Any) -> dict[str, Any]:
@@ -220,7 +221,7 @@ class Command:
 
         return self.circumstances(case) | wall_of_document(document) | doubt_of_document(document)
 
-    def unanswered(self, case: CommandLine, none: NoAnswer) -> Answer:
+    def unanswered(self, case: CommandLine, none: NoAnswerError) -> Answer:
         """The answer where there is none: every key null, and why."""
         decided = {"decided": none.decided} if self.may_be_undecided else {}
         return Answer(
@@ -248,18 +249,18 @@ class Command:
     def _answer(self, case: CommandLine) -> Answer:
         if self.has_device and not self.takes_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses options that need a model for a [response]
-            none = self.unanswered(case, NoAnswer(self.no_response))
+            none = self.unanswered(case, NoAnswerError(self.no_response))
             return replace(none, document=case.question.linear_circumstances(case.device) | none.document)
-        from zwidth.chart.edge_by_eigenvalues import ChartError
+        from zwidth.errors import ChartError
 
         try:
             with translate_errors(case.question):
                 result = self.compute(case)
             return self._stated(case, result)
-        except NoAnswer as none:
+        except NoAnswerError as none:
             return self.unanswered(case, none)
         except ChartError as error:  # of a chart that is drawn only as it is stated
-            return self.unanswered(case, NoAnswer(f"this is undecided: {error}", decided=False))
+            return self.unanswered(case, NoAnswerError(f"this is undecided: {error}", decided=False))
 
     def _stated(self, case: CommandLine, result: Any) -> Answer:
         """The answer that a result gives; writes the output file where one is named."""

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.errors import NoAnswerError
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Finite, Numbers, ParamType, refuse_empty
 
 if TYPE_CHECKING:
@@ -164,19 +165,18 @@ def translate_contact_errors() -> Iterator[None]:
     """Simulate a contact inside this block.
 
     Raises  BadInput  for what `simulate_contact` does not take, under the options' names
-            NoAnswer  where the environment gives no force
+            NoAnswerError  where the environment gives no force
     """
-    from zwidth.contact.point_contact import ContactArgumentError, NoForceError
-    from zwidth.memory_limit import TooLarge
+    from zwidth.errors import ArgumentError, TooLarge
 
     try:
         yield
-    except ContactArgumentError as error:
+    except ArgumentError as error:
         option = OPTIONS.get(error.argument, as_option(error.argument))
         advice = f"; add {OPTIONS[error.missing]}" if error.missing else ""
         raise BadInput(*(f"{option}: {reason}{advice}" for reason in error.reasons)) from None
-    except NoForceError as error:
-        raise NoAnswer(str(error)) from None
+    except NoAnswerError as error:
+        raise NoAnswerError(str(error)) from None
     except TooLarge as error:
         raise BadInput(f"--duration: {error}") from None
 

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from zwidth.device.faults import SETTINGS, DeviceError, Fault
-from zwidth.processors import ProcessorError
+from zwidth.device.faults import SETTINGS, Fault
+from zwidth.errors import DeviceError, FileError, NoAnswerError, OutputError, ProcessorError, ZwidthError
 from zwidth.show.cli.progress import BAD_INPUT, INTERNAL, INTERRUPTED
-from zwidth.show.output import OutputError, printable
-from zwidth.study.boundary.points_file import PointsError
+from zwidth.show.output import printable
 
 if TYPE_CHECKING:
     from zwidth.show.cli.options import Question
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 DEBUG = "ZWIDTH_DEBUG"
 
 
-class BadInput(Exception):
+class BadInput(ZwidthError):
     """The command line is not valid; each line is one fault."""
 
     def __init__(self, *lines: str) -> None:
@@ -31,51 +30,45 @@ class BadInput(Exception):
         super().__init__("\n".join(lines))
 
 
-class UnfinishedRun(Exception):
+class UnfinishedRun(ZwidthError):
     """A run that could not be finished although its input is valid; the text says why."""
-
-
-class NoAnswer(Exception):
-    """The question was understood and has no answer; the text says why.
-
-    decided  False where there is an answer that double precision does not give
-    """
-
-    def __init__(self, reason: str, *, decided: bool = True) -> None:
-        super().__init__(reason)
-        self.decided = decided
 
 
 @contextmanager
 def translate_errors(question: Question) -> Iterator[None]:
     """Compute inside this block.
 
-    Raises  NoAnswer  where the posture does not exist, or double precision cannot decide
+    Raises  NoAnswerError  where the posture does not exist, or double precision cannot decide
             BadInput  where the model, or the loop, does not fit the device
     """
-    from zwidth.chart.edge_by_eigenvalues import ChartError
-    from zwidth.loop.estimator import NonlinearError
-    from zwidth.loop.point_text import MissingNumbersError
-    from zwidth.loop.sections import HysteresisError, UnmovedError
-    from zwidth.model.equilibrium import EquilibriumError, SidewaysForceError
-    from zwidth.model.load import LoadError
-    from zwidth.model.operator import OperatorError
-    from zwidth.model.posture import PostureError
-    from zwidth.model.reduction import DirectionError, ModelError
-    from zwidth.model.response import ResponseError
+    from zwidth.errors import (
+        ChartError,
+        DirectionError,
+        EquilibriumError,
+        HysteresisError,
+        LoadError,
+        MissingNumbersError,
+        ModelError,
+        NonlinearError,
+        OperatorError,
+        PostureError,
+        ResponseError,
+        SidewaysForceError,
+        UnmovedError,
+    )
 
     try:
         yield
     except SidewaysForceError as error:
         raise BadInput(f"{question.name}: load: {error}") from None
     except (PostureError, EquilibriumError) as error:
-        raise NoAnswer(str(error)) from None
+        raise NoAnswerError(str(error)) from None
     except LoadError as error:
         raise BadInput(f"{question.name}: load: {error}") from None
     except MissingNumbersError as error:
-        raise NoAnswer(f"this {error}") from None
+        raise NoAnswerError(f"this {error}") from None
     except ChartError as error:
-        raise NoAnswer(f"this is undecided: {error}", decided=False) from None
+        raise NoAnswerError(f"this is undecided: {error}", decided=False) from None
     except DirectionError as error:
         raise BadInput(f"{question.name}: direction: {error}") from None
     except ModelError as error:
@@ -97,7 +90,7 @@ def explain(error: Exception) -> tuple[list[str], int]:
     match error:
         case DeviceError():
             return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
-        case BadInput() | PointsError():
+        case BadInput() | FileError():
             return [printable(line) for line in error.lines], BAD_INPUT
         case ProcessorError():
             return [error.spelled(as_option)], BAD_INPUT

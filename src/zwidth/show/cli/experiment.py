@@ -15,7 +15,7 @@ import click
 
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.errors import BadInput, NoAnswer
+from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Numbers, refuse_empty
 from zwidth.show.cli.progress import say
 from zwidth.show.units import amount
@@ -190,10 +190,8 @@ class ExperimentCommand(Command):
         return {"left_out": []} | super().circumstances(case)
 
     def compute(self, case: CommandLine) -> Experiment:
-        from zwidth.contact.boundary_experiment import NoStableWallError
-        from zwidth.contact.stability_trial import TrialError
+        from zwidth.errors import ArgumentError, StoreError
         from zwidth.study.boundary.experiment import measure_boundary
-        from zwidth.study.jobs.journal import JournalError
 
         file = _journal(case)
         try:
@@ -201,12 +199,10 @@ class ExperimentCommand(Command):
                 return measure_boundary(
                     case.point, case["plan"], case["measured"], file=file, progress=case.progress
                 )
-        except TrialError as error:
-            raise BadInput(f"--{error.argument}: {error.reason}") from None
-        except JournalError as error:
+        except ArgumentError as error:
+            raise BadInput(f"--{error.argument}: {error.reasons[0]}") from None
+        except StoreError as error:
             raise BadInput(str(error)) from None
-        except NoStableWallError as none:
-            raise NoAnswer(str(none)) from None
         except OSError as error:  # of the journal
             raise BadInput(f"{file}: cannot be written: {error.strerror}; name another file") from None
 
@@ -233,7 +229,7 @@ class ExperimentCommand(Command):
 def _plan(case: CommandLine) -> Plan:
     """What is to be measured. Raises BadInput."""
     from zwidth.contact.boundary_experiment import SearchWindow
-    from zwidth.contact.stability_trial import TrialError
+    from zwidth.errors import ArgumentError
     from zwidth.study.boundary.measured_boundary import Plan
 
     stiffness, damping = case["stiffness"], case["damping"]
@@ -248,8 +244,8 @@ def _plan(case: CommandLine) -> Plan:
     box = None if stiffness is None else SearchWindow(stiffness, damping)
     try:
         return Plan.touching(box=box, **given) if one_sided else Plan(box=box, **given)
-    except TrialError as error:
-        raise BadInput(f"--{error.argument}: {error.reason}") from None
+    except ArgumentError as error:
+        raise BadInput(f"--{error.argument}: {error.reasons[0]}") from None
 
 
 def _journal(case: CommandLine) -> Path | None:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.errors import NoAnswerError
 from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
 from zwidth.show.cli.resumable import (
@@ -199,9 +200,8 @@ class ExportCommand(Command):
         return False  # which `compute` refuses
 
     def compute(self, case: CommandLine) -> SafeWalls:
-        from zwidth.memory_limit import TooLarge
-        from zwidth.study.wall_tables.safe_walls import SafeWallsError, compute_table, safe_walls_job
-        from zwidth.study.workspace.plane_grid import PlaneError
+        from zwidth.errors import TooLarge, WorkspaceError
+        from zwidth.study.wall_tables.safe_walls import compute_table, safe_walls_job
 
         question, device = case.question, case.device
         if case["arduino"] is not None:
@@ -232,14 +232,14 @@ class ExportCommand(Command):
                     cluster=case["cluster"],
                     time_limit=case["time_limit"],
                 )
-        except (SafeWallsError, PlaneError) as error:
+        except WorkspaceError as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         if not (table.level > 0).any():
             if store is not None and case["resume"] is None:
                 store.remove()
-            raise NoAnswer(f"no cell has safe walls: {'; '.join(table.reasons)}")
+            raise NoAnswerError(f"no cell has safe walls: {'; '.join(table.reasons)}")
         return table
 
     def table(self, case: CommandLine, result: SafeWalls, document: Mapping[str, Any]) -> dict[str, Any]:

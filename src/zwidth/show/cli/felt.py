@@ -47,7 +47,7 @@ class FeltCommand(Command):
         return {"wall_stiffness_N_per_m": case["stiffness"], "wall_damping_Ns_per_m": case["damping"]}
 
     def compute(self, case: CommandLine) -> FeltWall:
-        from zwidth.measures.handle_impedance import HandleError
+        from zwidth.errors import HandleError
 
         try:
             return case.point.felt(case["stiffness"], case["damping"])

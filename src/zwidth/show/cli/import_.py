@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.device.faults import DeviceError, plural
+from zwidth.device.faults import plural
+from zwidth.errors import DeviceError
 from zwidth.show.cli.answer import table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.errors import NoAnswerError
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import BoundedNumber, wall_options
-from zwidth.show.cli.errors import BadInput, NoAnswer
+from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import refuse_empty
 from zwidth.show.output import FIGURES, destination
 from zwidth.show.units import amount, as_written
@@ -93,21 +94,17 @@ class LimitCyclesCommand(Command):
         }
 
     def compute(self, case: CommandLine) -> LimitCyclePrediction:
-        from zwidth.contact.wall_limit_cycles import (
-            NoEncoderStepsError,
-            NothingNonlinearError,
-            amplitude_dependent,
-            predict_limit_cycles,
-        )
+        from zwidth.contact.wall_limit_cycles import amplitude_dependent, predict_limit_cycles
+        from zwidth.errors import ArgumentError
 
         name, offset = case.question.name, case["offset"]
         try:
             parts = amplitude_dependent(case.point, offset)
-        except NothingNonlinearError:
-            raise NoAnswer(
+        except NoAnswerError:
+            raise NoAnswerError(
                 NOTHING_NONLINEAR.format(_device_key(FRICTION_KEYS, case), _device_key(ENCODER_KEYS, case))
             ) from None
-        except NoEncoderStepsError:
+        except ArgumentError:
             lacking = f"{name} has no encoder steps"
             raise BadInput(f"--offset: {lacking}; give {_device_key(ENCODER_KEYS, case)}") from None
         if case["plane"] is not None:

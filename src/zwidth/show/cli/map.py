@@ -215,11 +215,9 @@ class MapCommand(Command):
         return facts if case["extreme"] is None else facts | {"direction": case["extreme"]}
 
     def compute(self, case: CommandLine) -> MapResult:
-        from zwidth.measures.definition import MeasureError
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import MeasureError, TooLarge, WorkspaceError
         from zwidth.study.workspace.common_area import common_area
         from zwidth.study.workspace.map import workspace_map
-        from zwidth.study.workspace.plane_grid import PlaneError
 
         question, device = case.question, case.device
         if device.mechanism is None:
@@ -243,7 +241,7 @@ class MapCommand(Command):
                 )
         except MeasureError as error:
             raise BadInput(f"{question.name}: {error.spelled(as_option)}") from None
-        except PlaneError as error:
+        except WorkspaceError as error:
             raise BadInput(f"{question.name}: {error.spelled(_plane_option)}") from None
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
@@ -332,8 +330,7 @@ def _plane_option(name: str, value: str | None) -> str:
 
 
 def _plane(case: CommandLine) -> PlaneGrid:
-    from zwidth.model.equilibrium import EquilibriumError, SidewaysForceError
-    from zwidth.model.posture import PostureError
+    from zwidth.errors import EquilibriumError, PostureError, SidewaysForceError
     from zwidth.study.workspace.plane_grid import plane_of
 
     device, assembly, direction = case.device, case.question.assembly, case.question.direction

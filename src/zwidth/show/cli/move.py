@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.errors import NoAnswerError
 from zwidth.show.circumstances import computer_text
 from zwidth.show.cli.answer import Row, table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
@@ -24,7 +25,7 @@ from zwidth.show.cli.contact_options import (
     environment_options,
     usage_error,
 )
-from zwidth.show.cli.errors import BadInput, NoAnswer, as_option
+from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Finite, Numbers
 from zwidth.show.cli.simulate import environment_words
 from zwidth.show.output import printable
@@ -323,9 +324,7 @@ class MoveCommand(Command):
         return super().circumstances(case) | {"operator": None, "left_out": left_out}
 
     def compute(self, case: CommandLine) -> MechanismMotion:
-        from zwidth.contact.mechanism.motion_inputs import MotionError
-        from zwidth.contact.mechanism.simulate_mechanism import SurfaceOutOfReach
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import ArgumentError, TooLarge
 
         device, name = case.device, case.question.name
         if device.mechanism is None:
@@ -351,15 +350,15 @@ class MoveCommand(Command):
             )
         except TooLarge as error:
             raise BadInput(f"--duration: {error}") from None
-        except SurfaceOutOfReach as error:
-            raise BadInput(f"{surface_option(case.options)}: {error}") from None
-        except MotionError as error:
+        except ArgumentError as error:
+            if error.argument == "surface":
+                raise BadInput(f"{surface_option(case.options)}: {error.reasons[0]}") from None
             option = f"{as_option(error.argument)}: " if error.argument else ""
-            raise BadInput(f"{name}: {option}{error}") from None
+            raise BadInput(f"{name}: {option}{error.reasons[0]}") from None
         if not len(motion.time):
-            raise NoAnswer(motion.reason)
+            raise NoAnswerError(motion.reason)
         if motion.status == "no force":
-            raise NoAnswer(f"{motion.reason}; have it return a number there")
+            raise NoAnswerError(f"{motion.reason}; have it return a number there")
         return motion
 
     def heading(self, case: CommandLine) -> str:

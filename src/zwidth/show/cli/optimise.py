@@ -75,8 +75,7 @@ class OptimiseCommand(Command):
         return circumstances_of_study(case, case.question.study)
 
     def compute(self, case: CommandLine) -> Optimisation:
-        from zwidth.measures.definition import MeasureError
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import MeasureError, TooLarge
         from zwidth.study.optimisation.optimise import optimise_by
 
         question = case.question

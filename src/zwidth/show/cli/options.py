@@ -83,7 +83,8 @@ class Question:
 
     def refuse_unsupported(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
-        from zwidth.loop.point_text import SeveralDirectionsError, check_several_directions
+        from zwidth.errors import SeveralDirectionsError
+        from zwidth.loop.point_text import check_several_directions
 
         instead = {
             "an operator": "use --operator none",
@@ -115,8 +116,7 @@ class Question:
 
     def _where(self, device: Device) -> tuple[Floats | None, float | None]:
         """Position of the handle [m], and how far it was projected; as typed, and None, if out of reach."""
-        from zwidth.model.load import LoadError
-        from zwidth.model.posture import PostureError
+        from zwidth.errors import LoadError, PostureError
 
         try:
             posture = self.point(device).posture

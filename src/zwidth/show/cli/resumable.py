@@ -78,7 +78,8 @@ def open_store(job: Job, beside: Path | None, resume: str | None) -> Store | Non
 
     Raises  BadInput  where there is no room, or something else is there
     """
-    from zwidth.study.jobs.store import Store, StoreError
+    from zwidth.errors import StoreError
+    from zwidth.study.jobs.store import Store
 
     if resume is None and beside is None:
         return None
@@ -116,8 +117,8 @@ def series_of(case: CommandLine) -> Iterator[JobSeries]:
 
     Raises  as `report_kept_work`
     """
+    from zwidth.errors import StoreError
     from zwidth.study.jobs.series import JobSeries
-    from zwidth.study.jobs.store import StoreError
 
     folder = series_folder(case)
     try:
@@ -147,9 +148,7 @@ def remove_series(case: CommandLine) -> None:
 
 @contextmanager
 def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Iterator[None]:
-    from zwidth.study.jobs.cluster import ClusterEnded, ClusterError
-    from zwidth.study.jobs.store import StoreError
-    from zwidth.study.jobs.workers import CannotStart, WorkerLost
+    from zwidth.errors import CannotStart, ClusterEnded, ClusterError, StoreError, WorkerLost
 
     goes_on = (
         ""

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.device.read import LARGEST_FILE
-from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.text_file import read_text
+from zwidth.errors import FileError, NoAnswerError
 from zwidth.loop.motion_names import listed_names
 from zwidth.show.circumstances import member_text, operator_text, value_text
 from zwidth.show.cli.answer import table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.errors import BadInput, NoAnswer
+from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import refuse_empty
 from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
@@ -119,8 +120,9 @@ class RobustCommand(Command):
         return {"operators": operators, "ranges": _ranges(case["ranges"])}
 
     def compute(self, case: CommandLine) -> RobustStudy:
-        from zwidth.study.robust.family import Family, RangeError
-        from zwidth.study.robust.robust_study import RobustError, robust_study
+        from zwidth.errors import RangeError
+        from zwidth.study.robust.family import Family
+        from zwidth.study.robust.robust_study import robust_study
 
         response = case.point.response
         if not case["ranges"] and not case["operators"] and (response is None or response.sweeps is None):
@@ -134,8 +136,8 @@ class RobustCommand(Command):
         except RangeError as error:
             faults = (fault.spelled(lambda name, _: ARGUMENT_NAMES[name]) for fault in error.faults)
             raise BadInput(*(f"--range: {fault}" for fault in faults)) from None
-        except RobustError as error:
-            raise NoAnswer(str(error), decided=False) from None
+        except NoAnswerError as error:
+            raise NoAnswerError(str(error), decided=False) from None
 
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
         from zwidth.show.figures.caption import facts_of_members
@@ -203,7 +205,7 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
     if file is not None:
         try:
             lines = read_text(file, LARGEST_FILE).splitlines()
-        except UnreadableFileError as error:
+        except FileError as error:
             raise BadInput(f"--operator-list: {file}: {error}; give a text file, one name a line") from None
         listed = [line.split("#")[0].strip() for line in lines]
         operators = tuple(dict.fromkeys(name for name in listed if name))

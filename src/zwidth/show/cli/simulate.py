@@ -198,12 +198,13 @@ class SimulateCommand(Command):
     ) -> str | None:
         if not case.writes(SOUND):
             return super().write(case, result, document, reason)
-        from zwidth.show.sound import Silence, sound_of, write_sound
+        from zwidth.errors import NoAnswerError
+        from zwidth.show.sound import sound_of, write_sound
 
         assert case.path is not None
         try:
             sound = sound_of(result.response, case["sound_pitch"], case["sound_full_scale"])
-        except Silence as error:
+        except NoAnswerError as error:
             del document["file"]
             return str(error)
         write_sound(case.path, sound)

@@ -43,7 +43,7 @@ class StudyQuestion(Question):
     @cached_property
     def study(self) -> Study:
         """The study, read and checked. Raises DeviceError, BadInput."""
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import TooLarge
         from zwidth.study.designs.study_file import read_study
 
         try:
@@ -129,8 +129,7 @@ class SweepCommand(Command):
         return circumstances_of_study(case, case.question.study)
 
     def compute(self, case: CommandLine) -> Sweep:
-        from zwidth.measures.definition import MeasureError
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import MeasureError, TooLarge
         from zwidth.study.designs.sweep import compute_designs
         from zwidth.study.designs.sweep_data import check_listing
         from zwidth.study.designs.sweep_job import sweep_job

@@ -51,7 +51,7 @@ class ToleranceFile(Question):
     @cached_property
     def asked(self) -> ToleranceQuestion:
         """The question, read and checked. Raises DeviceError, BadInput."""
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import TooLarge
         from zwidth.study.tolerances.question import read_question
 
         try:
@@ -114,8 +114,7 @@ class ToleranceCommand(Command):
         check_workers(case.options)
 
     def compute(self, case: CommandLine) -> ToleranceStudy:
-        from zwidth.measures.definition import MeasureError
-        from zwidth.memory_limit import TooLarge
+        from zwidth.errors import MeasureError, TooLarge
         from zwidth.study.tolerances.tolerance_study import answer
 
         question = case.question

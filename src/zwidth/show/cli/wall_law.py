@@ -125,12 +125,13 @@ def _directions(case: CommandLine) -> list[Any]:
 
 def _matrices(case: CommandLine) -> WallMatrices | None:
     """The matrices of the law; None where it is the same along each direction. Raises BadInput."""
-    from zwidth.loop.wall_matrices import MatrixError, WallMatrices
+    from zwidth.errors import ArgumentError
+    from zwidth.loop.wall_matrices import WallMatrices
 
     stiffness, damping = case["relative_stiffness"], case["relative_damping"]
     if stiffness is None and damping is None:
         return None
     try:
         return WallMatrices.of(stiffness, damping, 1 + len(case["others"]))
-    except MatrixError as error:
-        raise BadInput(f"{as_option(error.name)} {error.problem}") from None
+    except ArgumentError as error:
+        raise BadInput(f"{as_option(error.argument)} {error.reasons[0]}") from None

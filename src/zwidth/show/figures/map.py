@@ -266,8 +266,8 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism
     """Strokes of the links, the joints and the handle in the reference posture, on the plane; None for none."""
     if device is None or device.mechanism is None:
         return None
-    from zwidth.model.load import LoadError
-    from zwidth.model.posture import PostureError, link_points
+    from zwidth.errors import LoadError, PostureError
+    from zwidth.model.posture import link_points
 
     try:
         posture = device.at(assembly=str(dataset.attrs["assembly"]) or None).posture

@@ -24,9 +24,10 @@ from zwidth.arrays import Floats
 from zwidth.contact.mechanism.motion import MechanismMotion
 from zwidth.contact.mechanism.surfaces import Box, Sphere, Surface, depth_and_normal
 from zwidth.device.device import Device
+from zwidth.errors import PostureError
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.plant import Plant
-from zwidth.model.posture import Posture, PostureError, link_points, solve_posture
+from zwidth.model.posture import Posture, link_points, solve_posture
 from zwidth.show.figures.contact_response import LONGEST_LINE, draw_envelope, draw_line
 from zwidth.show.figures.style import (
     BLACK,

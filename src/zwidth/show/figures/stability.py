@@ -28,10 +28,10 @@ from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.chart_base import BoundaryArc
 from zwidth.chart.decay import FastestDecay
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.measured.chart import MeasuredChart
 from zwidth.chart.measured.loop import UnusableRange
 from zwidth.chart.robust.common_chart import CommonChart
+from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.measures.root_paths import EigenvaluePaths
 from zwidth.model.modes import natural_frequencies

@@ -8,10 +8,10 @@ from typing import Final
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.conditions import Bound
 from zwidth.conditions.comparison import bounds_of
 from zwidth.device.device import Device
+from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop, unobserved_instability
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.felt import FeltChart, felt_chart

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from zwidth.errors import NoAnswerError
 from zwidth.loop.loop import SidewaysMotion
-from zwidth.measures.load_effect import NoWallError, load_change
+from zwidth.measures.load_effect import load_change
 from zwidth.model.load import Load
 from zwidth.show.circumstances import load_text
 from zwidth.show.load_text import ROUNDING, has_sideways_force, motor_torques, path_sentences
@@ -62,7 +63,7 @@ def change(facts: Facts) -> str:
     """By how much the load moves the largest stiffness."""
     try:
         share = load_change(facts.point)
-    except NoWallError as error:
+    except NoAnswerError as error:
         return f"What the load changes of the largest stiffness has no number: {error}."
     bare = quantity(facts.base.stiffness_max / (1.0 + share), "N/m")
     if abs(share) < ROUNDING:

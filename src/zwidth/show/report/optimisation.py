@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from zwidth._version import __version__
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
-from zwidth.device.faults import DeviceError, comma_list, plural
+from zwidth.device.faults import comma_list, plural
+from zwidth.errors import ChartError, DeviceError
 from zwidth.measures.definition import FAILED, OUT_OF_TIME
 from zwidth.show.figures.caption import caption_of_facts, facts_of_point, facts_of_study
 from zwidth.show.figures.optimise import front_figure

@@ -19,7 +19,6 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_crossings import EdgeKind, exact_edge
 from zwidth.conditions.traits import reading_noise, reading_step
 from zwidth.contact.boundary_experiment import (
@@ -32,12 +31,12 @@ from zwidth.contact.boundary_experiment import (
     tip_dampings,
 )
 from zwidth.contact.hand import Hand, Reflex
-from zwidth.contact.stability_trial import StabilityTrial, TrialError
-from zwidth.loop.estimator import NonlinearError
+from zwidth.contact.stability_trial import StabilityTrial
+from zwidth.errors import ArgumentError, ChartError, NonlinearError
+from zwidth.loop.controller import refuse_load
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.unsupported_feedback import refuse_load
 from zwidth.model.argument_checks import require
 from zwidth.model.operator import Operator, attach
 from zwidth.progress import Progress
@@ -70,7 +69,7 @@ def measure_boundary(
     user_points  points measured on a real device, to be compared with the same exact chart
     file         journal that keeps the trials done, from which an interrupted run continues; None: no journal
     causes       measure again without each nonlinear part (friction, encoder steps, force limit) in turn
-    Raises       JournalError  for a file that is not a journal, or of a newer version
+    Raises       StoreError  for a file that is not a journal, or of a newer version
                  OSError       where it cannot be read or written
                  what `run_experiment` and `OperatingPoint.plant` raise
     """
@@ -99,8 +98,8 @@ def run_experiment(
     operator  the operator who holds it; None: no operator
     journal   keeps the trials done (see `question`); None: no journal
     causes    measure again without each nonlinear part in turn
-    Raises    TrialError         for numbers of the plan that cannot be used
-              NoStableWallError  where no stable wall was found
+    Raises    ArgumentError         for numbers of the plan that cannot be used
+              NoAnswerError  where no stable wall was found
               HysteresisError, UnmovedError  as `simulate_batch`
 
     >>> from zwidth.loop.controller import Controller
@@ -163,7 +162,7 @@ def _subjects(operator: Operator | None, plan: Plan) -> tuple[Operator | None, .
         if plan.subjects > 1 or plan.reflex:
             argument, verb = ("subjects", "differ") if plan.subjects > 1 else ("reflex", "is")
             reason = f"{verb} in the arm that holds the device; give an operator"
-            raise TrialError(argument, reason)
+            raise ArgumentError(argument, reason)
         return (None,)
     if plan.subjects == 1:
         return (operator,)

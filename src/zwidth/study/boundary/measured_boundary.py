@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.edge_crossings import EdgeKind
 from zwidth.contact.boundary_experiment import EdgePoint, SearchWindow, StableExtent
-from zwidth.contact.stability_trial import TrialError
+from zwidth.errors import ArgumentError
 from zwidth.model.operator import Operator
 from zwidth.result import Result
 from zwidth.study.boundary.points_file import PointsComparison
@@ -243,7 +243,7 @@ class Plan:
     subjects, trials  number of operators, and of trials of each
     spread, seed      of the numbers of operators and trials: see `study.boundary.experiment`
     box          range of walls to search; None: no limit
-    Raises       TrialError  for a number outside its allowed range
+    Raises       ArgumentError  for a number outside its allowed range
     """
 
     one_sided: bool = False
@@ -263,14 +263,14 @@ class Plan:
     def __post_init__(self) -> None:
         for name, least in (("stiffnesses", 1), ("tips", 0), ("subjects", 1), ("trials", 1), ("seed", 0)):
             if getattr(self, name) < least:
-                raise TrialError(name, f"must be {least} or more, got {getattr(self, name)}")
+                raise ArgumentError(name, f"must be {least} or more, got {getattr(self, name)}")
         for name, most, unit in (("disturbance", FARTHEST, "m"), ("speed", FASTEST, "m/s")):
             if isfinite(getattr(self, name)) and abs(getattr(self, name)) > most:
-                raise TrialError(name, f"must be {most:g} {unit} or less, got {getattr(self, name):g}")
+                raise ArgumentError(name, f"must be {most:g} {unit} or less, got {getattr(self, name):g}")
         if not (isfinite(self.spread) and 0.0 <= self.spread <= 2.0):
-            raise TrialError("spread", f"must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
+            raise ArgumentError("spread", f"must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
         if not isfinite(self.push):
-            raise TrialError("push", f"must be finite [N], got {self.push!r}")
+            raise ArgumentError("push", f"must be finite [N], got {self.push!r}")
 
     @classmethod
     def touching(cls, *, push: float = PUSH, speed: float = SPEED, **more: Any) -> Plan:

@@ -14,14 +14,8 @@ from itertools import islice
 from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.device.text_file import (
-    LARGEST_TABLE,
-    SEPARATORS,
-    UnreadableFileError,
-    header_fault,
-    non_blank_rows,
-    read_text,
-)
+from zwidth.device.text_file import LARGEST_TABLE, SEPARATORS, header_fault, non_blank_rows, read_text
+from zwidth.errors import FileError
 from zwidth.model.argument_checks import check_choice
 
 if TYPE_CHECKING:
@@ -45,14 +39,6 @@ Walls = list[tuple[float, float]]
 Reader = Callable[[str], tuple[Any, str]]
 
 
-class PointsError(ValueError):
-    """A file of walls or points with faults; `lines` holds one message each, with the file and the line."""
-
-    def __init__(self, *lines: str) -> None:
-        self.lines = lines
-        super().__init__("\n".join(lines))
-
-
 def wall_number(text: str) -> tuple[float, str]:
     """Read a wall's stiffness or damping; returns the number, and what is wrong with it ("" if nothing)."""
     try:
@@ -69,7 +55,7 @@ def wall_number(text: str) -> tuple[float, str]:
 def read_walls(file: File) -> Walls:
     """The walls (stiffness [N/m], damping [N s/m]) of a CSV file with these two columns; others are ignored.
 
-    Raises PointsError  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
+    Raises FileError  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
     """
     return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
 
@@ -77,7 +63,7 @@ def read_walls(file: File) -> Walls:
 def read_points(file: File) -> list[UserPoint]:
     """Measured points: a CSV file as for `read_walls`, with columns that may be left out, and cells left empty.
 
-    Raises PointsError  as `read_walls`
+    Raises FileError  as `read_walls`
     """
     optional: dict[str, Reader] = {
         "edge": partial(_word, EDGES),
@@ -142,12 +128,12 @@ def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
             faults += [f"{file}: line {rows.line_num}: {fault}" for fault in _contradictions(cells)]
             cells_of_rows.append(cells)
     except csv.Error as error:
-        raise PointsError(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
+        raise FileError(f"{file}: line {rows.line_num}: is not CSV: {error}") from None
     if faults:
         more = [f"{file}: and {len(faults) - MOST_FAULTS} more faults"] if len(faults) > MOST_FAULTS else []
-        raise PointsError(*islice(faults, MOST_FAULTS), *more)
+        raise FileError(*islice(faults, MOST_FAULTS), *more)
     if not cells_of_rows:
-        raise PointsError(f"{file}: holds no walls; give a line with {' and '.join(COLUMNS)} for each")
+        raise FileError(f"{file}: holds no walls; give a line with {' and '.join(COLUMNS)} for each")
     return cells_of_rows
 
 
@@ -173,17 +159,17 @@ def _contradictions(cells: dict[str, Any]) -> Iterator[str]:
 def _column_indices(file: File, header: list[str], optional: Collection[str]) -> dict[str, int]:
     """Index of each required column, and of the optional ones that the file has."""
     if not header:
-        raise PointsError(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
+        raise FileError(f"{file}: is empty; its first line must name the columns {', '.join(COLUMNS)}")
     if fault := header_fault(header, COLUMNS, optional):
-        raise PointsError(f"{file}: line 1: {fault}")
+        raise FileError(f"{file}: line 1: {fault}")
     return {name: header.index(name) for name in (*COLUMNS, *optional) if name in header}
 
 
 def _text(file: File) -> str:
     try:
         return read_text(file, LARGEST_TABLE, pipes=True)
-    except UnreadableFileError as error:
-        raise PointsError(f"{file}: {error}; give a CSV file") from None
+    except FileError as error:
+        raise FileError(f"{file}: {error}; give a CSV file") from None
 
 
 EDGES: Final = ("lower", "upper", "tip", "")

@@ -11,11 +11,12 @@ from typing import Any, Final
 from zwidth.device import address
 from zwidth.device.address import is_number, tables
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, dotted, fail, nearest, plural, quote, suggestion
+from zwidth.device.faults import KeyPath, dotted, fail, nearest, plural, quote, suggestion
 from zwidth.device.schema import device_file as schema
+from zwidth.errors import DeviceError, FileError
 from zwidth.measures.definition import WANTED_BY_KEY
 from zwidth.model.reduction import MODELS
-from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, CatalogueError, Tie, read_catalogue, spread
+from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, Tie, read_catalogue, spread
 
 UNITS: Final = {key: one.unit for key, one in WANTED_BY_KEY.items()}
 NUMBER: Final = ("number", "integer")
@@ -153,7 +154,7 @@ def _catalogue_axis(
         return None
     try:
         parts = read_catalogue(folder / file, columns)
-    except CatalogueError as error:
+    except FileError as error:
         faults += [(("catalogue",), f"{file}: {line}") for line in str(error).splitlines()]
         return None
     return None if faults else Axis(key, tuple(parts), parts=tuple(parts.values()))

@@ -17,13 +17,14 @@ import numpy as np
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.device import address
 from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
-from zwidth.device.faults import DeviceError, KeyPath
+from zwidth.device.faults import KeyPath
 from zwidth.device.load import check
 from zwidth.device.operator_choice import with_operator
+from zwidth.errors import DeviceError, PostureError
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import table_of_points
-from zwidth.model.posture import OK, PostureError
+from zwidth.model.posture import OK
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
 
 Rows = Ints

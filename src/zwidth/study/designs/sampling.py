@@ -31,7 +31,8 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import comma_list
-from zwidth.device.text_file import LARGEST_TABLE, UnreadableFileError, read_text
+from zwidth.device.text_file import LARGEST_TABLE, read_text
+from zwidth.errors import FileError
 from zwidth.measures.definition import WANTED_BY_KEY
 
 WANTED: Final = tuple(WANTED_BY_KEY)
@@ -233,33 +234,29 @@ NAMES: Final = "name"  # heading of the column of names
 Part: TypeAlias = tuple[tuple[str, float], ...]  # path of the device file -> number
 
 
-class CatalogueError(ValueError):
-    """A catalogue that cannot be used; the text says why, and what to do."""
-
-
 def read_catalogue(path: Path, columns: Mapping[str, str]) -> dict[str, Part]:
     """The parts of a catalogue by name, each with the numbers that it sets.
 
     columns  path of the device file -> heading of the column that holds its number
-    Raises   CatalogueError  with all that is wrong, a line for each
+    Raises   FileError  with all that is wrong, a line for each
     """
     try:
         text = read_text(path, LARGEST_TABLE)
-    except UnreadableFileError as error:
-        raise CatalogueError(str(error)) from None
+    except FileError as error:
+        raise FileError(str(error)) from None
     rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
     if not rows:
-        raise CatalogueError("is empty; write a line of headings, one of them 'name', and a line for each part")
+        raise FileError("is empty; write a line of headings, one of them 'name', and a line for each part")
     headings = [heading.strip() for heading in rows[0]]
     if len(headings) == 1 and ";" in headings[0]:
-        raise CatalogueError("separates its columns by ';'; save it with commas, and numbers with decimal points")
+        raise FileError("separates its columns by ';'; save it with commas, and numbers with decimal points")
     absent = [heading for heading in dict.fromkeys([NAMES, *columns.values()]) if heading not in headings]
     if absent:
         has = comma_list([repr(heading) for heading in headings])
-        raise CatalogueError("\n".join(f"has no column {heading!r}; it has {has}" for heading in absent))
+        raise FileError("\n".join(f"has no column {heading!r}; it has {has}" for heading in absent))
     twice = [heading for heading in dict.fromkeys(headings) if headings.count(heading) > 1]
     if twice:
-        raise CatalogueError(f"has several columns {twice[0]!r}; give each a name of its own")
+        raise FileError(f"has several columns {twice[0]!r}; give each a name of its own")
     return _parts(headings, rows[1:], columns)
 
 
@@ -285,9 +282,9 @@ def _parts(headings: list[str], rows: list[list[str]], columns: Mapping[str, str
                 numbers.append((path, value))
         parts[name] = tuple(numbers)
     if wrong:
-        raise CatalogueError("\n".join(wrong))
+        raise FileError("\n".join(wrong))
     if not parts:
-        raise CatalogueError("holds no part; write a line for each below the headings")
+        raise FileError("holds no part; write a line for each below the headings")
     return parts
 
 

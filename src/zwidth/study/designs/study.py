@@ -12,16 +12,16 @@ from pydantic import ValidationError
 
 from zwidth.device.address import is_number, table, tables
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, nearest, plural
+from zwidth.device.faults import KeyPath, nearest, plural
 from zwidth.device.validation_messages import validation_messages
-from zwidth.measures.definition import WANTED_NUMBERS, Measure, Spelling, WantedWall
-from zwidth.memory_limit import TooLarge
+from zwidth.errors import DeviceError, Spelling, TooLarge, WorkspaceError
+from zwidth.measures.definition import WANTED_NUMBERS, Measure, WantedWall
 from zwidth.study.designs.axis_tables import TableFaults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
 from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
 from zwidth.study.designs.task import Task, task_of
-from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of
+from zwidth.study.workspace.plane_grid import PlaneGrid, plane_of
 
 MOST_ALONG: Final = 10**6  # values of one axis that has a range and a count
 # Argument in Python -> what it is called as a key of a study file, or of its [workspace].
@@ -265,7 +265,7 @@ def plane_of_study(
             (count, count) if isinstance(count, int) else count,
             document.get("assembly"),
         )
-    except PlaneError as error:
+    except WorkspaceError as error:
         faults.append((("workspace",), error.spelled(spelling)))
     except DeviceError as error:
         faults.append((("workspace",), error.faults[0].message))

@@ -17,13 +17,14 @@ from zwidth.device import address
 from zwidth.device.address import is_number, table, tables
 from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, KeyPath, fail
+from zwidth.device.faults import Fault, KeyPath, fail
 from zwidth.device.load import from_document, in_order
 from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
-from zwidth.device.text_file import UnreadableFileError, read_text, refuse_newer
-from zwidth.measures.definition import WANTED_NUMBERS, Measure, as_argument
+from zwidth.device.text_file import read_text, refuse_newer
+from zwidth.errors import DeviceError, FileError, as_argument
+from zwidth.measures.definition import WANTED_NUMBERS, Measure
 from zwidth.measures.user_measures import load_measures
 from zwidth.model.argument_checks import require, wrong_type
 from zwidth.study.designs.axis_tables import TableFaults
@@ -55,7 +56,7 @@ def read_document(label: str) -> dict[str, Any]:
     """The tables of a study file. Raises DeviceError."""
     try:
         text = read_text(label, LARGEST_FILE)
-    except UnreadableFileError as error:
+    except FileError as error:
         if error.missing and label in bundled_names():
             raise _device_instead(label, "a bundled device") from None
         raise fail(label, "", f"{error}; give a study file") from None

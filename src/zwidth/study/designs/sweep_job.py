@@ -18,8 +18,20 @@ from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.design_checks import masses_moved
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, plural
+from zwidth.device.faults import plural
 from zwidth.device.load import from_document
+from zwidth.errors import (
+    BeyondLimit,
+    DeviceError,
+    EquilibriumError,
+    LoadError,
+    MeasureError,
+    MissingMeasures,
+    OutOfReach,
+    PostureError,
+    Singular,
+    Spelling,
+)
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import (
     BEYOND_LIMIT,
@@ -32,17 +44,12 @@ from zwidth.measures.definition import (
     SINGULAR,
     WANTED_BY_NAME,
     Measure,
-    MeasureError,
     MeasureValues,
     Note,
-    Spelling,
     WantedWall,
     WantedWalls,
 )
 from zwidth.measures.evaluation import evaluate, evaluate_safely, measured_together
-from zwidth.model.equilibrium import EquilibriumError
-from zwidth.model.load import LoadError
-from zwidth.model.posture import BeyondLimit, OutOfReach, PostureError, Singular
 from zwidth.study.designs.column import Column, areas
 from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling, settings
@@ -56,17 +63,6 @@ if TYPE_CHECKING:
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
 Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
 WALL: Final = tuple(WANTED_BY_NAME)  # numbers of the wanted wall, as arguments
-
-
-class MissingMeasures(MeasureError):
-    """Measures that exist for no design of a study.
-
-    refused  column -> why
-    """
-
-    def __init__(self, refused: dict[str, str]) -> None:
-        super().__init__("\n".join(f"{name} {why}" for name, why in refused.items()))
-        self.refused = refused
 
 
 class _NoPoint(Exception):

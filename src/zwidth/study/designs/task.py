@@ -15,9 +15,8 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.device.address import is_number, table
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError
-from zwidth.measures.definition import MeasureError
-from zwidth.model.posture import PostureError, handle_motions
+from zwidth.errors import DeviceError, MeasureError, PostureError
+from zwidth.model.posture import handle_motions
 from zwidth.study.workspace.extreme_direction import sphere
 
 Fault = tuple[tuple[str | int, ...], str]

@@ -17,6 +17,7 @@ from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
+from zwidth.errors import ClusterEnded, ClusterError
 from zwidth.study.jobs.workers import (
     Batch,
     CellRange,
@@ -39,14 +40,6 @@ LEAVE: Final = 5.0  # s that saying good-bye may take
 LOOK: Final = 1.0  # s between two looks at whether the scheduler and its workers are there
 AHEAD: Final = 3  # ranges sent to each worker's thread beforehand, so that none waits for the next
 LOST: Final = 3  # times that the workers of a range may end, one after the other
-
-
-class ClusterError(RuntimeError):
-    """A cluster that cannot be used; the text says why, and what to do."""
-
-
-class ClusterEnded(ClusterError):
-    """A cluster that ended before all was done."""
 
 
 class Cluster:

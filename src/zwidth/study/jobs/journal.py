@@ -23,6 +23,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.device.text_file import STORE_VERSION, newer_version_message, without_checksums
+from zwidth.errors import StoreError
 
 
 def fingerprint(*parts: object) -> str:
@@ -56,16 +57,12 @@ def _plain(part: object) -> Any:
     raise TypeError(f"a fingerprint cannot hold {part!r}: its value cannot be read{hint}")
 
 
-class JournalError(ValueError):
-    """A file that is not a journal, or is one of a newer version; it is not changed."""
-
-
 class Journal:
     """Results computed so far, each under a name.
 
     path      file of the journal; None: in memory only
     question  see `fingerprint`
-    Raises    JournalError  for a file that is no journal, or of a newer version
+    Raises    StoreError  for a file that is no journal, or of a newer version
               OSError       where it cannot be read or written
 
     >>> journal = Journal(None, fingerprint("how much?"))
@@ -82,7 +79,7 @@ class Journal:
             self.entries_read = 0
             return
         if path.exists() and not path.is_file():
-            raise JournalError(f"{path.name or path}: is not an ordinary file; name another")
+            raise StoreError(f"{path.name or path}: is not an ordinary file; name another")
         data = path.read_bytes() if path.exists() else b""
         lines = _read(path, data.split(b"\n")[:-1], data != b"", question)
         self.known = {entry["name"]: entry["value"] for entry in map(read_checked_line, lines[1:])}
@@ -111,9 +108,9 @@ def _read(path: Path, lines: list[bytes], not_empty: bool, question: str) -> lis
     first = json.dumps({"version": STORE_VERSION, "question": question}).encode()
     header = _entry(lines[0]) if lines else {}
     if message := newer_version_message(header.get("version"), STORE_VERSION):
-        raise JournalError(f"{path.name}: its version {message}, or name another file")
+        raise StoreError(f"{path.name}: its version {message}, or name another file")
     if not_empty and not isinstance(header.get("question"), str):
-        raise JournalError(f"{path.name}: is not the journal of a run; name another file, or remove it")
+        raise StoreError(f"{path.name}: is not the journal of a run; name another file, or remove it")
     if header.get("question") != question:
         return [first]
     unchecked = without_checksums(header.get("version"))

@@ -25,12 +25,13 @@ from typing import Final
 
 from zwidth._version import __version__
 from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.errors import StoreError
 from zwidth.progress import Progress
 from zwidth.study.jobs.executor import SMALL, Executor, open_executor, run
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import FILE as LOCK
-from zwidth.study.jobs.store import FolderLock, KeptForAnother, Store, StoreError, owner_of, whose_work
+from zwidth.study.jobs.store import FolderLock, Store, kept_for_another, owner_of, whose_work
 from zwidth.study.jobs.workers import cores
 
 HEADER: Final = "series.json"
@@ -116,7 +117,7 @@ class JobSeries:
         if message := unchecked_version_message(header.get("version")):
             raise StoreError(f"{self.folder}: its version {message}; remove it, or name another folder")
         if header.get("question") != own["question"]:
-            raise KeptForAnother(str(self.folder), whose_work(header, own["study"]))
+            raise kept_for_another(str(self.folder), whose_work(header, own["study"]))
         return True
 
     def _take_folder(self) -> None:
@@ -145,8 +146,10 @@ class JobSeries:
             self._take_folder()
             try:
                 store = Store(self.folder / name, job)
-            except KeptForAnother as error:
-                raise KeptForAnother(str(self.folder), error.whose) from None
+            except StoreError as error:
+                if error.whose is None:
+                    raise
+                raise kept_for_another(str(self.folder), error.whose) from None
         began = perf_counter()
         executor = self._executor_in_time()
         slots = 1 if executor is None else executor.slots

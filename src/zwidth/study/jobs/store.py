@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 from zwidth._version import __version__
 from zwidth.arrays import Flags, Floats
 from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.errors import StoreError
 from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS, Note
 from zwidth.memory_limit import check_memory
 from zwidth.study.jobs.job import CellValues, Job, Notes, NoteSummary
@@ -54,16 +55,9 @@ PER_CELL: Final = 9  # bytes of value and status; compressed they take less
 UNLIMITED: Final = float("inf")
 
 
-class StoreError(ValueError):
-    """A store that cannot be used; the text says why, and what to do."""
-
-
-class KeptForAnother(StoreError):
-    """A folder with the finished work of another question or release, which is left as it is."""
-
-    def __init__(self, folder: str, whose: str) -> None:
-        super().__init__(f"{folder}: {whose}; name another folder, or remove it")
-        self.whose = whose
+def kept_for_another(folder: str, whose: str) -> StoreError:
+    """The error about a folder with the finished work of another question or release, which is left as it is."""
+    return StoreError(f"{folder}: {whose}; name another folder, or remove it", whose)
 
 
 class Store:
@@ -274,7 +268,7 @@ class Store:
         if attributes.get(DIGEST) != _digest_of(attributes) or not isinstance(batch, int):
             raise damaged
         if attributes.get("question") != self.question:
-            raise KeptForAnother(self.path.name, whose_work(attributes, self._study))
+            raise kept_for_another(self.path.name, whose_work(attributes, self._study))
         try:
             if attributes.get("descriptions") != _descriptions(self.path):
                 raise damaged

@@ -36,8 +36,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from zwidth.device.faults import DeviceError
-from zwidth.measures.definition import FAILED, OUT_OF_TIME, MeasureError, Note
+from zwidth.errors import CannotStart, DeviceError, MeasureError, OutOfTime, WorkerLost
+from zwidth.measures.definition import FAILED, OUT_OF_TIME, Note
 from zwidth.study.jobs.job import CellValues, merge_notes
 
 if TYPE_CHECKING:
@@ -456,18 +456,6 @@ TRIES_ALONE: Final = 3  # of a single cell
 UNLIMITED: Final = 10**12
 
 Attempt = Callable[[int, int], CellValues]
-
-
-class WorkerLost(RuntimeError):
-    """A worker process ended before its task was done: killed, or out of memory."""
-
-
-class OutOfTime(RuntimeError):
-    """Cells took longer than their time limit; the process that computed them was ended."""
-
-
-class CannotStart(RuntimeError):
-    """A worker process does not get as far as computing its first task."""
 
 
 ENDING: Final = (MeasureError, DeviceError, CannotStart)  # say that no cell can be computed

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Floats
 from zwidth.device import address
-from zwidth.device.faults import DeviceError
 from zwidth.device.load import in_order
+from zwidth.errors import DeviceError, MissingMeasures
 from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, Note
 from zwidth.measures.workspace_statistics import global_conditioning_index, overall
 from zwidth.study.designs.column import Column
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
-from zwidth.study.designs.sweep_job import MissingMeasures, SweepJob, sweep_job
+from zwidth.study.designs.sweep_job import SweepJob, sweep_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.optimisation.problem import Problem

@@ -20,9 +20,9 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.address import UNSET, edited_text
-from zwidth.device.faults import DeviceError
 from zwidth.device.read import LARGEST_FILE
-from zwidth.device.text_file import UnreadableFileError, read_text
+from zwidth.device.text_file import read_text
+from zwidth.errors import DeviceError, FileError
 from zwidth.measures.definition import Note
 from zwidth.progress import Progress
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
@@ -331,7 +331,7 @@ def files_there(folder: Path, study: Study) -> tuple[list[Path], list[Path]]:
 def _is_of(path: Path, study: Study) -> bool:
     try:
         return f"{_origin(study)}, seed " in read_text(path, LARGEST_FILE)
-    except UnreadableFileError:
+    except FileError:
         return False
 
 

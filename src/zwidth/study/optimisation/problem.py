@@ -12,9 +12,10 @@ import numpy as np
 
 from zwidth.device.address import is_number, table
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, nearest
+from zwidth.device.faults import KeyPath, nearest
 from zwidth.device.load import in_order
 from zwidth.device.schema.value_types import Section
+from zwidth.errors import DeviceError
 from zwidth.measures.definition import Better, Measure
 from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named

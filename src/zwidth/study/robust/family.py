@@ -10,7 +10,7 @@ computed with the device's fitted modes, as its sensitivities are (`loop.measure
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import floor, isfinite
@@ -20,29 +20,26 @@ import numpy as np
 from pydantic import ValidationError
 
 from zwidth.arrays import Floats
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.robust.measured import MeasuredRobustChart, measured_robust_chart, open_edge
 from zwidth.device import address, build
 from zwidth.device.consistency import operator_inconsistencies
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, fail, one_line, quote
+from zwidth.device.faults import Fault, KeyPath, dotted, fail, one_line, quote
 from zwidth.device.load import check, device_of_point, from_document
 from zwidth.device.operator_choice import document_held_by
 from zwidth.device.schema import device_file as schema
 from zwidth.device.schema.operator import OperatorSection
+from zwidth.errors import Advice, ChartError, DeviceError, NonlinearError, RangeError, Spelling, as_argument
 from zwidth.loop.controller import Controller
-from zwidth.loop.estimator import NonlinearError
 from zwidth.loop.loop import Loop
 from zwidth.loop.measured.held_response import response_of_port
 from zwidth.loop.measured.measured_port import MeasuredPort, changed_port, command_port, sweep_port
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import Spelling, as_argument
 from zwidth.model.operator import ABOUT_AN_AXIS, Operator
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response, handle_obstacle
 from zwidth.progress import Progress
-from zwidth.study.advice import Advice
 from zwidth.study.designs.design_groups import BuiltDesigns, DesignColumn, DesignGrouping, build_at_point
 
 # Advice of two of the faults; arguments are spelled as in Python.
@@ -73,17 +70,6 @@ class RangeFault:
         """The fault on one line, with arguments spelled as in Python or as on the command line."""
         advice = "" if self.advice is None else f"; {self.advice.spelled(spelling)}"
         return f"{one_line(self.path)}: {one_line(self.reason)}{advice}"
-
-
-class RangeError(ValueError):
-    """Ranges that cannot be used; `faults` holds everything that is wrong with them."""
-
-    def __init__(self, faults: Iterable[RangeFault]) -> None:
-        self.faults = tuple(dict.fromkeys(faults))
-        super().__init__("\n".join(map(str, self.faults)))
-
-    def __reduce__(self) -> tuple[type[RangeError], tuple[tuple[RangeFault, ...]]]:
-        return type(self), (self.faults,)
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,14 @@ from typing import Any, Final
 import numpy as np
 import shapely
 
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
 from zwidth.chart.robust.common_chart import CommonChart
 from zwidth.chart.robust.members import Member, chart_member
-from zwidth.loop.estimator import NonlinearError
+from zwidth.errors import ChartError, NoAnswerError, NonlinearError, RangeError
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress
 from zwidth.result import Result
-from zwidth.study.robust.family import Family, FamilyMember, RangeError, build_together
+from zwidth.study.robust.family import Family, FamilyMember, build_together
 from zwidth.study.robust.unseen_members import (
     MemberRadii,
     Violation,
@@ -35,7 +34,7 @@ from zwidth.study.robust.unseen_members import (
     violating_members,
 )
 
-__all__ = ["RobustError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
+__all__ = ["NoAnswerError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
 
 
 REFINING: Final = 0.25  # share of the members that is reserved for those found by the search
@@ -43,10 +42,6 @@ MEMBERS, UNSEEN = 256, 10_000  # charted, and tried afterwards
 # The same of a measured device, whose charts take seconds
 MEASURED_MEMBERS, MEASURED_UNSEEN = 24, 200
 AT_ENDS: Final = 0.5  # probability of each number of the members searched to lie at an end of its range
-
-
-class RobustError(ValueError):
-    """No member of the family can be built and charted."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +185,7 @@ def robust_study(
     tolerance  the search ends with a round that changes the area by a smaller share
     Raises     RangeError      for ranges that cannot be used
                DeviceError     for operators that cannot be read
-               RobustError     if no member can be built and charted
+               NoAnswerError     if no member can be built and charted
                NonlinearError  for a velocity estimate that is not linear
 
     Of a measured device, see `robust_measured`.
@@ -264,10 +259,10 @@ class _Members:
         self.progress(stage, len(points), len(points))
 
     def chart(self) -> RobustChart:
-        """The robust chart of all members so far. Raises RobustError if none could be charted."""
+        """The robust chart of all members so far. Raises NoAnswerError if none could be charted."""
         if not self.charted:
             reason = next(iter(self.failed.values()))
-            raise RobustError(f"none of {len(self.points)} members could be charted; the first: {reason}")
+            raise NoAnswerError(f"none of {len(self.points)} members could be charted; the first: {reason}")
         return robust_chart_of_members(dict(self.charted), dict(self.failed))
 
 
@@ -322,7 +317,7 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
     try:
         chart = charted.chart()
     except ChartError as error:
-        raise RobustError(str(error)) from None
+        raise NoAnswerError(str(error)) from None
     rounds, area_change, settled = 0, 0.0, not family.free
     tried = list(random_measured_members(measured, unseen, [seed, 2], AT_ENDS)) if family.free else []
     unknown = 0

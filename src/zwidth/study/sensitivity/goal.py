@@ -25,15 +25,15 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.edge_memory import DOUBTFUL
 from zwidth.device import address
 from zwidth.device.design_batch import takes_arrays
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, dotted, fail
+from zwidth.device.faults import KeyPath, dotted, fail
 from zwidth.device.load import device_of_point, from_document
 from zwidth.device.numbers import number_limits, typical_size
 from zwidth.device.schema.device_file import key_unit
+from zwidth.errors import ChartError, DeviceError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
 from zwidth.progress import Progress

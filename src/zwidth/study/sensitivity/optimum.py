@@ -33,6 +33,7 @@ from zwidth.chart.loop_polynomials import (
 from zwidth.chart.real_root_lines import end_of_curve
 from zwidth.chart.tracer import Tracer, tracer_of
 from zwidth.compiled import compiled, compiled_lean
+from zwidth.errors import NoAnswerError
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
@@ -69,10 +70,6 @@ class EdgePieces(NamedTuple):
     wall: Floats
 
 
-class OptimumError(ValueError):
-    """The largest stiffness has no derivative that could be computed."""
-
-
 @dataclass(frozen=True)
 class Optimum:
     """The stiffest wall and the part of the edge on which it lies.
@@ -89,10 +86,10 @@ class Optimum:
 
     def stiffness_to_first_order(self, loop: Loop) -> float:
         """A number whose derivative by anything in the loop is that of the largest stiffness [N/m]; for the loop
-        itself it is the largest stiffness. Raises OptimumError where the curve's end goes to infinity."""
+        itself it is the largest stiffness. Raises NoAnswerError where the curve's end goes to infinity."""
         (stiffness,) = self.stiffnesses_to_first_order(loop.table).tolist()
         if self.kind == "end of the curve" and not np.isfinite(stiffness):
-            raise OptimumError("the curve's end goes to infinity")
+            raise NoAnswerError("the curve's end goes to infinity")
         return float(stiffness)
 
     def stiffnesses_to_first_order(self, loops: LoopTable) -> Floats:
@@ -151,7 +148,7 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     """Find the part of the edge on which the stiffest wall of a loop lies.
 
     peak    `largest_stiffness(loop)`
-    Raises  OptimumError  where the wall is of no kind, for instance where rounding hides a piece of the edge
+    Raises  NoAnswerError  where the wall is of no kind, for instance where rounding hides a piece of the edge
 
     >>> from zwidth.chart.chart import largest_stiffness
     >>> from zwidth.loop.controller import Controller
@@ -173,7 +170,7 @@ def optimum(loop: Loop, peak: Peak) -> Optimum:
     if len(pieces) == 2:
         return _crossing(peak, "corner", pieces, loop.period)
     if inside and not _is_maximum(tracer, inside[0]):
-        raise OptimumError(
+        raise NoAnswerError(
             "rounding hides the edge where the largest stiffness lies, so that it has no derivative"
         )
     alone = _Piece(CURVE if inside else END, (inside or real)[0], np.array([1.0, 0.0]))
@@ -216,7 +213,7 @@ def _crossing(peak: Peak, kind: Kind, pieces: list[_Piece], period: float) -> Op
     normals = np.array([one.normal for one in pieces])
     scaled = normals * np.array([1.0 / period, 1.0])  # K T and B have one unit
     if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]) > 1e9:
-        raise OptimumError("two pieces of the edge touch at the largest stiffness, which then has no derivative")
+        raise NoAnswerError("two pieces of the edge touch at the largest stiffness, which then has no derivative")
     return Optimum(peak, kind, _pieces(peak, pieces, np.linalg.solve(normals.T, np.array([1.0, 0.0]))))
 
 

@@ -29,10 +29,11 @@ from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.device import address, build
 from zwidth.device.build import nonlinear_kind
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, KeyPath, dotted
+from zwidth.device.faults import KeyPath, dotted
 from zwidth.device.load import check, device_of_point
 from zwidth.device.numbers import circumstance, typical_size
 from zwidth.device.schema.device_file import below_diagonal, key_unit, mirror_image
+from zwidth.errors import DeviceError, NoAnswerError
 from zwidth.loop.controller import Controller
 from zwidth.loop.measured.held_response import response_of_port
 from zwidth.loop.measured.measured_port import MeasuredPort, changed_port, command_port
@@ -48,7 +49,7 @@ from zwidth.study.sensitivity.changed_devices import (
     central_derivative,
     one_sided_derivative,
 )
-from zwidth.study.sensitivity.optimum import OptimumError, optimum, second_peak_stiffness
+from zwidth.study.sensitivity.optimum import optimum, second_peak_stiffness
 from zwidth.study.sensitivity.result import Group, Sensitivities, Sensitivity, number_obstacle
 
 ZERO: Final = "0 has no logarithm; the derivative by the number itself is given instead"
@@ -88,7 +89,7 @@ def sensitivities(
         return Sensitivities(None, None, (), (), left_out, nan)
     try:
         stiffest, obstacle = optimum(loop, peak), ""
-    except OptimumError as error:
+    except NoAnswerError as error:
         stiffest, obstacle = None, str(error)
     numbers, varied = [], list(property_numbers(device.document))
     changed = None

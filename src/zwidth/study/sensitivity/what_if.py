@@ -13,15 +13,14 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.chart.chart import StabilityChart, stability_chart
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.device.device import Device
+from zwidth.errors import ChartError, LoadError, ModelError
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import require
-from zwidth.model.load import LoadError
 from zwidth.model.plant import Plant
-from zwidth.model.reduction import Model, ModelError
+from zwidth.model.reduction import Model
 
 BASE: Final = "as-described"
 # Changes that may gain stiffness; the one that gains most names what limits the device.

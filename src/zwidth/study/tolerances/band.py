@@ -17,10 +17,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.point_chart import chart_at
 from zwidth.chart.tracer import Tracer
+from zwidth.errors import ChartError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import FAILED, OK, UNDECIDED, Note
 from zwidth.study.designs.sweep_job import SweepJob

@@ -14,15 +14,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.point_chart import check_at
 from zwidth.chart.table_radii import radii_at_points
 from zwidth.chart.verdict import NEAR, STABLE, UNDECIDED
 from zwidth.device.address import is_number, table
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, KeyPath
+from zwidth.device.faults import Fault, KeyPath
+from zwidth.errors import ChartError, DeviceError, as_argument
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import Measure, MeasureValues, WantedWall, WantedWalls, as_argument
+from zwidth.measures.definition import Measure, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_pointwise
 from zwidth.measures.preconditions import walls_of
 from zwidth.memory_limit import check_memory

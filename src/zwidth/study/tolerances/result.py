@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from zwidth.arrays import Flags, Floats
-from zwidth.chart.edge_by_eigenvalues import ChartError
 from zwidth.chart.point_chart import chart_at
 from zwidth.device.faults import plural
+from zwidth.errors import ChartError
 from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
 from zwidth.result import Result
 from zwidth.study.designs.sampling import Axis

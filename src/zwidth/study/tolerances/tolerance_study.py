@@ -25,10 +25,11 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
+from zwidth.errors import MissingMeasures
 from zwidth.measures.definition import NO_VALUE, OK, STATUS, Measure
 from zwidth.progress import Progress
 from zwidth.study.designs.sampling import Axis
-from zwidth.study.designs.sweep_job import MissingMeasures, SweepJob, sweep_job
+from zwidth.study.designs.sweep_job import SweepJob, sweep_job
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.series import JobSeries
 from zwidth.study.tolerances.band import MOST_INTERVALS, Band, Coverage, EdgeJob, highest_damping, refined_dampings

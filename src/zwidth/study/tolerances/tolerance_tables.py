@@ -19,9 +19,10 @@ from typing import Any, Final
 from zwidth.device import address
 from zwidth.device.address import is_number, tables
 from zwidth.device.device import Device
-from zwidth.device.faults import DeviceError, Fault, KeyPath, dotted, nearest, quote
+from zwidth.device.faults import Fault, KeyPath, dotted, nearest, quote
 from zwidth.device.load import from_document
 from zwidth.device.schema import device_file as schema
+from zwidth.errors import DeviceError
 from zwidth.study.designs.axis_tables import (
     SetNumbers,
     TableFault,

@@ -10,9 +10,9 @@ import numpy as np
 
 from zwidth.arrays import Floats, Ints
 from zwidth.device.device import Device
+from zwidth.errors import Advice, WorkspaceError
 from zwidth.model.mechanism import ORIENTATION
-from zwidth.study.advice import Advice
-from zwidth.study.workspace.plane_grid import FLAT, PlaneError, plane_of, reachable_set, rounded_outwards
+from zwidth.study.workspace.plane_grid import FLAT, plane_of, reachable_set, rounded_outwards
 
 LONG_SIDE: Final = {2: 20, 3: 6}  # cells along the longest side, by default, of a plane and of a space
 MOST: Final = 10**6  # cells
@@ -94,24 +94,24 @@ def cells_of(
 
     ranges   lowest and highest coordinate along each axis [m]; None: the file's workspace, or what is reached
     cells    number along each axis; left out: 20 along the longer side of a plane, 6 along the longest in space
-    Raises   PlaneError  for a device whose handle moves on a curve, on a curved surface or about axes, for ranges
-                         and numbers of cells that are none; and what `plane_of` raises
+    Raises   WorkspaceError  for a device whose handle moves on a curve, on a curved surface or about axes, for
+                             ranges and numbers of cells that are none; and what `plane_of` raises
     """
     mechanism = device.mechanism
     if mechanism is None:
         if cells is not None or any(one is not None for one in ranges):
-            raise PlaneError(
+            raise WorkspaceError(
                 "the device has no [mechanism], and so no workspace; its walls are the same everywhere"
             )
         none = np.empty(0)
         return CellGrid(np.empty((0, 3)), np.zeros(3), none, none, (), ())
     if mechanism.controls == ORIENTATION:
-        raise PlaneError(
+        raise WorkspaceError(
             "the drives control the orientation of the handle, and a table needs a handle that they move"
         )
     drives = len(mechanism.drives.names)
     if drives < 2:
-        raise PlaneError(
+        raise WorkspaceError(
             "the handle has one drive and moves along a curve, and a table needs two drives or three; describe "
             "what is felt along the curve as a [plant]"
         )
@@ -119,7 +119,7 @@ def cells_of(
     spread = np.linalg.svd(reach.positions - reach.positions.mean(axis=0), compute_uv=False)
     flat = not spread[2] > FLAT * spread[0]
     if not flat and drives < 3:
-        raise PlaneError(
+        raise WorkspaceError(
             "the handle has two drives and moves on a curved surface, and a table needs a plane or space"
         )
     _check_counts(cells, 2 if flat else 3)
@@ -138,12 +138,14 @@ def cells_of(
                 given = rounded_outwards(*reach.extent(np.eye(3)[axis])) if np.isnan(bounds).any() else bounds
             ends.append((float(given[0]), float(given[1])))
             if not (np.isfinite(ends[-1]).all() and ends[-1][0] < ends[-1][1]):
-                raise PlaneError(f"the range along {'xyz'[axis]} must be LOW,HIGH with LOW < HIGH, got {given}")
+                raise WorkspaceError(
+                    f"the range along {'xyz'[axis]} must be LOW,HIGH with LOW < HIGH, got {given}"
+                )
         low, high = np.array(ends).T.copy()
         axes, through, names = np.eye(3), np.zeros(3), ("x", "y", "z")
     counts = tuple(cells) if cells is not None else _counts(high - low)
     if np.prod(counts, dtype=float) > MOST:
-        raise PlaneError(f"a table has at most {MOST:.0e} cells, got {' x '.join(map(str, counts))}")
+        raise WorkspaceError(f"a table has at most {MOST:.0e} cells, got {' x '.join(map(str, counts))}")
     return CellGrid(axes, through, low, high, counts, tuple(names))
 
 
@@ -153,16 +155,16 @@ def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:
     if len(cells) != dimensions:
         text = ",".join(map(str, cells))
         advice = Advice("give {} as " + ("NX,NY" if dimensions == 2 else "NX,NY,NZ"), "cells")
-        raise PlaneError(
+        raise WorkspaceError(
             f"the handle moves in {dimensions} dimensions, and {text} are {len(cells)} counts", advice
         )
     if min(cells) < 1:
-        raise PlaneError(f"a table needs at least 1 cell along each axis, got {','.join(map(str, cells))}")
+        raise WorkspaceError(f"a table needs at least 1 cell along each axis, got {','.join(map(str, cells))}")
 
 
 def _refuse_third(ranges: Sequence[Sequence[float] | None]) -> None:
     if len(ranges) > 2 and ranges[2] is not None:
-        raise PlaneError(
+        raise WorkspaceError(
             "the handle moves in a plane, whose two axes have the ranges x and y", Advice("leave out {}", "z")
         )
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from zwidth.device.device import Device
 from zwidth.device.operator_choice import NOBODY
+from zwidth.errors import Advice, WorkspaceError
 from zwidth.measures.definition import OK, STATUS, Note
 from zwidth.model.argument_checks import describe_value, require, wrong_type
 from zwidth.progress import Progress
-from zwidth.study.advice import Advice, AdvisedError
 from zwidth.study.jobs.executor import run
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
@@ -33,10 +33,6 @@ LEVELS: Final = 12
 MOST_LEVELS: Final = 255  # what a byte of the exported program counts
 MOST_PARTS: Final = 16
 BATCH: Final = 4  # cells
-
-
-class SafeWallsError(AdvisedError):
-    """A table of safe walls that cannot be made."""
 
 
 def safe_walls(
@@ -77,9 +73,9 @@ def safe_walls(
     store       a folder that keeps the cells that are done
     progress    is called with "cells", cells done, and cells of all
     workers     processes at most; left out: one for each core
-    Raises      SafeWallsError  for arguments that are not allowed, a table beyond the limit, a device under load,
+    Raises      WorkspaceError  for arguments that are not allowed, a table beyond the limit, a device under load,
                                 one that renders moments, a measured response
-                PlaneError      as `grid.cells_of` does
+                WorkspaceError      as `grid.cells_of` does
                 DeviceError     for hands that cannot be read, and as `Device.at` does
                 what `OperatingPoint.loop`, `executor.run` and `Store` raise
     """
@@ -118,22 +114,22 @@ def safe_walls_job(
     _check_kinds(hands, cells, ranges)
     _check_numbers(levels, directions, margin)
     if device.response is not None:
-        raise SafeWallsError(
+        raise WorkspaceError(
             "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth "
             "identify"
         )
     if device.load is not None:
-        raise SafeWallsError(
+        raise WorkspaceError(
             "a table holds for a device without load: its walls would hang on how hard the hand pushes",
             Advice("leave the load out, with {}", "set", "load=unset"),
         )
     if device.mechanism is not None and device.renders_moments(None):
-        raise SafeWallsError(
+        raise WorkspaceError(
             "the device renders moments about an axis, and a table is about forces; render a force"
         )
     grid = cells_of(device, ranges, cells, assembly)
     if directions > 1 and not grid.dimensions:
-        raise SafeWallsError(
+        raise WorkspaceError(
             f"the device has no [mechanism] and one direction, got {directions} parts of directions",
             Advice("leave out {}", "directions"),
         )
@@ -141,7 +137,7 @@ def safe_walls_job(
     sectors = Sectors(grid.dimensions, directions)
     question = CellQuestion(held, grid, sectors, levels, float(margin), assembly, model, seed)
     if size_limit is not None and (size := table_size(question)) > size_limit:
-        raise SafeWallsError(
+        raise WorkspaceError(
             f"the table takes {size} bytes, more than the {size_limit} of its limit",
             Advice("take fewer with {}, or fewer levels", "cells"),
         )
@@ -162,7 +158,7 @@ def compute_table(
 ) -> SafeWalls:
     """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
     if span is not None and not (isinstance(span, Real) and isfinite(span) and span > 0.0):
-        raise SafeWallsError(f"the span of damping must be positive, got {describe_value(span)}")
+        raise WorkspaceError(f"the span of damping must be positive, got {describe_value(span)}")
     cells = run(job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit)
     asked = job.cell_question
     return table_of_cells(device, hand_names(asked), asked, cells, span)
@@ -195,14 +191,14 @@ def _all(values: Any, kind: type[Any]) -> bool:
 def _check_numbers(levels: int, directions: int, margin: float) -> None:
     for name, value, most in (("levels", levels, MOST_LEVELS), ("directions", directions, MOST_PARTS)):
         if not (isinstance(value, Integral) and 1 <= value <= most):
-            raise SafeWallsError(f"{name} must be a whole number from 1 to {most}, got {describe_value(value)}")
+            raise WorkspaceError(f"{name} must be a whole number from 1 to {most}, got {describe_value(value)}")
     if not (isinstance(margin, Real) and 0.0 <= margin < 1.0):
-        raise SafeWallsError(f"margin must be at least 0 and below 1, got {describe_value(margin)}")
+        raise WorkspaceError(f"margin must be at least 0 and below 1, got {describe_value(margin)}")
 
 
 def _check_point(question: CellQuestion) -> None:
     """Raise what is wrong with the device, its assembly or its model, before the cells have it as their status."""
-    from zwidth.model.posture import PostureError
+    from zwidth.errors import PostureError
 
     for device in question.devices:
         try:

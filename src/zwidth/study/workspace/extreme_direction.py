@@ -24,8 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats, Ints
+from zwidth.errors import MeasureError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import MISSING, OK, Measure, MeasureError, MeasureValues, Note
+from zwidth.measures.definition import MISSING, OK, Measure, MeasureValues, Note
 from zwidth.measures.evaluation import NO_MECHANISM, evaluate
 from zwidth.study.designs.column import Requirement
 

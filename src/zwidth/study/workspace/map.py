@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
 from zwidth.device.device import Device
+from zwidth.errors import MeasureError, WorkspaceError
 from zwidth.loop.linear_omissions import load_omissions
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import find_measure
@@ -34,7 +35,6 @@ from zwidth.measures.definition import (
     UNREACHED,
     WANTED_NUMBERS,
     Measure,
-    MeasureError,
     Note,
     WantedWall,
 )
@@ -51,7 +51,7 @@ from zwidth.study.jobs.job import Cells, CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.extreme_direction import EXTREMES, extreme_over_directions, extreme_sign
-from zwidth.study.workspace.plane_grid import PlaneError, PlaneGrid, plane_of, reachable_set
+from zwidth.study.workspace.plane_grid import PlaneGrid, plane_of, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -201,7 +201,7 @@ def workspace_map(
     Returns        a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none,
                    NAME_status, and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have
                    no value stands in the attribute `notes`, a line for each reason
-    Raises         PlaneError    where the handle reaches no cell, and as `plane_of` does
+    Raises         WorkspaceError    where the handle reaches no cell, and as `plane_of` does
                    ValueError    for an unknown measure, or two of one name
                    MeasureError  for a measure that does not exist for this device
                    DeviceError   as `Device.at` does
@@ -268,7 +268,7 @@ def map_job(
 
 
 def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
-    """A map's cells with axes, units and circumstances. Raises PlaneError where the handle reaches none."""
+    """A map's cells with axes, units and circumstances. Raises WorkspaceError where the handle reaches none."""
     import xarray as xr
 
     plane, mechanism = job.plane, job.device.mechanism
@@ -341,7 +341,7 @@ def _check_reached(job: MapJob, cells: Cells) -> None:
     assert mechanism is not None
     assembly = job.assembly or job.device.reference_assembly
     reach = reachable_set(mechanism, assembly)
-    raise PlaneError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {reach}")
+    raise WorkspaceError(f"the handle reaches no point of this plane in assembly {assembly!r}; it reaches {reach}")
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:

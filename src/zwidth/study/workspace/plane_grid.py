@@ -11,12 +11,12 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
+from zwidth.errors import Advice, WorkspaceError
 from zwidth.model.argument_checks import require
 from zwidth.model.mechanism import ORIENTATION, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import reachable_positions
 from zwidth.model.posture_batch import Shell, shells
-from zwidth.study.advice import Advice, AdvisedError
 
 AXES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 LONG_SIDE: Final = 81  # points along the longer side, by default
@@ -26,10 +26,6 @@ PARALLEL: Final = 1e-6  # sine of an angle; two axes with a smaller one count as
 BETWEEN: Final = 0.08  # share of the extent by which the reachable set may go beyond the known positions
 ROUND: Final = 20  # ranges are rounded outwards to a power of ten over this
 DIGITS: Final = 14  # significant digits of coordinates, counted from the largest
-
-
-class PlaneError(AdvisedError):
-    """A plane on which no map can be drawn, and what can be reached."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,7 @@ def plane_of(
     x, y      lowest and highest coordinate along both axes [m]; left out: the file's workspace, or a box around
               what is reached, its ends rounded outwards
     cells     points along both; left out: 81 along the longer side, as many to the metre along the other
-    Raises    PlaneError   for parallel axes, an empty range, fewer than two points, a plane that the
+    Raises    WorkspaceError   for parallel axes, an empty range, fewer than two points, a plane that the
                            reachable set meets in a line or not at all
               DeviceError  for a device without a mechanism, or a point that is not a position
               PostureError where the assembly is singular throughout, or does not close
@@ -98,13 +94,15 @@ def plane_of(
     mechanism = device.mechanism
     assert mechanism is not None
     if mechanism.controls == ORIENTATION:
-        raise PlaneError(
+        raise WorkspaceError(
             "the drives control the orientation of the handle, and a map needs a handle that they move; ask for "
             "single orientations, or sweep a study"
         )
     reach = reachable_set(mechanism, assembly or device.reference_assembly)
     if len(mechanism.drives.names) < 2:
-        raise PlaneError("the handle has one drive and moves along a curve; a map needs a device with two drives")
+        raise WorkspaceError(
+            "the handle has one drive and moves along a curve; a map needs a device with two drives"
+        )
     own = _reach_normal(reach.positions)
     first, second, names = _axes(axes, own)
     _check_intersection(np.cross(first, second), point, own, reach)
@@ -181,26 +179,28 @@ def _axes(
         return first, np.cross(reach_normal, first), ("u", "v")
     if isinstance(requested_axes, str):
         if requested_axes not in AXES:
-            raise PlaneError(f"the plane must be xy, xz, yz or six numbers, got '{requested_axes}'")
+            raise WorkspaceError(f"the plane must be xy, xz, yz or six numbers, got '{requested_axes}'")
         a, b = AXES[requested_axes]
         return unit[a], unit[b], (requested_axes[0], requested_axes[1])
     vectors = np.asarray(requested_axes, dtype=np.float64)
     if vectors.shape != (6,) or not np.isfinite(vectors).all():
-        raise PlaneError(f"the plane's axes must be six finite numbers, two vectors, got {list(requested_axes)}")
+        raise WorkspaceError(
+            f"the plane's axes must be six finite numbers, two vectors, got {list(requested_axes)}"
+        )
     return *_orthonormal(vectors[:3], vectors[3:]), ("u", "v")
 
 
 def _orthonormal(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     lengths = [float(np.linalg.norm(v / (np.abs(v).max() or 1.0))) for v in (a, b)]
     if not all(lengths):
-        raise PlaneError(
+        raise WorkspaceError(
             f"an axis of the plane has length 0: {_vector(a)} and {_vector(b)}; give two vectors that are not zero"
         )
     first, other = (v / np.abs(v).max() / length for v, length in zip((a, b), lengths, strict=True))
     second = other - (first @ other) * first
     across = float(np.linalg.norm(second))
     if across < PARALLEL:
-        raise PlaneError(f"the plane's axes {_vector(a)} and {_vector(b)} are parallel; give two that are not")
+        raise WorkspaceError(f"the plane's axes {_vector(a)} and {_vector(b)} are parallel; give two that are not")
     return first, second / across
 
 
@@ -209,7 +209,7 @@ def _vector(v: Floats) -> str:
 
 
 def _check_intersection(normal: Floats, point: Floats, own: Floats | None, reach: ReachableSet) -> None:
-    """Raises PlaneError where a handle that cannot leave its own plane meets this one in a line or nowhere."""
+    """Raises WorkspaceError where a handle that cannot leave its own plane meets this one in a line or nowhere."""
     if own is None:
         return
     known, k = reach.positions, int(np.argmax(np.abs(own)))
@@ -218,10 +218,10 @@ def _check_intersection(normal: Floats, point: Floats, own: Floats | None, reach
     where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_vector(own)}"
     if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
         advice = Advice("ask for {}", "axes", plane) if plane else Advice("leave {} out", "axes")
-        raise PlaneError(f"the handle cannot leave {where}, and meets the requested plane in a line", advice)
+        raise WorkspaceError(f"the handle cannot leave {where}, and meets the requested plane in a line", advice)
     off = float(abs((point - known[0]) @ own))
     if off > FLAT * float(np.ptp(known, axis=0).max()):
-        raise PlaneError(
+        raise WorkspaceError(
             f"the handle cannot leave {where}, and the requested plane lies {off:.4g} m beside it; it reaches "
             f"{reach}"
         )
@@ -233,7 +233,9 @@ def _range(
     if given is not None:
         low, high = (float(value) for value in given)
         if not (np.isfinite([low, high]).all() and low < high):
-            raise PlaneError(f"the range along {name} must be LOW,HIGH with LOW < HIGH, got {low:.6g},{high:.6g}")
+            raise WorkspaceError(
+                f"the range along {name} must be LOW,HIGH with LOW < HIGH, got {low:.6g},{high:.6g}"
+            )
         return low, high
     if np.isnan(bounds[axis != 0.0]).any():
         return rounded_outwards(*reach.extent(axis))
@@ -259,14 +261,14 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
         lengths = [high - low for low, high in ranges]
         if not min(lengths) > 0.0:
             flat = "the reachable positions have no extent along an axis"
-            raise PlaneError(flat, Advice("give its range and {}", "cells"))
+            raise WorkspaceError(flat, Advice("give its range and {}", "cells"))
         nx, ny = (max(2, round((LONG_SIDE - 1) * length / max(lengths)) + 1) for length in lengths)
         return nx, ny
     nx, ny = (int(count) for count in cells)
     if min(nx, ny) < 2:
-        raise PlaneError(f"a map needs at least 2 points along each axis, got {nx},{ny}")
+        raise WorkspaceError(f"a map needs at least 2 points along each axis, got {nx},{ny}")
     if nx * ny > MOST:
-        raise PlaneError(f"a map has at most {MOST:.0e} points, got {nx} x {ny}")
+        raise WorkspaceError(f"a map has at most {MOST:.0e} points, got {nx} x {ny}")
     return nx, ny
 
 
