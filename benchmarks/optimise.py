@@ -25,10 +25,20 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
-from zwidth.study import Axis, Judge, Sampling, Study, hypervolume, problem_of, settle, study_of, values_at
+from zwidth.study import (
+    Axis,
+    Judge,
+    Sampling,
+    Study,
+    hypervolume,
+    optimise,
+    problem_of,
+    settle,
+    study_of,
+    values_at,
+)
 from zwidth.study import run as run_job
 from zwidth.study.optimisation.evaluation import Judgement
-from zwidth.study.optimisation.optimise import optimise
 from zwidth.study.optimisation.problem import Problem
 
 BUDGET, SEEDS, WORKERS = 4000, 3, 2

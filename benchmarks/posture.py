@@ -26,8 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "model"))
 from model_cases import five_bar, two_bar_angles
 
 from benchmarks._cases import Cases, TimedCase, run
-from zwidth.model import OK, solve_posture
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.model import OK, effective_parameters, solve_posture
 
 POSTURES, ENGINE_POSTURES, ROUNDS, TARGET_US = 100_000, 2_000, 7, 2.0
 ALONG_Y = np.array([0.0, 1.0, 0.0])

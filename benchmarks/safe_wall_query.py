@@ -27,8 +27,7 @@ from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, median_time, print_table, seconds, verdict
 from zwidth.device.load import load
 from zwidth.show import HEADER_NAME, header_text
-from zwidth.study import SafeWalls
-from zwidth.study.wall_tables.safe_walls import safe_walls
+from zwidth.study import SafeWalls, safe_walls
 
 TARGET = 1e-6  # s
 QUERIES = 1_000_000

@@ -24,8 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._simulators import TwoMassDevice, by_events, by_mujoco
 from benchmarks._timing import machine, print_table, seconds
-from zwidth.contact import Run, simulate_batch
-from zwidth.contact.environments import wall
+from zwidth.contact import Run, simulate_batch, wall
 from zwidth.device.load import load
 from zwidth.loop import Loop
 from zwidth.model import Counter, Friction, Nonlinear

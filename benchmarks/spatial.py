@@ -32,12 +32,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "model"))
 
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
-from zwidth.device import Device, import_file
+from zwidth.device import Device, import_file, new_device
 from zwidth.device.load import load
-from zwidth.device.new_file import new_device
 from zwidth.measures import OK as MEASURED
-from zwidth.model import BALL_X, BALL_Z, OK, PRISMATIC, REVOLUTE, Mechanism, solve_posture
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.model import BALL_X, BALL_Z, OK, PRISMATIC, REVOLUTE, Mechanism, effective_parameters, solve_posture
 
 POSTURES, FEWER_POSTURES, ENGINE_POSTURES, ROUNDS = 100_000, 20_000, 500, 5  # fewer: of our own cases
 POSTURES_TARGET, MAP_TARGET, REPORT_TARGET, IMPORT_TARGET = 1.0, 3.0, 60.0, 1.0  # s

@@ -14,8 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from gallery import optimal_mass
-from zwidth.study import study_of
-from zwidth.study.optimisation.optimise import optimise
+from zwidth.study import optimise, study_of
 
 
 def like(link: str) -> list[object]:

@@ -24,9 +24,7 @@ import numpy as np
 
 from gallery.shared_loops import published, write_page
 from zwidth.chart import eigenvalues, spectral_radius, stability_chart
-from zwidth.contact import Judgement, TimeResponse, judge_response
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import Judgement, TimeResponse, judge_response, simulate, wall
 from zwidth.loop import Loop
 
 loop = published()

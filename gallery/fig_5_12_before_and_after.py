@@ -25,9 +25,7 @@ import numpy as np
 from gallery import optimal_mass
 from gallery.shared_loops import published, write_page
 from zwidth.chart import eigenvalues, judge
-from zwidth.contact import Judgement, TimeResponse, judge_response
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import Judgement, TimeResponse, judge_response, simulate, wall
 from zwidth.loop import Loop
 
 WALLS = {name: optimal_mass.WALLS[name] for name in "BCD"}

@@ -14,8 +14,7 @@ from gallery.five_bar import SIDES, bundled
 from zwidth.device import Device
 from zwidth.device.load import load
 from zwidth.loop import OperatingPoint
-from zwidth.measures import MeasureValues, find_measure
-from zwidth.measures.evaluation import evaluate
+from zwidth.measures import MeasureValues, evaluate, find_measure
 
 device = load("five-bar")
 LINKS = device.mechanism.links.names

@@ -31,8 +31,7 @@ import numpy as np
 from gallery.shared_loops import published, write_figure
 from zwidth.chart import judge
 from zwidth.chart.verdict import STABLE
-from zwidth.contact import Hand, Run, limit_cycles, resting_limit, simulate_batch
-from zwidth.contact.environments import one_sided_wall, wall
+from zwidth.contact import Hand, Run, limit_cycles, one_sided_wall, resting_limit, simulate_batch, wall
 from zwidth.loop import Controller, Loop
 from zwidth.model import Counter, Friction, Nonlinear
 

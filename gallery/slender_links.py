@@ -16,7 +16,7 @@ from zwidth.chart import StabilityChart
 from zwidth.device import Device, from_document
 from zwidth.device.load import load
 from zwidth.study import bending
-from zwidth.study.bending import BendingNumbers
+from zwidth.study.link_bending import BendingNumbers
 
 DISTAL, DRIVEN = ("distal-right", "distal-left"), ("upper-right", "upper-left")
 RIGID = "rigid links"

@@ -20,9 +20,8 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.device.load import load
-from zwidth.model import natural_frequencies, plant_effective_parameters
+from zwidth.model import effective_parameters, natural_frequencies, plant_effective_parameters
 from zwidth.model.effective_mass import EffectiveParameters
-from zwidth.model.reduction import effective_parameters
 
 DEVICE = "five-bar"
 DISTAL = ("distal-right", "distal-left")

@@ -2,14 +2,14 @@
 
 Each wall on the edge of the stable ones has the frequency at which it starts to vibrate. At each, a simpler model
 is off by the least share by which stiffness, damping and frequency must all be allowed to differ for its edge to
-pass there (`zwidth.study.model_validity`); here is asked where that stays within 10 %.
+pass there (`zwidth.study.validity`); here is asked where that stays within 10 %.
 """
 
 from __future__ import annotations
 
 from gallery.shared_loops import PUBLISHED
 from zwidth.device.load import load
-from zwidth.study.model_validity import validity
+from zwidth.study import validity
 
 model_validity = validity(load(PUBLISHED).at())
 fits = {fit.key: fit for fit in model_validity.fits}

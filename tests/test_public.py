@@ -43,6 +43,14 @@ def test_all_names_of_a_package_are_there(package):
         assert name in dir(module)
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_name_of_a_package_is_that_of_a_module_of_it(package):
+    """Else the name means the module once that was imported, and the function before."""
+    module = import_module(f"zwidth.{package}")
+    modules = {path.stem for path in Path(str(module.__file__)).parent.glob("[a-z]*")}
+    assert not modules & {*module.__all__}
+
+
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'stabilty_chart'"):
         zwidth.stabilty_chart  # noqa: B018

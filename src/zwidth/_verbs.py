@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from zwidth.model.load import Load
     from zwidth.progress import Progress
     from zwidth.result import Result
-    from zwidth.study.bending import Bending
     from zwidth.study.boundary.measured_boundary import Experiment, Plan
-    from zwidth.study.load_path import LoadPath
+    from zwidth.study.link_bending import Bending
+    from zwidth.study.loaded_charts import LoadPath
     from zwidth.study.model_validity import Validity
     from zwidth.study.sensitivity.result import Sensitivities
 
@@ -72,13 +72,13 @@ def device_sensitivities(device: Device, point: OperatingPoint, progress: Progre
 def device_load_path(
     device: Device, push: float, count: int, point: OperatingPoint | None, progress: Progress | None
 ) -> LoadPath:
-    from zwidth.study.load_path import load_path
+    from zwidth.study.loaded_charts import load_path
 
     return load_path(device, push, count, point, progress)
 
 
 def device_bending(device: Device, point: OperatingPoint | None) -> Bending | None:
-    from zwidth.study.bending import bending
+    from zwidth.study.link_bending import bending
 
     return bending(device, point)
 

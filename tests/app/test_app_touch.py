@@ -7,8 +7,8 @@ import pytest
 from app.page_driver import Page
 
 import zwidth
-from zwidth.contact.environments import wall as wall_law
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import simulate
+from zwidth.contact import wall as wall_law
 from zwidth.model import Operator
 
 MOUSE = Operator(0.05, 300.0, 4.0)

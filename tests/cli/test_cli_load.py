@@ -163,7 +163,7 @@ def test_files(tmp_path):
 
 
 def test_ctrl_c_stops_it():
-    code, out, err = stopped_by_ctrl_c(["load", MECHANISM], "zwidth.study.load_path:_Pushes.chart", 2)
+    code, out, err = stopped_by_ctrl_c(["load", MECHANISM], "zwidth.study.loaded_charts:_Pushes.chart", 2)
     assert (code, out) == (130, "")
     assert "Traceback" not in err
 

@@ -10,7 +10,8 @@ import pytest
 
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from tests.undrawn_figures import leave_undrawn
-from zwidth.device.new_file import KINDS, new_device
+from zwidth.device import new_device
+from zwidth.device.new_file import KINDS
 
 
 @pytest.fixture(autouse=True)

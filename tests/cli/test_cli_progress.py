@@ -166,7 +166,10 @@ def test_a_command_reports_its_steps_and_what_it_writes(tmp_path, monkeypatch, w
 @pytest.mark.parametrize(
     ("words", "module"),
     [
-        (["simulate", "five-bar", "--stiffness", "1000", "--damping", "2", "--duration", "0.05"], "simulate"),
+        (
+            ["simulate", "five-bar", "--stiffness", "1000", "--damping", "2", "--duration", "0.05"],
+            "loop_simulation",
+        ),
         (["move", "five-bar", "--push", "0,1", "--duration", "0.05"], "mechanism.simulate_mechanism"),
     ],
 )

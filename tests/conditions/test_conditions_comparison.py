@@ -7,8 +7,8 @@ from math import isnan
 import pytest
 
 from zwidth.chart import stability_chart
-from zwidth.conditions import compare
-from zwidth.conditions.comparison import bounds_of, compare_bounds
+from zwidth.conditions import compare, compare_bounds
+from zwidth.conditions.comparison import bounds_of
 from zwidth.device import from_document
 from zwidth.errors import ChartError
 

@@ -14,8 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from systems import mass, two_mass
 
-from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import one_sided_wall, simulate, wall
 from zwidth.loop import Controller, Loop
 from zwidth.model import Friction, Nonlinear
 

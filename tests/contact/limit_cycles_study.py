@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tests.contact.limit_cycles_cases import random_wall, vibration
-from zwidth.contact import Run, TimeResponse, limit_cycles, simulate_batch
-from zwidth.contact.environments import wall
+from zwidth.contact import Run, TimeResponse, limit_cycles, simulate_batch, wall
 from zwidth.contact.harmonic_balance import LimitCycle
 from zwidth.loop import Loop
 from zwidth.model import Counter, Friction, Nonlinear

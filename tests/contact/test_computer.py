@@ -15,7 +15,7 @@ from contact.mechanism_cases import (
 )
 from scipy.signal import lfilter
 
-from zwidth.contact import normal
+from zwidth.contact import normal, simulate, wall
 from zwidth.contact.computer import (
     arrived_command,
     clip,
@@ -27,8 +27,6 @@ from zwidth.contact.computer import (
     send,
     signals_of,
 )
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
 from zwidth.loop import (
     AlphaBeta,
     BackwardDifference,

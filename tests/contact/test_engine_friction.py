@@ -16,9 +16,7 @@ from contact.engine_cases import (
 )
 from systems import random_loop
 
-from zwidth.contact import SOURCES, Hand, Run, simulate_batch
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import SOURCES, Hand, Run, simulate, simulate_batch, wall
 from zwidth.loop import Loop
 from zwidth.model import Counter, Friction, Nonlinear
 

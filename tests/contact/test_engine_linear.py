@@ -6,9 +6,7 @@ from contact.engine_cases import random_stable_wall, run, spectral_radius, two_m
 from contact.matrix_power_reference import fine_readings
 from systems import FEATURES, random_loop
 
-from zwidth.contact import Run, judge_response, simulate_batch
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import Run, judge_response, simulate, simulate_batch, wall
 from zwidth.loop import (
     AlphaBeta,
     Butterworth,

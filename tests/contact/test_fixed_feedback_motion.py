@@ -9,10 +9,18 @@ import pytest
 from systems import mass, two_mass
 
 from tests.control_apart import ControlledLoop, DoublePrecision, Memory, Period, random_controlled_loop
-from zwidth.contact import Hand, Reflex, Run, StabilityTrial, judge_response, observe, simulate_batch
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
-from zwidth.contact.wall_limit_cycles import predict_limit_cycles
+from zwidth.contact import (
+    Hand,
+    Reflex,
+    Run,
+    StabilityTrial,
+    judge_response,
+    observe,
+    predict_limit_cycles,
+    simulate,
+    simulate_batch,
+    wall,
+)
 from zwidth.errors import FeedbackError
 from zwidth.loop import (
     Butterworth,

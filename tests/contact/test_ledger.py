@@ -8,9 +8,17 @@ from contact.engine_cases import EventSolver, friction_of, one_mass, run, two_ma
 from contact.test_engine_friction import random_friction
 from systems import FEATURES, random_loop
 
-from zwidth.contact import SOURCES, Hand, PassivityController, Run, Tremor, simulate_batch
-from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import (
+    SOURCES,
+    Hand,
+    PassivityController,
+    Run,
+    Tremor,
+    one_sided_wall,
+    simulate,
+    simulate_batch,
+    wall,
+)
 from zwidth.loop import Foaw, Levant, Loop
 from zwidth.model import Brake, Counter, Nonlinear, Spring
 

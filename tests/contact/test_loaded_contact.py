@@ -8,10 +8,7 @@ import pytest
 
 from tests.contact.mechanism_cases import with_friction
 from tests.model.model_cases import five_bar
-from zwidth.contact import ENVIRONMENTS
-from zwidth.contact.environments import wall
-from zwidth.contact.environments.walls import pressed_wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import ENVIRONMENTS, pressed_wall, simulate, wall
 from zwidth.errors import ArgumentError, FeedbackError
 from zwidth.loop import Butterworth, Controller, OperatingPoint
 from zwidth.model import Load, ModalDamping, solve_posture

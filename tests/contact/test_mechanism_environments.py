@@ -25,9 +25,9 @@ from zwidth.contact import (
     SurfaceEnvironment,
     SurfaceWall,
     depth_and_normal,
+    simulate,
 )
 from zwidth.contact.environments import environment
-from zwidth.contact.loop_simulation import simulate
 from zwidth.errors import ArgumentError
 from zwidth.loop import Butterworth, Foaw, Levant, Loop
 from zwidth.model import ModalDamping, reduce_mechanism, solve_posture

@@ -8,8 +8,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
-from zwidth.device import from_document
-from zwidth.device.new_file import new_device
+from zwidth.device import from_document, new_device
 from zwidth.errors import ArgumentError
 
 ARM = {

@@ -13,10 +13,8 @@ import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
 from zwidth.chart import largest_stiffness, spectral_radius
-from zwidth.contact import Hand, Reach, Reflex, Tremor, environment
+from zwidth.contact import Hand, Reach, Reflex, Tremor, environment, simulate_contact, slot
 from zwidth.contact.contact_simulation import bound_of_run, lengthened, needed_substeps, run_length
-from zwidth.contact.environments.walls import slot
-from zwidth.contact.point_contact import simulate_contact
 from zwidth.errors import ArgumentError, NoAnswerError, TooLarge
 from zwidth.loop import Controller, Loop, OperatingPoint
 from zwidth.model import Friction, Nonlinear

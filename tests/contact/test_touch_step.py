@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from contact.touch_cases import in_python, random_loop, random_touch, same_bits
 
-from zwidth.contact import OUTPUTS, Hand, normal, touch, touch_obstacle
-from zwidth.contact.environments import one_sided_wall, wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import OUTPUTS, Hand, normal, one_sided_wall, simulate, touch, touch_obstacle, wall
 from zwidth.contact.touch_step import FREE, ONE_SIDED, touch_numbers
 from zwidth.loop import Controller, FirstOrder, Loop
 from zwidth.model import Operator, Plant

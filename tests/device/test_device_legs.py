@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import zwidth
 from tests.device.device_cases import faults
-from zwidth.device import from_document
-from zwidth.device.new_file import new_device
+from zwidth.device import from_document, new_device
 from zwidth.errors import BeyondLimit, OutOfReach
 from zwidth.measures import BEYOND_LIMIT, OUT_OF_REACH
 from zwidth.model import handle_position, solve_posture

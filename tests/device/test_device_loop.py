@@ -14,6 +14,7 @@ from zwidth.chart import eigenvalues
 from zwidth.device import address, from_document
 from zwidth.device.schema import device_file as schema
 from zwidth.loop import (
+    METHODS,
     AlphaBeta,
     BackwardDifference,
     Butterworth,
@@ -28,7 +29,6 @@ from zwidth.loop import (
     SavitzkyGolay,
     WindowedDifference,
 )
-from zwidth.loop.estimators import METHODS
 from zwidth.model import LaggedDamper, Operator, attach
 
 NO_FILTER = {"loop__velocity__filter": REMOVED}

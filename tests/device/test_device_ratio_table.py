@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tests.device.device_cases import ARM_FILE, REMOVED, faults, with_changes
-from zwidth.device import from_document
+from zwidth.device import from_document, new_device
 from zwidth.device.design_batch import design_batch
-from zwidth.device.new_file import new_device
 from zwidth.errors import BeyondLimit, DeviceError
 from zwidth.model import OK
 from zwidth.model.posture import BEYOND_LIMIT

@@ -16,7 +16,7 @@ from tests.identify.arm_benches import (
 )
 from zwidth.identify import Parameters, base_parameters, identify_arm, record_of
 from zwidth.identify.arm import COLUMNS
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.model import effective_parameters
 
 
 def link_parameters(mechanism, parameters):

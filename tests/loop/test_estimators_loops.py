@@ -10,8 +10,15 @@ from tests.loop.estimators_cases import random_method
 from tests.systems import mass, random_loop
 from zwidth.chart import judge, largest_stiffness, stability_chart
 from zwidth.chart.verdict import STABLE, UNSTABLE
-from zwidth.loop import Controller, LeastSquaresSlope, Loop, SavitzkyGolay, WindowedDifference, relative_response
-from zwidth.loop.estimators import LINEAR_METHODS
+from zwidth.loop import (
+    LINEAR_METHODS,
+    Controller,
+    LeastSquaresSlope,
+    Loop,
+    SavitzkyGolay,
+    WindowedDifference,
+    relative_response,
+)
 
 
 def loops_of(name, rng, count, longest=16):

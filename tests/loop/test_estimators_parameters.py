@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 from tests.loop import estimators_cases
-from zwidth.loop import AlphaBeta, BackwardDifference, Kalman, LeastSquaresSlope, SavitzkyGolay, WindowedDifference
-from zwidth.loop.estimators import LINEAR_METHODS, METHODS
+from zwidth.loop import (
+    LINEAR_METHODS,
+    METHODS,
+    AlphaBeta,
+    BackwardDifference,
+    Kalman,
+    LeastSquaresSlope,
+    SavitzkyGolay,
+    WindowedDifference,
+)
 
 REFUSED = [
     (WindowedDifference, (0,), "samples must be from 1 to 1000, got 0"),

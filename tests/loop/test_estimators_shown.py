@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from gallery import estimators as gallery
 from tests.systems import reference_transition_matrix
-from zwidth.loop import AlphaBeta, phase_delay, quantisation_noise, relative_response
-from zwidth.loop.estimators import METHODS
+from zwidth.loop import METHODS, AlphaBeta, phase_delay, quantisation_noise, relative_response
 
 PAGE = (Path(__file__).parents[2] / "docs" / "estimators.md").read_text(encoding="utf-8")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device.new_file import new_device
+from zwidth.device import new_device
 
 
 def poles_of(plant):

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from systems import mass, two_mass
 
-from zwidth.contact import Hand, Tremor
-from zwidth.contact.environments import wall
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import Hand, Tremor, simulate, wall
 from zwidth.errors import FeedbackError, MeasureError
 from zwidth.loop import (
     Butterworth,
@@ -22,8 +20,7 @@ from zwidth.loop import (
     Loop,
     OperatingPoint,
 )
-from zwidth.measures import felt_impedance, free_motion_mass, static_stiffness
-from zwidth.measures.felt import felt_chart
+from zwidth.measures import felt_chart, felt_impedance, free_motion_mass, static_stiffness
 from zwidth.measures.handle_impedance import free_impedance
 
 T = 0.001

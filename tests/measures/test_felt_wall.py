@@ -14,8 +14,7 @@ from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of
 from zwidth.chart import judge, largest_stiffness
 from zwidth.errors import HandleError
 from zwidth.loop import Controller, OperatingPoint
-from zwidth.measures import felt_impedance, static_stiffness
-from zwidth.measures.felt import felt_wall
+from zwidth.measures import felt_impedance, felt_wall, static_stiffness
 from zwidth.show import json_value
 
 WALL = (4000.0, 10.0)

@@ -13,8 +13,16 @@ from tests.systems import mass, published, two_mass
 from zwidth.chart import spectral_radius, stability_chart
 from zwidth.errors import MeasureError
 from zwidth.loop import Controller, FirstOrder, Loop, OperatingPoint, WindowedDifference
-from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, WantedWall, optimal_mass, structural_distortion
-from zwidth.measures.evaluation import evaluate
+from zwidth.measures import (
+    MEASURES,
+    NO_VALUE,
+    OK,
+    OUT_OF_REACH,
+    WantedWall,
+    evaluate,
+    optimal_mass,
+    structural_distortion,
+)
 from zwidth.model import Operator
 
 CLOSED = ("stiffness_max_closed_form", "damping_max_closed_form", "stable_area_closed_form")

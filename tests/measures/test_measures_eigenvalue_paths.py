@@ -10,8 +10,8 @@ from tests.systems import mass, published, random_loop, reference_transition_mat
 from zwidth.chart import stability_chart
 from zwidth.errors import NoAnswerError
 from zwidth.loop import Controller, Loop
-from zwidth.measures import loop_paths, wall_paths
-from zwidth.measures.root_paths import LONG, SHORT, eigenvalue_paths
+from zwidth.measures import eigenvalue_paths, loop_paths, wall_paths
+from zwidth.measures.root_paths import LONG, SHORT
 
 FEATURES = ("lag", "electrical", "estimator")
 

@@ -24,15 +24,14 @@ from zwidth.errors import HandleError
 from zwidth.loop import Butterworth, Controller, FirstOrder, Loop, WindowedDifference
 from zwidth.measures import (
     commanded_impedance,
+    felt_chart,
     felt_impedance,
     free_motion_impedance,
     free_motion_mass,
     static_stiffness,
     static_stiffness_limit,
 )
-from zwidth.measures.felt import felt_chart
-from zwidth.model import LaggedDamper, Plant
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.model import LaggedDamper, Plant, effective_parameters
 
 
 class SectionFilter:

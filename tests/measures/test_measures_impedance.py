@@ -8,8 +8,7 @@ import pytest
 from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.device.load import load
 from zwidth.loop import Loop
-from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, find_measure, impedance_range
-from zwidth.measures.evaluation import evaluate
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, evaluate, find_measure, impedance_range
 
 AT = np.array([[[0.0, 0.25, 0.0], [0.08, 0.2, 0.0]], [[-0.12, 0.22, 0.0], [0.9, 0.9, 0.0]]])
 SETTINGS = (

@@ -22,10 +22,8 @@ from tests.model.model_cases import KINDS, five_bar, some_postures
 from zwidth.device import from_document
 from zwidth.device.load import load
 from zwidth.errors import MeasureError
-from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, dexterity, find_measure
-from zwidth.measures.evaluation import evaluate
-from zwidth.model import GivenDamping, reduce_directions
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.measures import MEASURES, NO_VALUE, OK, OUT_OF_REACH, dexterity, evaluate, find_measure
+from zwidth.model import GivenDamping, effective_parameters, reduce_directions
 
 # Those that are about a wanted wall or force have tests of their own.
 TESTED_MEASURES = [

@@ -17,8 +17,8 @@ from zwidth.measures import (
     global_conditioning_index,
     global_isotropy_index,
     isotropy,
+    overall,
 )
-from zwidth.measures.workspace_statistics import overall
 
 NAN = float("nan")
 

@@ -15,8 +15,7 @@ from tests.systems import mass, two_mass
 from zwidth.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.loop import Controller, ForceSensor, Loop, OperatingPoint
-from zwidth.measures import static_stiffness, static_stiffness_limit
-from zwidth.measures.felt import felt_chart
+from zwidth.measures import felt_chart, static_stiffness, static_stiffness_limit
 from zwidth.measures.handle_impedance import static_stiffness_limit_kind
 from zwidth.model import Plant
 

@@ -25,6 +25,7 @@ from zwidth.model import (
     REVOLUTE,
     GivenDamping,
     ModalDamping,
+    effective_parameters,
     modes_in_general,
     natural_frequencies,
     reduce_mechanism,
@@ -32,7 +33,6 @@ from zwidth.model import (
     undamped_modes,
 )
 from zwidth.model.drive_side import drive_side
-from zwidth.model.effective_mass import effective_parameters
 
 AT = 2j * np.pi * np.array([3.0, 30.0, 300.0])
 

@@ -25,8 +25,7 @@ from tests.model.beam_devices import (
 from tests.model.bent_chains import with_bodies
 from tests.model.framed_devices import framed
 from zwidth.device import from_document
-from zwidth.model import assumed_modes, finite_elements, natural_frequencies, undamped_modes
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.model import assumed_modes, effective_parameters, finite_elements, natural_frequencies, undamped_modes
 
 CONVERGING = ("assumed-modes", "finite-elements")
 

@@ -13,11 +13,11 @@ from zwidth.model import (
     ModalDamping,
     ProportionalDamping,
     decompose,
+    effective_parameters,
     reduce_directions,
     reduce_mechanism,
     solve_posture,
 )
-from zwidth.model.effective_mass import effective_parameters
 
 MODELS = ("full", "two-mass", "motor-mass", "rigid")
 DAMPINGS = (ModalDamping(0.05), ProportionalDamping(0.7, 1e-4), GivenDamping())

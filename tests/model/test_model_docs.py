@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.model import OK, OUT_OF_REACH, Plant
-from zwidth.model.damping import modal_matrix
+from zwidth.model import OK, OUT_OF_REACH, Plant, modal_matrix
 
 PAGE = (Path(__file__).parents[2] / "docs" / "mechanism.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)

@@ -14,13 +14,13 @@ from zwidth.model import (
     ModalDamping,
     Plant,
     ProportionalDamping,
+    effective_parameters,
     natural_frequencies,
     plant_effective_parameters,
     reduce_mechanism,
     reduce_plant,
     solve_posture,
 )
-from zwidth.model.effective_mass import effective_parameters
 
 FIVE_PERCENT = ModalDamping(0.05)
 AVERAGE = (0.40, 0.65)

@@ -10,7 +10,7 @@ from tests.measured_cases import chirp, encoder_readings, sampled_response
 from zwidth.chart import measured_chart, stability_chart
 from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth, Controller, Loop
-from zwidth.model.raw_sweep import sweep_response
+from zwidth.model import sweep_response
 
 T = 0.001
 DEVICE = systems.two_mass(0.26, 0.025, 15000.0, 8.0)

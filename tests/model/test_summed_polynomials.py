@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from zwidth.errors import ResponseError
-from zwidth.model import sweep_response_of_blocks
-from zwidth.model.raw_sweep import block_length, sweep_response
+from zwidth.model import sweep_response, sweep_response_of_blocks
+from zwidth.model.raw_sweep import block_length
 
 PERIOD = 1e-3
 SAMPLES = 1 << 17

@@ -11,8 +11,7 @@ import pytest
 from tests.device.device_cases import ARM_FILE
 from zwidth.device import from_document
 from zwidth.errors import ArgumentError
-from zwidth.model import OK, RatioTable, modes_in_general, natural_frequencies
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.model import OK, RatioTable, effective_parameters, modes_in_general, natural_frequencies
 
 MEASURES = ("stiffness_max", "damping_max", "motor_side_mass", "rigid_mass", "stiffness", "peak_force")
 GRID = np.stack(np.meshgrid(np.linspace(0.05, 0.35, 5), np.linspace(-0.15, 0.3, 4)), axis=-1)

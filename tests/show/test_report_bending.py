@@ -11,8 +11,7 @@ import pytest
 
 import zwidth
 from tests.model.beam_devices import device, drive, five_bar, light_five_bar, link, planar_arm, spatial_arm, tube
-from zwidth.device import from_document
-from zwidth.device.new_file import new_device
+from zwidth.device import from_document, new_device
 from zwidth.show import gather, json_value, keys_of_moments, speaking_of_moments, typed
 from zwidth.show.report import bending as section
 from zwidth.show.report import report

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 import zwidth
 from tests.cli.command_runner import run_command
 from tests.undrawn_figures import listed_svg
-from zwidth.measures.felt import felt_chart
+from zwidth.measures import felt_chart
 from zwidth.show import caption_of_result, figure, save, write_caption
 from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts
 from zwidth.show.figures.style import text_width, wrapped

@@ -12,8 +12,7 @@ from tests.systems import mass, published
 from zwidth.chart import stability_chart
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop
-from zwidth.measures import commanded_impedance, felt_impedance, free_motion_impedance
-from zwidth.measures.felt import felt_chart
+from zwidth.measures import commanded_impedance, felt_chart, felt_impedance, free_motion_impedance
 from zwidth.show import figure
 from zwidth.show.figures.felt import draw_felt_chart, draw_impedance
 from zwidth.show.figures.sensitivity import draw_sensitivities

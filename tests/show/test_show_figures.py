@@ -20,8 +20,18 @@ from zwidth.device.load import load
 from zwidth.errors import OutputError
 from zwidth.loop import Controller, Loop
 from zwidth.model import Plant
-from zwidth.show import GREY, draw_chart, draw_decay_contours, draw_frequency, draw_models, figure, label, save
-from zwidth.show.figures.mechanism_motion import draw_chain, draw_mechanism
+from zwidth.show import (
+    GREY,
+    draw_chart,
+    draw_decay_contours,
+    draw_frequency,
+    draw_mechanism,
+    draw_models,
+    figure,
+    label,
+    save,
+)
+from zwidth.show.figures.mechanism_motion import draw_chain
 from zwidth.show.figures.stability import corners, edges_of, round_radii, tenfold_time
 from zwidth.show.figures.style import fitted_columns, inline_svg, number_logarithmic
 from zwidth.show.mechanism_scene import as_chain

@@ -12,7 +12,7 @@ from matplotlib import pyplot
 
 import zwidth
 from tests.model.beam_devices import slides
-from zwidth.device.new_file import new_device
+from zwidth.device import new_device
 from zwidth.measures import MISSING, OK, OUT_OF_REACH, STATUS
 from zwidth.model import PRISMATIC, Load
 from zwidth.show import MARKS, gather, keys_of_moments, load_path_figure, load_text, typed
@@ -21,7 +21,7 @@ from zwidth.show.figures.study import SYMBOLS
 from zwidth.show.load_text import balance_text, drive_rows, pushes_text
 from zwidth.show.report import load as section
 from zwidth.study import LoadPath
-from zwidth.study.load_path import PushedChart
+from zwidth.study.loaded_charts import PushedChart
 
 WEAK = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
 

@@ -7,8 +7,7 @@ import pytest
 
 from tests.show.show_cases import check_legends_lie_beside
 from tests.systems import published
-from zwidth.contact import ENVIRONMENTS, SOURCES
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import ENVIRONMENTS, SOURCES, simulate
 from zwidth.show import LONGEST_LINE, save
 from zwidth.show.figures.contact_response import binned_extremes, contact_figure, draw_contact, time_window
 from zwidth.show.units import energy_label

@@ -7,11 +7,10 @@ from matplotlib.cbook import STEP_LOOKUP_MAP
 
 from tests.study.study_cases import axis
 from tests.study.test_optimise import RATIO, TASK, problem_study
-from zwidth.device.new_file import new_device
+from zwidth.device import new_device
 from zwidth.show.figures.optimise import front_figure
 from zwidth.show.report.optimisation import sentences
-from zwidth.study import study_to_optimise
-from zwidth.study.optimisation.optimise import optimise
+from zwidth.study import optimise, study_to_optimise
 
 WALL = {"stiffness_N_per_m": 500.0, "damping_Ns_per_m": 1.0}
 AXES = [

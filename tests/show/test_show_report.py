@@ -16,9 +16,9 @@ from markupsafe import Markup
 from zwidth.device import from_document
 from zwidth.device.load import load
 from zwidth.errors import ChartError, OutOfReach
-from zwidth.show import gather, json_text
+from zwidth.show import gather, json_text, write_report
 from zwidth.show.report import facts as facts_module
-from zwidth.show.report.report import keep_units, page, write_report
+from zwidth.show.report.report import keep_units, page
 
 NO_STABLE_WALL = ["plant.damping_Ns_per_m=unset", "loop.delay_samples=1"]
 CASES = {

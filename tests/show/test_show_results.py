@@ -82,10 +82,10 @@ def function_results(point, single, arms):
     maps = zwidth.workspace_map(arms, "rigid_mass", plane_of(arms, cells=(15, 9)))
     designs = {"loop.sampling_period_s": [0.001, 0.0015], "loop.delay_samples": [0.0, 0.5, 1.0]}
     return {
-        "felt chart": zwidth.measures.felt(loop.chart()),
+        "felt chart": zwidth.measures.felt_chart(loop.chart()),
         "guarantee": zwidth.guarantees.spring_stable_region(single.loop),
         "validity": point.validity(),
-        "response": zwidth.contact.loop_simulation(
+        "response": zwidth.contact.simulate(
             loop, wall, wall.values(stiffness=1e3, damping=5.0), duration=0.2, start_position=1e-3
         ),
         "eigenvalue paths": zwidth.measures.wall_paths(loop, np.linspace(1e3, 1e5, 9), 5.0),

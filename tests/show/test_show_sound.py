@@ -12,8 +12,7 @@ import pytest
 
 from tests.cli.command_runner import document_of, run_command
 from tests.systems import published
-from zwidth.contact import ENVIRONMENTS
-from zwidth.contact.loop_simulation import simulate
+from zwidth.contact import ENVIRONMENTS, simulate
 from zwidth.errors import NoAnswerError, OutputError
 from zwidth.loop import Controller, Loop
 from zwidth.model import Plant

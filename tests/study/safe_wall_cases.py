@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from zwidth.chart.table_radii import radii_at_points
-from zwidth.device import from_document
-from zwidth.device.new_file import new_device
+from zwidth.device import from_document, new_device
 from zwidth.measures import OK
 
 

@@ -21,11 +21,10 @@ from tests.model.beam_devices import (
     with_beams,
     without_beams,
 )
-from zwidth.device import from_document
-from zwidth.device.new_file import new_device
+from zwidth.device import from_document, new_device
 from zwidth.errors import MissingNumbersError, OperatingPointError
 from zwidth.model import natural_frequencies
-from zwidth.study.bending import DAMPING, FIRST_ROOT, LEAST_SHARE, SHARE, THICKEST, WALL, with_rigid_links
+from zwidth.study.link_bending import DAMPING, FIRST_ROOT, LEAST_SHARE, SHARE, THICKEST, WALL, with_rigid_links
 
 E, RHO = 68.9e9, 2700.0  # of aluminium 6061 [Pa], [kg/m^3], as `zwidth.model.beam_section` has them
 RATIO, ROTOR = 15.0, 1.2e-6  # of `drive`

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from zwidth.chart import spectral_radii, spectral_radius
-from zwidth.device import from_document
+from zwidth.device import from_document, new_device
 from zwidth.device.load import load
-from zwidth.device.new_file import new_device
 from zwidth.loop import CHAINED
 from zwidth.study import Family, FamilyMember, Range, robust_study
 from zwidth.study.robust import family as robust_family

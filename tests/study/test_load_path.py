@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.device.new_file import new_device
+from zwidth.device import new_device
 from zwidth.errors import NoMechanismError
 from zwidth.measures import fastest_sideways_motion
 from zwidth.model import Load
 from zwidth.study import load_path
-from zwidth.study.load_path import without_push
+from zwidth.study.loaded_charts import without_push
 
 LIMITS = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
 

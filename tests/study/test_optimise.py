@@ -12,6 +12,7 @@ from zwidth.study import (
     Judge,
     gradients,
     neighbours,
+    optimise,
     problem_of,
     run,
     share_of,
@@ -19,7 +20,6 @@ from zwidth.study import (
     study_to_optimise,
     values_at,
 )
-from zwidth.study.optimisation.optimise import optimise
 
 TWO_MASS = "published-two-mass"
 LINKS = [

@@ -7,7 +7,7 @@ import pytest
 
 from tests.study.study_cases import axis
 from tests.study.test_optimise import LENGTH, RATIO, TASK, judged, problem_study
-from zwidth.study.optimisation.optimise import optimise
+from zwidth.study import optimise
 
 DRAWN = 100_000
 REACHES = (0.01, 0.1, 0.5)  # of the bounds, to both sides

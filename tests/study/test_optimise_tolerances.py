@@ -8,8 +8,7 @@ from zwidth.device import OPERATORS, bundled_names
 from zwidth.errors import DeviceError
 from zwidth.show import percent
 from zwidth.show.report.optimisation import sentences
-from zwidth.study import Judge, member_changes, problem_of, run, study_of, values_at
-from zwidth.study.optimisation.optimise import optimise
+from zwidth.study import Judge, member_changes, optimise, problem_of, run, study_of, values_at
 
 MASS = {"key": "plant.mass_kg", "distribution": "uniform", "plus_minus_percent": 5}
 PERIOD = {"key": "loop.sampling_period_s", "distribution": "uniform", "plus_minus": 1e-5}

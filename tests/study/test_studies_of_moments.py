@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 import zwidth
 from tests.cli.command_runner import document_of, run_command
 from tests.undrawn_figures import leave_undrawn
-from zwidth.device.new_file import new_device
+from zwidth.device import new_device
 from zwidth.measures import MEASURES
 from zwidth.model import Load
 from zwidth.study import sweep

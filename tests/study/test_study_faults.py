@@ -16,7 +16,7 @@ from tests.study.study_cases import (
     study,
     study_document,
 )
-from zwidth.device.new_file import new_device
+from zwidth.device import new_device
 from zwidth.errors import DeviceError, TooLarge
 from zwidth.study import read_study, study_of
 

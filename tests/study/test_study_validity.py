@@ -10,7 +10,8 @@ from zwidth.chart import BoundaryArc, stability_chart
 from zwidth.device import from_document
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop
-from zwidth.study.model_validity import edge_distance, validity
+from zwidth.study import validity
+from zwidth.study.model_validity import edge_distance
 
 K_E, M1, M2 = 15620.0, 0.2616, 0.0254
 

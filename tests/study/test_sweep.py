@@ -23,9 +23,8 @@ from zwidth.device import Device
 from zwidth.device.load import load
 from zwidth.errors import MeasureError
 from zwidth.loop import OperatingPoint
-from zwidth.measures import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, WantedWall
-from zwidth.measures.evaluation import evaluate
-from zwidth.model.effective_mass import effective_parameters
+from zwidth.measures import FAILED, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, WantedWall, evaluate
+from zwidth.model import effective_parameters
 from zwidth.study import (
     Store,
     Sweep,

@@ -11,9 +11,9 @@ from zwidth.errors import MeasureError, NoValueError
 from zwidth.loop import OperatingPoint
 from zwidth.measures import MEASURES, NO_VALUE, OK, Measure
 from zwidth.model import solve_posture
-from zwidth.study import extreme_over_directions, parse_requirement
+from zwidth.study import extreme_over_directions, parse_requirement, share_of_directions
 from zwidth.study.designs.column import Requirement
-from zwidth.study.workspace.extreme_direction import share_measure, share_of_directions, sphere
+from zwidth.study.workspace.extreme_direction import share_measure, sphere
 
 KINDS = {"planar": random_five_bar, "arm": spatial_arm, "loop": spatial_loop}
 

@@ -284,7 +284,7 @@ def test_kernels_of_a_table_and_of_a_module_that_a_function_imports_count_as_exe
 
 
 def test_the_function_of_an_environment_counts_where_its_parameters_are_asked_for():
-    from zwidth.contact.environments.surface_patterns import friction_patch, texture
+    from zwidth.contact import friction_patch, texture
 
     record, seen = ExecutionRecord(), set()
     record.swap(seen)

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model
     from zwidth.progress import Progress
-    from zwidth.study.bending import Bending
-    from zwidth.study.load_path import LoadPath
+    from zwidth.study.link_bending import Bending
+    from zwidth.study.loaded_charts import LoadPath
     from zwidth.study.sensitivity.result import Sensitivities
 
 

@@ -49,7 +49,7 @@ KINDS: Final[dict[str, Kind]] = {
     for kind in (
         Kind("stiffness", "stiffness.identify"),
         Kind("friction", "joint.friction"),
-        Kind("mass", "joint.mass"),
+        Kind("mass", "joint.friction"),
         Kind("response", "response.identify"),
         Kind("modes", "modes.identify", takes_point=True),
         Kind("impedance", "impedance.identify", takes_point=True),

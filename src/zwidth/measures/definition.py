@@ -14,7 +14,6 @@ from importlib import import_module
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from zwidth.arrays import Floats
 from zwidth.measures.unit_text import unit_of_moments
 from zwidth.result import Result
 
@@ -22,11 +21,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from zwidth.arrays import Floats
     from zwidth.loop.operating_point import OperatingPoint
-
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

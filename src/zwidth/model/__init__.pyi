@@ -9,6 +9,7 @@ from .continuation import OUT_OF_REACH as OUT_OF_REACH
 from .damping import GivenDamping as GivenDamping
 from .damping import ModalDamping as ModalDamping
 from .damping import ProportionalDamping as ProportionalDamping
+from .damping import modal_matrix as modal_matrix
 from .effective_mass import effective_parameters as effective_parameters
 from .flexible_body import FlexibleBody as FlexibleBody
 from .flexible_body import clamped_frequencies as clamped_frequencies

@@ -15,6 +15,7 @@ from .figures.load_path import load_path_figure as load_path_figure
 from .figures.map import MARKS as MARKS
 from .figures.map import draw_map as draw_map
 from .figures.map import map_figure as map_figure
+from .figures.mechanism_motion import draw_mechanism as draw_mechanism
 from .figures.mechanism_motion import draw_mechanism_motion as draw_mechanism_motion
 from .figures.mechanism_motion import mechanism_motion_figure as mechanism_motion_figure
 from .figures.stability import draw_chart as draw_chart
@@ -36,6 +37,7 @@ from .output import csv_text as csv_text
 from .output import json_text as json_text
 from .output import json_value as json_value
 from .report.facts import gather as gather
+from .report.report import write_report as write_report
 from .safe_walls_header import HEADER_NAME as HEADER_NAME
 from .safe_walls_header import header_text as header_text
 from .units import amount as amount

@@ -14,7 +14,7 @@ from zwidth.show.units import SPACE, amount, as_written, percent, quantity, seco
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
     from zwidth.model.equilibrium import Equilibrium
-    from zwidth.study.load_path import LoadPath
+    from zwidth.study.loaded_charts import LoadPath
 
 ROUNDING: Final = 1e-9  # share of a stiffness, or of the hand's force across the direction, that is
 UNCHANGED: Final = 5e-7  # share of a stiffness that its four digits do not show

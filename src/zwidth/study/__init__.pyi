@@ -1,5 +1,3 @@
-from .bending import Bending as Bending
-from .bending import bending as bending
 from .boundary.experiment import measure_boundary as measure_boundary
 from .boundary.measured_boundary import Experiment as Experiment
 from .boundary.measured_boundary import MeasuredPoint as MeasuredPoint
@@ -33,8 +31,10 @@ from .jobs.series import JobSeries as JobSeries
 from .jobs.store import FolderLock as FolderLock
 from .jobs.store import Store as Store
 from .jobs.workers import pack_job as pack_job
-from .load_path import LoadPath as LoadPath
-from .load_path import load_path as load_path
+from .link_bending import Bending as Bending
+from .link_bending import bending as bending
+from .loaded_charts import LoadPath as LoadPath
+from .loaded_charts import load_path as load_path
 from .model_validity import Validity as Validity
 from .model_validity import validity as validity
 from .optimisation.evaluation import Judge as Judge
@@ -80,6 +80,7 @@ from .wall_tables.safe_walls import safe_walls as safe_walls
 from .wall_tables.table import SafeWalls as SafeWalls
 from .workspace.common_area import common_area as common_area
 from .workspace.extreme_direction import extreme_over_directions as extreme_over_directions
+from .workspace.extreme_direction import share_of_directions as share_of_directions
 from .workspace.map import map_document as map_document
 from .workspace.map import map_job as map_job
 from .workspace.map import map_table as map_table

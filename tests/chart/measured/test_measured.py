@@ -16,8 +16,7 @@ from zwidth.chart import MeasuredLoop, eigenvalues, measured_chart, stability_ch
 from zwidth.chart.measured.boundary import coarse_angles, nyquist_count, sample_boundary
 from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth, CentralDifference, Controller, LeastSquaresSlope, Loop, SavitzkyGolay
-from zwidth.model import Plant, Response, integrators_of
-from zwidth.model.raw_sweep import sweep_response
+from zwidth.model import Plant, Response, integrators_of, sweep_response
 
 DAMPED = (0.01, 0.05, 0.3, 1.0, 1.5)
 # Of the first random loops: one to four masses, late by part of a sample, by whole samples and not at all.

@@ -14,8 +14,7 @@ from tests.study_sizes import study_size
 from zwidth.chart import eigenvalues, measured_chart, stability_chart
 from zwidth.errors import ResponseError
 from zwidth.loop import Butterworth, Controller, Loop
-from zwidth.model import Plant, integrators_of
-from zwidth.model.raw_sweep import sweep_response
+from zwidth.model import Plant, integrators_of, sweep_response
 from zwidth.model.response import joint_radius
 
 CLAIMED = 0.95

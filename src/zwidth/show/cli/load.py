@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from zwidth.device.device import Device
-    from zwidth.study.load_path import LoadPath, PushedChart
+    from zwidth.study.loaded_charts import LoadPath, PushedChart
 
 
 def _check_push(ctx: click.Context, param: click.Parameter, push: float) -> float:
@@ -152,7 +152,7 @@ def _of_push(case: CommandLine) -> tuple[str, ...]:
 
 def _unpushed(case: CommandLine) -> Device:
     """The device with what is kept of its load."""
-    from zwidth.study.load_path import without_push
+    from zwidth.study.loaded_charts import without_push
 
     kept = without_push(case.device.load)
     return _bare(case) if kept is None else case.device.under(kept)

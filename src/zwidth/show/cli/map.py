@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import click
-import numpy as np
 
 from zwidth.measures.catalogue import MEASURES
 from zwidth.measures.definition import OK, STATUS, WANTED_NUMBERS, WantedNumber
@@ -388,6 +387,8 @@ def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
 
 
 def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    import numpy as np
+
     values, status = dataset[name].values, dataset[f"{name}_status"].values
     unit, better = str(dataset[name].attrs.get("unit", "")), dataset[name].attrs["better"]
     if (status == OK).any():
@@ -408,7 +409,7 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
 
 
 def _amount(value: float, unit: str) -> str:
-    return "infinite" if value == np.inf else amount(value, unit.replace("N s", "Ns"))
+    return "infinite" if value == math.inf else amount(value, unit.replace("N s", "Ns"))
 
 
 def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:

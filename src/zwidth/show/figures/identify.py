@@ -18,7 +18,6 @@ Torque over angle of a drive's transmission, measured and fitted.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from itertools import pairwise
 from typing import Any, Final
 
@@ -47,19 +46,13 @@ from zwidth.show.figures.style import (
 )
 from zwidth.show.units import quantity
 
-DRAWN_AS: Final = {"mass": "friction"}  # one fit finds both
-
 
 def draw_identification(ax: Axes, result: Identification) -> None:
     """One identification into axes; where nothing was fitted the reason."""
     if result.reason is not None:
         draw_empty(ax, "nothing was fitted")
         return
-    kind = DRAWN_AS.get(result.kind, result.kind)
-    draw: Callable[[Axes, Identification], None] = getattr(
-        import_module(f"zwidth.show.figures.identify_{kind}"), f"draw_{kind}"
-    )
-    draw(ax, result)
+    DRAWINGS[result.kind](ax, result)
 
 
 def identification_figure(result: Identification, width: float = 5.6, height: float = 3.9) -> Figure:
@@ -380,3 +373,16 @@ def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], mine: np.ndarray, text
         ax.plot(
             angle[first:behind], torque[first:behind], color=BLACK, linewidth=0.9, label="" if number else text
         )
+
+
+# Kind of identification -> the function that draws it.
+DRAWINGS: Final[dict[str, Callable[[Axes, Any], None]]] = {
+    "arm": draw_arm,
+    "boundary": draw_boundary,
+    "friction": draw_friction,
+    "impedance": draw_impedance,
+    "mass": draw_friction,  # one fit finds both
+    "modes": draw_modes,
+    "response": draw_response,
+    "stiffness": draw_stiffness,
+}

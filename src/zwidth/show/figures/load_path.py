@@ -29,7 +29,7 @@ from zwidth.show.figures.style import (
     legend_above,
 )
 from zwidth.show.units import as_written, quantity, spoken_unit
-from zwidth.study.load_path import LoadPath, PushedChart
+from zwidth.study.loaded_charts import LoadPath, PushedChart
 
 # From blue over black to vermilion: the farther from no push the lighter, either side in its own colour.
 COLOURS: Final = LinearSegmentedColormap.from_list(

@@ -7,7 +7,7 @@ from math import inf, isfinite, isnan
 from zwidth.show.report.facts import Facts
 from zwidth.show.report.sentences import hertz, join_words
 from zwidth.show.units import NONE, SPACE, as_written, percent, quantity, speaking_of_moments
-from zwidth.study.bending import DAMPING, Bending, BendingNumbers
+from zwidth.study.link_bending import DAMPING, Bending, BendingNumbers
 
 Row = tuple[str, ...]
 

@@ -18,8 +18,8 @@ from zwidth.measures.felt import FeltChart, felt_chart
 from zwidth.model.effective_mass import EffectiveParameters
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
-from zwidth.study.bending import Bending, bending
-from zwidth.study.load_path import PUSH, LoadPath, load_path
+from zwidth.study.link_bending import Bending, bending
+from zwidth.study.loaded_charts import PUSH, LoadPath, load_path
 from zwidth.study.model_validity import Validity, validity
 from zwidth.study.sensitivity.result import Sensitivities
 from zwidth.study.sensitivity.sensitivities import sensitivities

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -56,9 +56,6 @@ from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling, settings
 from zwidth.study.designs.study import KEYS, Study, as_key
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
-
-if TYPE_CHECKING:
-    pass
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
 Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
