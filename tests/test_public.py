@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +126,34 @@ def test_the_lines_of_the_contract():
     assert maps["rigid_mass"].shape == (4, 5)
     mass = zwidth.Plant.one_mass(mass=0.03, damping=1.0)
     assert zwidth.Loop(mass, sampling_period=0.001).chart().stiffness_max == pytest.approx(21942.75, abs=0.01)
+
+
+# --- the page on what changed since 0.2 --------------------------------------------------------------
+
+CHANGES = (Path(__file__).parents[1] / "docs" / "from-0.2.md").read_text(encoding="utf-8")
+
+
+def test_names_that_the_page_says_are_gone_are_gone_and_what_stands_instead_is_there():
+    rows = re.findall(r"^\| (`.*?) \| (`.*?) \|$", CHANGES, re.MULTILINE)
+    assert len(rows) > 15
+    for before, now in rows:
+        for old in re.findall(r"`(?:zwidth\.)?(\w+)`", before):
+            assert not hasattr(zwidth.errors, old)
+            assert old not in zwidth.__all__
+        for name in re.findall(r"`(zwidth(?:\.\w+)+)", now):
+            assert attrgetter(name.removeprefix("zwidth."))(zwidth) is not None
+        for kind in re.findall(r"^`(\w+(?:Error))`", now):
+            assert issubclass(getattr(zwidth.errors, kind), zwidth.ZwidthError)
+
+
+def test_every_error_of_zwidth_is_below_one_root_and_in_one_file():
+    kind = re.compile(r"^class ([A-Z]\w*)\((?:\w+, )*(?:Exception|\w*Error)\)", re.MULTILINE)
+    sources = Path(zwidth.__file__).parent
+    found = {
+        str(path.relative_to(sources)): names
+        for path in sources.rglob("*.py")
+        if (names := kind.findall(path.read_text("utf-8")))
+    }
+    assert all(issubclass(getattr(zwidth.errors, name), zwidth.ZwidthError) for name in found.pop("errors.py"))
+    # what the command line and the workbench say to themselves
+    assert found == {"show/cli/errors.py": ["BadInput", "UnfinishedRun"], "show/app/worker.py": ["ComputeLost"]}

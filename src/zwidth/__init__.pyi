@@ -2,6 +2,7 @@ from . import chart as chart
 from . import conditions as conditions
 from . import contact as contact
 from . import device as device
+from . import errors as errors
 from . import guarantees as guarantees
 from . import identify as identify
 from . import loop as loop

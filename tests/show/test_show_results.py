@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 
 import zwidth
 from tests.identify.spring_bench import bench_record
+from tests.public_names import public_names
 from zwidth.result import Result
 from zwidth.show import json_value
 from zwidth.show.figures.plots import DRAWINGS
@@ -121,7 +122,7 @@ STAGES = """
 # Plain values, arrays, and a few numbers by name, such as the rows of a result; datasets show themselves.
 NUMBERS = """
     Any Self None bool int float str complex dict list tuple Iterator Callable NDArray np bool_ complex128 float64
-    Floats Complex Complexes ArrayLike Mapping Sequence xr Dataset Axes Rectangle
+    Floats Complexes Flags Ints ArrayLike Mapping Sequence xr Dataset Axes Rectangle
     Peak FastestDecay EffectiveParameters ImpedanceRange OptimalMass Overall Judgement Bound LimitCycle Variant
 """
 
@@ -302,10 +303,10 @@ def _subclasses(kind):
 
 def _return_annotations():
     """(name, annotation) of every public function, and of every public method of a public class."""
-    packages = [zwidth, *(getattr(zwidth, name) for name in PACKAGES)]
-    for package in packages:
-        for name in package.__all__:
-            thing = getattr(package, name)
+    faces = [("", zwidth), *((name, getattr(zwidth, name)) for name in PACKAGES)]
+    for package, face in faces:
+        for name in public_names(package):
+            thing = getattr(face, name)
             if inspect.isfunction(thing):
                 yield name, str(thing.__annotations__.get("return", "missing"))
             elif inspect.isclass(thing):
