@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table
 from zwidth.show import State, pack_frame
-from zwidth.show.app.layers import view
+from zwidth.show.app.layers import page_view
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import Wall
 
@@ -158,7 +158,7 @@ def cases() -> Cases:
         return state.model_copy(update={"settings": {PATH: 0.4 + 1e-6 * next(values)}})
 
     def answer(asked: State) -> float:
-        return float(len(pack_frame(*view(opened, asked, ("chart", "scene")))))
+        return float(len(pack_frame(*page_view(opened, asked, ("chart", "scene")))))
 
     return {"a view of a drag": TimedCase(answer, one)}
 

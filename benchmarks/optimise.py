@@ -37,8 +37,8 @@ from zwidth.study import (
     study_of,
     values_at,
 )
-from zwidth.study import run as run_job
-from zwidth.study.optimisation.evaluation import Judgement
+from zwidth.study import run_job as run_job
+from zwidth.study.optimisation.evaluation import DesignJudgement
 from zwidth.study.optimisation.problem import Problem
 
 BUDGET, SEEDS, WORKERS = 4000, 3, 2
@@ -86,13 +86,13 @@ def study(budget: int, seed: int) -> Study:
     return study_of(document, bounds=True)
 
 
-def judged(problem: Problem, shares: np.ndarray) -> Judgement:
+def judged(problem: Problem, shares: np.ndarray) -> DesignJudgement:
     """Designs judged as one batch."""
     judge = Judge(problem)
     return judge.judge(run_job(judge.job(values_at(problem.variables, shares)), workers=WORKERS))
 
 
-def kept_costs(problem: Problem, judgement: Judgement) -> np.ndarray:
+def kept_costs(problem: Problem, judgement: DesignJudgement) -> np.ndarray:
     """Costs of the designs that keep the demands."""
     return judgement.costs(problem)[~judgement.violations(problem).any(axis=1)]
 

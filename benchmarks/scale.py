@@ -33,7 +33,7 @@ from benchmarks._cases import Cases, TimedCase, run
 from benchmarks._timing import machine, print_table, seconds, verdict
 from tests.study.cluster_cases import running_cluster
 from zwidth.study import Store, open_executor, pack_job, study_of, sweep_job
-from zwidth.study import run as run_job
+from zwidth.study import run_job as run_job
 from zwidth.study.jobs.executor import Executor
 from zwidth.study.jobs.workers import PackedJob
 

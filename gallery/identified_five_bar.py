@@ -98,12 +98,12 @@ def chart() -> StabilityChart:
 
 def draw(figure: Any) -> None:
     """Deflections of both drives, and the boundary with the fitted chart."""
-    from zwidth.show.figures.identify import draw_boundary, draw_stiffness
+    from zwidth.show.figures.identify import draw_boundary, draw_identified_stiffness
 
     upper, lower = figure.subplots(2, 1, height_ratios=(1.0, 1.1))
     both = stiffnesses()
     curves = {name: np.concatenate([one.curves[name] for one in both]) for name in both[0].curves}
-    draw_stiffness(upper, replace(both[0], curves=curves))
+    draw_identified_stiffness(upper, replace(both[0], curves=curves))
     draw_boundary(lower, damping())
 
 

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from tests.model.joints_apart import FOURTH, Joints, travel, travel_rates
 from zwidth.contact.mechanism.motion_kernel import ready
 from zwidth.contact.mechanism.stepping import accelerate, configure
-from zwidth.contact.mechanism.system import memory_of, system_of
+from zwidth.contact.mechanism.system import motion_memory, system_of
 from zwidth.loop import Butterworth
 from zwidth.model import BALL_Z, GivenDamping, attach, pack, reduce_mechanism
 from zwidth.model.effective_mass import screw
@@ -300,7 +300,7 @@ class SimulatedDevice(LoadedDevice):
         plant = replace(plant, nonlinear=replace(nonlinear, friction=()))
         self.mech = pack(m)
         self.system = system_of(self.mech, m.drives, plant, self.gravity, self.lag)
-        self.memory = memory_of(self.system)
+        self.memory = motion_memory(self.system)
         self.base = np.concatenate(
             [self.q[m.drives.joint], (self.q[m.drives.joint] + self.at.deflections)[self.flexible]]
         )

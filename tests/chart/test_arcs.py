@@ -8,7 +8,7 @@ import shapely
 from scipy.optimize import brentq
 
 from tests.systems import published, random_loop
-from zwidth.chart import Box, TracedEdge, Tracer, trace_curves
+from zwidth.chart import TracedEdge, Tracer, WallBox, trace_curves
 from zwidth.chart.arcs import CHORD, DAMPING, MINUS, PAIR, PLUS, SLOPE, STIFFNESS, Arc, Arcs, cut_at_holes
 from zwidth.chart.area import find_peak, largest_damping, quadrant_area, stiffest_index
 from zwidth.chart.loop_edge import trace_edge
@@ -194,7 +194,7 @@ def branch_of_one_direction(loop, edge):
     p = loop.plant
     plant = MultiPlant(p.mass, p.damping, p.stiffness, p.actuator[None], p.sensor[None])
     walls = np.vstack(edge.outlines)
-    box = Box(walls.min(axis=0) * (loop.period, 1.0), walls.max(axis=0) * (loop.period, 1.0))
+    box = WallBox(walls.min(axis=0) * (loop.period, 1.0), walls.max(axis=0) * (loop.period, 1.0))
     with np.errstate(all="ignore"):  # walls at infinity are data
         _, curves = trace_curves(MultiLoop(plant, loop.controller)).within(box.with_margin(0.1), 1e-5)
     return [Branch(curve, np.ptp(walls, axis=0)) for curve in curves if curve.kind == PAIR]

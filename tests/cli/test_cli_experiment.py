@@ -16,7 +16,7 @@ from tests.cli.command_runner import TWO_MASS, document_of, refusal_lines, run_c
 from tests.interruption import stopped_by_ctrl_c
 from tests.systems import published
 from zwidth.contact import StableExtent
-from zwidth.show.cli.experiment import point_rows, sentences, warning
+from zwidth.show.cli.experiment import experiment_sentences, experiment_warning, point_rows
 from zwidth.study import Experiment, MeasuredPoint, Plan
 
 FEW = ("--stiffnesses", 2, "--tips", 1)
@@ -148,21 +148,23 @@ EDGES = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
 
 def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
     doubtful = experiment_of(*EDGES, point(5e3, 5.0, "tip", 4e3, True))
-    far = dict(sentences(doubtful))
+    far = dict(experiment_sentences(doubtful))
     assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 Ns/m")
     assert "measured 5.000 kN/m, exact 4.000 kN/m, more is stable" in far["difference"]
     assert far["stiffest"].endswith(", unsure")
     assert far["unsure"].startswith("at 1 tip the verdict changes more than once")
     assert "--trials" in far["unsure"]
     assert [p["unsure"] for p in doubtful.document()["points"]] == [False, False, True]
-    near = dict(sentences(experiment_of(*EDGES, point(4.001e3, 5.0, "tip", 4e3))))
+    near = dict(experiment_sentences(experiment_of(*EDGES, point(4.001e3, 5.0, "tip", 4e3))))
     assert near["difference"].startswith("farthest from the exact linear edge is the lower one")
     assert "unsure" not in near
 
 
 def test_edges_that_are_unsure_are_marked_as_tips_are():
     doubtful = experiment_of(EDGES[0], point(2e3, 11.0, "upper", 11.0, True), point(4e3, 5.0, "tip", 4e3))
-    assert dict(sentences(doubtful))["unsure"].startswith("at 1 edge the verdict changes more than once")
+    assert dict(experiment_sentences(doubtful))["unsure"].startswith(
+        "at 1 edge the verdict changes more than once"
+    )
     assert [row[-1] for row in point_rows(doubtful)[1]] == ["", "unsure", ""]
 
 
@@ -180,14 +182,14 @@ def test_edges_that_are_unsure_are_marked_as_tips_are():
 )
 def test_an_edge_beyond_a_tip_is_warned_of(tips, says):
     """At 2 kN/m walls from 1 to 11 N s/m were stable: no tip between them is softer, nor is the stiffest tip."""
-    text = warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips)))
+    text = experiment_warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips)))
     assert text.startswith("an edge lies beyond a tip")
     assert says in text
 
 
 @pytest.mark.parametrize("tips", [[(4000.0, 5.0)], [(1500.0, 12.0), (4000.0, 5.0)], []])
 def test_tips_beyond_all_edges_or_beside_them_contradict_nothing(tips):
-    assert warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips))) is None
+    assert experiment_warning(experiment_of(*EDGES, *(point(K, B, "tip", K) for K, B in tips))) is None
 
 
 def test_subjects_and_trials_give_bars(folder, rough_search):

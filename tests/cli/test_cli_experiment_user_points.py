@@ -15,7 +15,7 @@ from zwidth.chart import stability_chart
 from zwidth.contact import StableExtent
 from zwidth.errors import FileError
 from zwidth.show import ErrorBarPoint, amount, draw_experiment, figure
-from zwidth.show.cli.experiment import sentences
+from zwidth.show.cli.experiment import experiment_sentences
 from zwidth.study import Experiment, Plan, compare_points, read_points
 
 HEAD = "stiffness_N_per_m,damping_Ns_per_m,edge,verdict\n"
@@ -45,7 +45,7 @@ def points_report(tmp_path, text, drawn=True):
     own = compare_points(exact, read_points(str(tmp_path / "own.csv")))
     run = Experiment(Plan(), StableExtent(7e3, 10.0, 25.0, True), (), 0, (None,), exact, (), 0, own)
     document = run.document()
-    rows = list(sentences(run))
+    rows = list(experiment_sentences(run))
     first = [label for label, _ in rows].index("your points")
     return document, "; ".join(text for _, text in rows[first:])
 

@@ -32,7 +32,7 @@ front = 4
         pytest.param("zwidth.study.jobs.store:Store.begin", 2, marks=pytest.mark.slow),  # a store without a batch
         pytest.param("zwidth.study.jobs.store:Store.write_batch", 3, marks=pytest.mark.slow),
         ("zwidth.study.optimisation.polish:gradients", 1),
-        ("zwidth.study.optimisation.optimisation:simulate_contact", 1),  # after all that is kept
+        ("zwidth.study.optimisation.optimisation:simulate_front_contact", 1),  # after all that is kept
     ],
 )
 def test_a_killed_run_goes_on_and_ends_with_the_same_numbers(tmp_path, monkeypatch, place, calls):

@@ -15,7 +15,7 @@ from contact.mechanism_cases import (
 )
 from scipy.signal import lfilter
 
-from zwidth.contact import normal, simulate, wall
+from zwidth.contact import normal_number, simulate, wall
 from zwidth.contact.computer import (
     arrived_command,
     clip,
@@ -153,7 +153,7 @@ def test_noise_of_one_seed_is_the_same_in_both():
     arms = with_friction(with_drives(planar_chain(2), encoder_counts=np.nan), encoder_noise=1e-6)
     seed, sigma, u = 2**40 + 7, 1e-6 / 18.6, np.array([0.6, 0.8, 0.0])
     motion = motion_of(arms, GivenDamping(), sampled_controller(PERIOD), duration=0.05, seed=seed)
-    draws = np.array([[normal(np.uint64(seed), j, i) for i in range(2)] for j in range(51)])
+    draws = np.array([[normal_number(np.uint64(seed), j, i) for i in range(2)] for j in range(51)])
     posture = solve_posture(arms, arms.reference_position)
     off = motion.counted_position - motion.position
     assert off == pytest.approx(sigma * draws @ posture.jacobian.T, rel=1e-5, abs=1e-12)

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from zwidth.contact.vibration_kernel import exponential, held_response, multiply
+from zwidth.contact.vibration_kernel import exponential, held_vibration_response, multiply
 
 
 def random_plant_matrix(rng, n):
@@ -46,7 +46,7 @@ def test_it_is_exact_with_its_integral_and_what_an_input_leaves(seed):
     expected = reference_exponential(A, b, time)
     assert relative_difference(E, expected[0]) < 2e-14
     assert relative_difference(G, expected[1]) < 2e-14
-    E, gain = held_response(A, b, time)
+    E, gain = held_vibration_response(A, b, time)
     assert relative_difference(E, expected[0]) < 2e-14
     assert relative_difference(gain, expected[2]) < 2e-13
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from contact.touch_cases import in_python, random_loop, random_touch, same_bits
 
-from zwidth.contact import OUTPUTS, Hand, normal, one_sided_wall, simulate, touch, touch_obstacle, wall
+from zwidth.contact import OUTPUTS, Hand, normal_number, one_sided_wall, simulate, touch, touch_obstacle, wall
 from zwidth.contact.touch_step import FREE, ONE_SIDED, touch_numbers
 from zwidth.loop import Controller, FirstOrder, Loop
 from zwidth.model import Operator, Plant
@@ -43,7 +43,7 @@ def test_kernel_is_simulation_to_the_bit(seed, frictions):
     loop, operator, start, device, ports, _ = random_touch(np.random.default_rng([seed, frictions]), frictions)
     counters = loop.plant.nonlinear.counters
     channels = [c if each.channel is None else each.channel for c, each in enumerate(counters)]
-    normals = np.array([[normal(np.uint64(SEED), j, c) for c in channels] for j in range(S)])
+    normals = np.array([[normal_number(np.uint64(SEED), j, c) for c in channels] for j in range(S)])
     drawn = device.noise * normals
     mine, _ = in_python(device, ports, drawn.ravel(), S)
     kinds = [{}, {"trail": False, "ledger": False}] if frictions else [{}]

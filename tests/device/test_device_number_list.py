@@ -50,7 +50,7 @@ def test_every_number_of_a_file_is_listed_or_left_out_for_a_reason(name):
     device = any_device(name)
     listed = {one.path: one for one in numbers_of(name)}
     assert len(listed) == len(numbers_of(name))  # none twice
-    for steps, value in address.numbers(device.document):
+    for steps, value in address.number_paths(device.document):
         path = address.dotted(steps, device.document)
         assert (path in listed) != bool(unchangeable(steps))
         if path in listed:

@@ -13,7 +13,7 @@ from zwidth.device import from_document
 from zwidth.errors import DeviceError
 from zwidth.identify import Parameters, base_parameters, check_sampling, identify_arm, record_of
 from zwidth.identify.arm import COLUMNS
-from zwidth.identify.arm.checks import channels_of
+from zwidth.identify.arm.checks import drive_channels_of
 from zwidth.identify.arm.smoothing import choose_band
 from zwidth.identify.arm.stretches import TorqueTiming, smoothed
 
@@ -320,7 +320,7 @@ def test_records_are_smoothed_in_pieces_as_at_once(period, monkeypatch):
     columns = {name: np.delete(values, slice(40, 50)) for name, values in columns.items()}
     record = record_of(columns, COLUMNS)
     sampling = check_sampling(record)[0]
-    channels = channels_of(device, record, "joint")
+    channels = drive_channels_of(device, record, "joint")
     band = choose_band([channels.coordinates(columns)], [sampling])
     assert (band.coarse > 1) == (period < 0.001)
     whole = list(smoothed(record, 0, sampling, channels, band, TorqueTiming()))

@@ -14,7 +14,7 @@ from zwidth.device.load import load
 from zwidth.errors import NoAnswerError
 from zwidth.identify import Estimate, identify_arm, read_record
 from zwidth.identify.arm import COLUMNS, ArmIdentification
-from zwidth.identify.arm.checks import Channels, Survey, sign_check, velocity_check
+from zwidth.identify.arm.checks import DriveChannels, MotionSurvey, sign_check, velocity_check
 from zwidth.identify.arm.smoothing import Kernel
 
 PENDULUM = """name = "pendulum"
@@ -83,14 +83,16 @@ def surveyed(seed):
     for i in np.flatnonzero(rng.random(6000) < rng.uniform(0.05, 0.25))[1:]:
         q[i] = q[i - 1]
     rows = {"time_s": time, "angle_rad.rod": q, "velocity_rad_per_s.rod": v}
-    return Survey(rows, q[:, None], q[:, None])
+    return MotionSurvey(rows, q[:, None], q[:, None])
 
 
 def velocity_of(survey, factor=1.0):
     kernel = Kernel(12.0, 1.2 / 12.0)
-    channels = Channels(("angle_rad.rod",), ("torque_Nm.rod",), ("velocity_rad_per_s.rod",), np.eye(1), np.eye(1))
+    channels = DriveChannels(
+        ("angle_rad.rod",), ("torque_Nm.rod",), ("velocity_rad_per_s.rod",), np.eye(1), np.eye(1)
+    )
     rows = survey.rows | {"velocity_rad_per_s.rod": factor * survey.rows["velocity_rad_per_s.rod"]}
-    survey = Survey(rows, survey.coordinates, survey.forces)
+    survey = MotionSurvey(rows, survey.coordinates, survey.forces)
     return velocity_check(("motor",), channels, survey, kernel.taps(0.002, 1), kernel.taps(0.002))
 
 

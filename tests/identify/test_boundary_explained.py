@@ -7,8 +7,8 @@ import pytest
 
 from tests.identify.boundary_cases import measured, random_device, record
 from zwidth.device import address
-from zwidth.identify import BoundaryModel, BoundaryParameters, fit_boundary, read_points
-from zwidth.identify.boundary.checks import PERIOD, check_explained, check_magnitudes, check_period
+from zwidth.identify import BoundaryModel, BoundaryParameters, fit_boundary, read_boundary_points
+from zwidth.identify.boundary.checks import PERIOD, check_explained, check_file_period, check_magnitudes
 
 DELAY = "loop.delay_samples"
 FEWEST = 12  # points on the boundary, of which a device is taken
@@ -36,7 +36,7 @@ def verdict(seed, folder, other):
     elif other == "device":
         model, _ = random_device(rng, folder)
     start = model.with_({DELAY: address.get(model.document, DELAY) * 10.0 ** rng.uniform(-0.1, 0.1)})
-    parameters, points = BoundaryParameters.of(start, start.at(), [DELAY]), read_points([record(columns)])
+    parameters, points = BoundaryParameters.of(start, start.at(), [DELAY]), read_boundary_points([record(columns)])
     sizes = check_magnitudes(points, parameters.edge(parameters.start))
     if not sizes.passed:
         return REFUSED
@@ -44,7 +44,7 @@ def verdict(seed, folder, other):
     fit = fit_boundary(model, parameters, profiled=False)
     check = check_explained(model, fit)
     assert check.passed or "model lacks something" in check.reason or "no value of the numbers" in check.reason
-    checks = [check, *check_period(model, fit)]
+    checks = [check, *check_file_period(model, fit)]
     if any(not one.passed and not one.warning for one in checks):
         return REFUSED
     return ACCEPTED if all(one.passed for one in checks) else WARNED

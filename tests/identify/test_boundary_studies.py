@@ -10,7 +10,13 @@ from tests.identify.boundary_cases import measured, random_device, record, toml
 from zwidth.chart import EdgeChords
 from zwidth.device import address
 from zwidth.errors import ChartError
-from zwidth.identify import BoundaryModel, BoundaryParameters, fit_boundary, identify_boundary, read_points
+from zwidth.identify import (
+    BoundaryModel,
+    BoundaryParameters,
+    fit_boundary,
+    identify_boundary,
+    read_boundary_points,
+)
 from zwidth.study import Plan, measure_boundary
 
 PATHS = (
@@ -29,7 +35,7 @@ def outcomes(seeds, folder):
         rng = np.random.default_rng([20, seed])
         device, chords = random_device(rng, folder)
         columns = measured(rng, chords, 10.0 ** rng.uniform(-3.0, -1.7), frequency=0.005 * (seed % 2))
-        points = read_points([record(columns)])
+        points = read_boundary_points([record(columns)])
         if points.on_edge.sum() < FEWEST:
             continue
         true = {path: address.get(device.document, path) for path in PATHS[seed % 4]}

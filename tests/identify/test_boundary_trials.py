@@ -10,7 +10,7 @@ from tests.identify.boundary_cases import record
 from zwidth.contact import StabilityTrial
 from zwidth.contact.stability_trial import LEVELS, LONGER
 from zwidth.errors import ArgumentError
-from zwidth.identify import identify_boundary, read_points
+from zwidth.identify import identify_boundary, read_boundary_points
 from zwidth.identify.boundary.checks import check_circumstances
 from zwidth.identify.boundary.trials import TrialPlan
 from zwidth.study import Plan, measure_boundary
@@ -25,7 +25,7 @@ def rough():
 
 
 def points(**more):
-    return read_points(
+    return read_boundary_points(
         [
             record(
                 {

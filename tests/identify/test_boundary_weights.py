@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.identify.boundary_cases import measured, random_device, record
-from zwidth.identify import BoundaryModel, fit_boundary, fit_least_squares, read_points
+from zwidth.identify import BoundaryModel, fit_boundary, fit_least_squares, read_boundary_points
 from zwidth.identify.boundary.model import Deviations, relative_scatter
 from zwidth.identify.boundary.points import TIP
 
@@ -27,7 +27,7 @@ def columns(**more):
 
 
 def relative(**more):
-    return relative_scatter(read_points([record(columns(**more))]))
+    return relative_scatter(read_boundary_points([record(columns(**more))]))
 
 
 def test_points_without_ends_weigh_alike():
@@ -58,7 +58,7 @@ def test_joined_chords_are_crossed_where_the_edge_is(seed, tmp_path):
     rng = np.random.default_rng([20, seed])
     _, chords = random_device(rng, tmp_path)
     exact = measured(rng, chords, 0.0)
-    points = read_points([record(exact)])
+    points = read_boundary_points([record(exact)])
     for edge in COUNTS:
         some = points[points.of(edge)]
         at, _ = chords.thinned(4).crossings(some.chosen, some.bisected, edge)
@@ -96,7 +96,7 @@ class LinearModel(BoundaryModel):
 def shares_inside(seeds):
     """Share of intervals that hold the number 0, over random rates and scatters of three kinds of points."""
     own = SimpleNamespace(lower=np.array([-np.inf]), upper=np.array([np.inf]), start=np.zeros(1))
-    points = read_points([record(columns(frequency_Hz=np.linspace(20.0, 90.0, 24)))])
+    points = read_boundary_points([record(columns(frequency_Hz=np.linspace(20.0, 90.0, 24)))])
     unit = np.append(np.where(points.kind == TIP, 5.0, 0.01), np.full(24, 0.3))
     inside = []
     for seed in seeds:

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from zwidth.identify.impedance.local_spectra import correlations, local_spectra, merged, neighbours, segment_length
+from zwidth.identify.impedance.local_spectra import (
+    correlations,
+    local_spectra,
+    merged_sums,
+    neighbouring_lines,
+    sums_segment_length,
+)
 
 PERIOD = 0.001
 NAMES = ("force", "position")
@@ -51,7 +57,7 @@ def test_the_error_of_a_response_of_noise_is_as_large_and_as_correlated_as_is_sa
     for apart, expected in enumerate(correlations()):
         shared = np.mean(error[: len(error) - apart] * np.conj(error[apart:])).real
         assert shared / np.mean(np.abs(error) ** 2) == pytest.approx(expected, abs=0.04)
-    assert 1.0 < neighbours() < 3.0
+    assert 1.0 < neighbouring_lines() < 3.0
 
 
 def test_a_record_in_pieces_is_summed_as_at_once_and_none_across_a_gap(drifting):
@@ -68,10 +74,10 @@ def test_a_record_in_pieces_is_summed_as_at_once_and_none_across_a_gap(drifting)
         NAMES,
     )
     assert gap.segments == 5 + 5
-    assert merged([gap, whole]).segments == 21
+    assert merged_sums([gap, whole]).segments == 21
 
 
 def test_segments_are_a_third_of_a_record_unless_they_are_given():
-    assert 3 * segment_length(10_000) + 6 <= 10_000 < 3.4 * segment_length(10_000)
-    assert segment_length(10_000, 512) == 512
-    assert segment_length(100, 512) == 100
+    assert 3 * sums_segment_length(10_000) + 6 <= 10_000 < 3.4 * sums_segment_length(10_000)
+    assert sums_segment_length(10_000, 512) == 512
+    assert sums_segment_length(100, 512) == 100

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from zwidth.identify.modes.overview import averaged_spectra, merged, segment_length
+from zwidth.identify.modes.overview import averaged_spectra, merged_spectra, segment_length
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_no_segment_reaches_across_a_gap(signals):
     u, y = signals
     both = [{"force": u[part], "position": y[part]} for part in (slice(0, 900), slice(1000, 1900))]
     found = averaged_spectra(both, 1e-3, 256, {"force": 0, "position": 0})
-    apart = merged(
+    apart = merged_spectra(
         [averaged_spectra([part], 1e-3, 256, {"force": 0, "position": 0}) for part in both],
     )
     assert found.segments == apart.segments == 2 * (1 + (900 - 256) // 128)

@@ -11,8 +11,8 @@ from scipy.sparse.linalg import spsolve
 from zwidth.model import BeamProperties
 from zwidth.model.beam_section import (
     TYPICAL_MATERIALS,
+    CrossSection,
     Material,
-    Section,
     beam_properties,
     rectangle,
     rectangular_tube,
@@ -138,7 +138,7 @@ def test_torsion_is_never_stiffer_than_of_a_round_section():
 
 
 def test_beams_of_sections_and_materials():
-    section, material = Section(1e-4, 2e-9, 3e-9, 4e-9), Material(1e11, 4e10, 2000.0)
+    section, material = CrossSection(1e-4, 2e-9, 3e-9, 4e-9), Material(1e11, 4e10, 2000.0)
     beam = beam_properties(0.3, section, material)
     numbers = (beam.length, beam.EI_y, beam.EI_z, beam.GJ, beam.EA)
     assert numbers == pytest.approx((0.3, 200.0, 300.0, 160.0, 1e7), rel=1e-14)
@@ -167,8 +167,11 @@ def with_number(place, value):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Section(0.0, 1.0, 1.0, 1.0), "area must be .* greater than 0 .*, got 0; a beam needs a section"),
-        (lambda: Section(1.0, 1.0, -1.0, 1.0), "second_moment_z must be .* got -1"),
+        (
+            lambda: CrossSection(0.0, 1.0, 1.0, 1.0),
+            "area must be .* greater than 0 .*, got 0; a beam needs a section",
+        ),
+        (lambda: CrossSection(1.0, 1.0, -1.0, 1.0), "second_moment_z must be .* got -1"),
         (lambda: round_rod(0.0), r"diameter must be a finite number greater than 0 \[m\], got 0"),
         (lambda: round_rod(float("nan")), "diameter must be .* got nan"),
         (lambda: round_rod("10 mm"), "diameter must be .* got the text '10 mm'"),

@@ -9,7 +9,7 @@ from tests.study.study_cases import axis
 from tests.study.test_optimise import RATIO, TASK, problem_study
 from zwidth.device import new_device
 from zwidth.show.figures.optimise import front_figure
-from zwidth.show.report.optimisation import sentences
+from zwidth.show.report.optimisation import optimisation_sentences
 from zwidth.study import optimise, study_to_optimise
 
 WALL = {"stiffness_N_per_m": 500.0, "damping_Ns_per_m": 1.0}
@@ -50,7 +50,7 @@ SAME = "a grid twice as fine gives the same values"
 
 
 def said(*axes, **study):
-    found = sentences(optimise(problem_study(*axes, budget=24, **study), workers=1))
+    found = optimisation_sentences(optimise(problem_study(*axes, budget=24, **study), workers=1))
     return [sentence for sentence in found if "twice as fine" in sentence]
 
 

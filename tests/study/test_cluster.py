@@ -16,7 +16,7 @@ from tests.study.cluster_cases import running_cluster
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
 from zwidth.errors import CannotStart, ClusterEnded, ClusterError
 from zwidth.measures import FAILED, OUT_OF_TIME
-from zwidth.study import RecoveredWarning, Store, open_executor, pack_job, run
+from zwidth.study import RecoveredWarning, Store, open_executor, pack_job, run_job
 from zwidth.study.jobs import cluster as clusters
 from zwidth.study.jobs import workers
 
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::Depr
 
 def test_a_local_cluster_gives_the_same_bits_and_says_how_far_it_is():
     told = []
-    found = run(RootsJob(60), None, lambda *now: told.append(now), 2, batch=7, cluster="local", stage="roots")
+    found = run_job(RootsJob(60), None, lambda *now: told.append(now), 2, batch=7, cluster="local", stage="roots")
     assert same_cells(found, RootsJob(60).compute(0, 60))
     assert (told[0], told[-1]) == (("roots", 0, 60), ("roots", 60, 60))
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
@@ -35,14 +35,14 @@ def test_cells_that_raise_kill_or_never_end_are_data_as_on_one_computer(monkeypa
     monkeypatch.setattr("zwidth.study.jobs.workers.LOADING", 1.0)
     job = FaultyJob(24, raising=(3,), killing=(12,), endless=(20,), starter=os.getpid())
     with pytest.warns(RecoveredWarning, match="SIGKILL"):
-        found = run(job, workers=2, batch=8, cluster="local", time_limit=0.5)
+        found = run_job(job, workers=2, batch=8, cluster="local", time_limit=0.5)
     assert same_but_for(found, RootsJob(24).compute(0, 24), [3, 12, 20])
     assert found.status[[3, 12, 20], 0].tolist() == [FAILED, FAILED, OUT_OF_TIME]
 
 
 def test_one_cluster_serves_many_jobs_with_one_thread_for_each():
     with open_executor(1, "local") as executor:
-        found = [run(ProcessNumbersJob(8 + n), executor=executor).values for n in range(3)]
+        found = [run_job(ProcessNumbersJob(8 + n), executor=executor).values for n in range(3)]
     assert len({process for values in found for process in values[:, 0]}) == 1
     assert {threads for values in found for threads in values[:, 1]} == {1.0}
     with pytest.raises(ProcessLookupError):
@@ -57,7 +57,7 @@ def test_a_killed_worker_is_told_and_its_batch_done_again():
                 os.killpg(cluster.workers[0].pid, signal.SIGKILL)
 
         with pytest.warns(RecoveredWarning, match=r"^the worker at tcp://\S+ left the cluster; what it"):
-            found = run(RootsJob(150, seconds=0.02), None, progress, batch=5, cluster=cluster.address)
+            found = run_job(RootsJob(150, seconds=0.02), None, progress, batch=5, cluster=cluster.address)
         assert same_cells(found, RootsJob(150).compute(0, 150))
 
 
@@ -71,9 +71,9 @@ def test_a_killed_scheduler_ends_the_run_and_the_store_goes_on(tmp_path):
 
         # whether the lost connection or the missing answer is noticed first, the processor's load decides
         with pytest.raises(ClusterEnded, match=r"the scheduler at tcp://127\.0\.0\.1:.* has (ended|not answered)"):
-            run(job, Store(path, job), progress, batch=5, cluster=cluster.address)
+            run_job(job, Store(path, job), progress, batch=5, cluster=cluster.address)
     again = RootsJob(100)
-    assert same_cells(run(again, Store(path, again), workers=1), RootsJob(100).compute(0, 100))
+    assert same_cells(run_job(again, Store(path, again), workers=1), RootsJob(100).compute(0, 100))
     assert again.computed_ranges[0] >= (30, 35)
 
 
@@ -91,7 +91,7 @@ def test_what_dask_raises_of_a_lost_connection_ends_the_run_as_a_scheduler_that_
 
     monkeypatch.setattr(distributed.Client, "submit", lost_later)
     with pytest.raises(ClusterEnded, match=r"has ended$"):
-        run(RootsJob(100), batch=5, cluster="local")
+        run_job(RootsJob(100), batch=5, cluster="local")
 
 
 def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
@@ -101,13 +101,13 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
         silent.bind(("127.0.0.1", 0))
         port = silent.getsockname()[1]
         with pytest.raises(ClusterError, match=rf"^tcp://127.0.0.1:{port}: no scheduler answers within 1 s;"):
-            run(RootsJob(3), cluster=f"tcp://127.0.0.1:{port}")
+            run_job(RootsJob(3), cluster=f"tcp://127.0.0.1:{port}")
         silent.listen()
         with pytest.raises(ClusterError, match=rf"^tcp://127.0.0.1:{port}: no scheduler answers within 1 s;"):
-            run(RootsJob(3), cluster=f"tcp://127.0.0.1:{port}")
+            run_job(RootsJob(3), cluster=f"tcp://127.0.0.1:{port}")
     for wrong in ("nowhere", "hugo://here:1"):
         with pytest.raises(ClusterError, match=rf"^{wrong}: is no address \(.*\); start one"):
-            run(RootsJob(3), cluster=wrong)
+            run_job(RootsJob(3), cluster=wrong)
 
 
 def test_a_cluster_without_workers_and_workers_that_differ_are_refused(monkeypatch, tmp_path):
@@ -120,14 +120,14 @@ def test_a_cluster_without_workers_and_workers_that_differ_are_refused(monkeypat
     (older / "_version.py").write_text("__version__ = '0.0.1'")
     with running_cluster(0) as cluster:
         with pytest.raises(ClusterError, match=r"has no workers; start one on each computer: dask worker tcp://"):
-            run(RootsJob(3), cluster=cluster.address)
+            run_job(RootsJob(3), cluster=cluster.address)
         for folder, said in (
             (missing, r"has no zwidth; install zwidth \S+ there, in the Python that runs dask worker"),
             (older.parent, r"has zwidth 0\.0\.1 instead of \S+; results would not be the same: install the same"),
         ):
             worker = cluster.start_worker("--no-nanny", path=[str(folder), *sys.path])
             with pytest.raises(ClusterError, match=rf"^the worker at tcp://\S+ {said}"):
-                run(RootsJob(3), cluster=cluster.address)
+                run_job(RootsJob(3), cluster=cluster.address)
             os.killpg(worker.pid, signal.SIGKILL)
             worker.wait()
 
@@ -135,7 +135,7 @@ def test_a_cluster_without_workers_and_workers_that_differ_are_refused(monkeypat
 def test_without_dask_there_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ClusterError, match=r"^a cluster needs dask.distributed; install it: pip"):
-        run(RootsJob(3), cluster="local")
+        run_job(RootsJob(3), cluster="local")
 
 
 def test_a_cluster_at_an_address_has_its_own_workers():
@@ -183,7 +183,7 @@ def test_a_scheduler_that_falls_silent_ends_the_run(monkeypatch):
                 os.killpg(cluster.scheduler.pid, signal.SIGSTOP)
 
         with pytest.raises(ClusterEnded, match=r"^the scheduler at tcp://127\S+ has not answered for 1 s$"):
-            run(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)
+            run_job(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)
 
 
 def test_a_cluster_that_loses_all_its_workers_ends_the_run(monkeypatch):
@@ -195,4 +195,4 @@ def test_a_cluster_that_loses_all_its_workers_ends_the_run(monkeypatch):
                 os.killpg(cluster.workers[0].pid, signal.SIGKILL)
 
         with pytest.raises(ClusterEnded, match=r"^the scheduler at tcp://127\S+ has had no worker for 1\.5 s$"):
-            run(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)
+            run_job(RootsJob(400, seconds=0.01), None, progress, batch=5, cluster=cluster.address)

@@ -22,7 +22,7 @@ from tests.study.executor_cases import (
 )
 from zwidth.errors import MeasureError, TooLarge
 from zwidth.measures import FAILED, MISSING, NO_VALUE, Note
-from zwidth.study import Store, pack_job, run
+from zwidth.study import Store, pack_job, run_job
 from zwidth.study.jobs import executor
 from zwidth.study.jobs.executor import batch_size
 from zwidth.study.jobs.job import MORE, merge_notes
@@ -32,7 +32,7 @@ NO_PATIENCE = -1.0  # patience that is over at once
 
 
 def test_the_cells_are_those_of_the_job():
-    found = run(RootsJob(100), workers=1)
+    found = run_job(RootsJob(100), workers=1)
     n = np.arange(100.0)
     assert np.array_equal(found.values[:, 0], np.where(n % 7 == 0, np.nan, np.sqrt(n)), equal_nan=True)
     assert not (found.status == MISSING).any()
@@ -41,7 +41,7 @@ def test_the_cells_are_those_of_the_job():
 
 @pytest.mark.parametrize("batch", [1, 3, 99, 100, 1000, None])
 def test_batches_of_any_size_give_the_same(batch):
-    assert same_cells(run(RootsJob(100), workers=1, batch=batch), RootsJob(100).compute(0, 100))
+    assert same_cells(run_job(RootsJob(100), workers=1, batch=batch), RootsJob(100).compute(0, 100))
 
 
 @pytest.mark.parametrize(("seconds", "expected"), [(1e-5, 62_500 // 4), (1e-3, 244), (0.2, 1), (30.0, 1)])
@@ -63,7 +63,9 @@ def test_a_batch_takes_a_quarter_of_a_second_whatever_the_first_cells_load(secon
 
 def test_processes_give_the_same_and_say_how_far_they_are(capfd):
     told = []
-    found = run(RootsJob(60), None, lambda *now: told.append(now), 2, batch=7, patience=NO_PATIENCE, stage="roots")
+    found = run_job(
+        RootsJob(60), None, lambda *now: told.append(now), 2, batch=7, patience=NO_PATIENCE, stage="roots"
+    )
     assert same_cells(found, RootsJob(60).compute(0, 60))
     assert told[0] == ("roots", 0, 60)
     assert told[-1] == ("roots", 60, 60)
@@ -73,23 +75,23 @@ def test_processes_give_the_same_and_say_how_far_they_are(capfd):
 
 def test_processes_take_over_once_the_rest_takes_long():
     job = ProcessNumbersJob(40, seconds=0.01)
-    found = run(job, workers=2, batch=5, patience=0.1)
+    found = run_job(job, workers=2, batch=5, patience=0.1)
     mine = found.values[:, 0] == os.getpid()
     assert mine[:10].all()
     assert not mine[10:].any()
     assert 1 <= len(set(found.values[10:, 0])) <= 2
     assert (found.values[10:, 1] == 1.0).all(), "one thread in each process"
-    quick = run(ProcessNumbersJob(40), workers=2, batch=5)
+    quick = run_job(ProcessNumbersJob(40), workers=2, batch=5)
     assert (quick.values[:, 0] == os.getpid()).all()
 
 
 def test_what_a_job_raises_in_a_process_is_raised(capfd):
     with pytest.raises(MeasureError, match="cannot be asked"):
-        run(FailingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
+        run_job(FailingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
     out, err = capfd.readouterr()
     assert out == 2 * "talkative\n", "what this one prints, before they start"
     assert "Traceback" not in err
-    found = run(PrintingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
+    found = run_job(PrintingJob(40), workers=2, batch=5, patience=NO_PATIENCE)
     assert same_cells(found, RootsJob(40).compute(0, 40)), "what they print does not get between their replies"
     assert capfd.readouterr().err.count("talkative") == 6
 
@@ -99,7 +101,7 @@ def test_what_another_process_would_not_understand_stays_here():
         pass
 
     assert pack_job(Local(40)) is None
-    found = run(Local(40), workers=2, batch=5, patience=NO_PATIENCE)
+    found = run_job(Local(40), workers=2, batch=5, patience=NO_PATIENCE)
     assert (found.values[:, 0] == os.getpid()).all()
     Local.__module__, Local.__qualname__ = "__main__", "Local"
     assert pack_job(Local(40)) is None
@@ -168,7 +170,7 @@ def test_what_does_not_fit_into_memory_is_refused_with_its_size():
     with pytest.raises(
         TooLarge, match=r"10000000000000 cells of 2 measures would take 3\.6e\+05 GB of memory, .* ask"
     ):
-        run(job)
+        run_job(job)
     assert job.computed_ranges == []
 
 
@@ -178,11 +180,11 @@ def test_notes_are_the_same_in_any_order_and_not_endless():
     assert told == merge_notes(notes[::-1])
     assert len(told) == 101
     assert told[-1] == Note(FAILED, MORE, 50, (100,))
-    assert same_cells(run(NotedJob(150), workers=1, batch=4), run(NotedJob(150), workers=1, batch=150))
+    assert same_cells(run_job(NotedJob(150), workers=1, batch=4), run_job(NotedJob(150), workers=1, batch=150))
 
 
 def test_an_empty_job_has_no_cells():
-    assert run(RootsJob(0)).values.shape == (0, 2)
+    assert run_job(RootsJob(0)).values.shape == (0, 2)
 
 
 def test_there_is_a_core():

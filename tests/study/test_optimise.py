@@ -11,10 +11,10 @@ from zwidth.measures import OK, OUT_OF_REACH
 from zwidth.study import (
     Judge,
     gradients,
-    neighbours,
+    neighbouring_designs,
     optimise,
     problem_of,
-    run,
+    run_job,
     share_of,
     study_of,
     study_to_optimise,
@@ -45,7 +45,7 @@ def problem_study(*axes, objectives, task=None, **more):
 
 def judged(study, shares):
     judge = Judge(problem_of(study))
-    return judge.judge(run(judge.job(values_at(study.sampling.axes, shares)), workers=1))
+    return judge.judge(run_job(judge.job(values_at(study.sampling.axes, shares)), workers=1))
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_derivatives_of_the_polish_are_those_of_the_sensitivities():
     axes, free = study.sampling.axes, np.arange(2)
     own = [device.document["mechanism"]["drives"][0]["motor_inertia_kg_m2"], 0.00125]
     shares = np.array([share_of(one, value) for one, value in zip(axes, own, strict=True)])
-    here, around = judged(study, shares[None]).values[0], judged(study, neighbours(shares, free)).values
+    here, around = judged(study, shares[None]).values[0], judged(study, neighbouring_designs(shares, free)).values
     slopes = gradients(shares, free, here, around)[0]
     known = {one.path: one.logarithmic for one in device.sensitivities().numbers}
     for one, slope, value in zip(axes, slopes, own, strict=True):

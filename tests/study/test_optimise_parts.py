@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from zwidth.study import Axis, gradients, hypervolume, neighbours, settle, share_of, values_at
+from zwidth.study import Axis, gradients, hypervolume, neighbouring_designs, settle, share_of, values_at
 from zwidth.study.optimisation.evaluation import margins
 from zwidth.study.optimisation.optimisation import knee, spread_out, undominated
 from zwidth.study.optimisation.search import continuous, value_at
@@ -90,7 +90,7 @@ def test_derivatives_are_of_the_second_order_inside_and_at_the_bounds():
 
     for _ in range(20):
         x = random.choice([0.0, 1.0, 0.3, 5e-5, 1.0 - 5e-5], 4)
-        slope = gradients(x, free, values(x[None])[0], values(neighbours(x, free)))
+        slope = gradients(x, free, values(x[None])[0], values(neighbouring_designs(x, free)))
         e = np.exp(x @ [0.5, 0.0, 1.0, -2.0])
         exact = np.array([[0.5 * e, e, -2.0 * e], [0.0, 3.0 * np.cos(3.0 * x[2]), 0.0]])
         np.testing.assert_allclose(slope, exact, atol=3e-7)

@@ -7,8 +7,8 @@ from tests.study.study_cases import axis, study_document
 from zwidth.device import OPERATORS, bundled_names
 from zwidth.errors import DeviceError
 from zwidth.show import percent
-from zwidth.show.report.optimisation import sentences
-from zwidth.study import Judge, member_changes, optimise, problem_of, run, study_of, values_at
+from zwidth.show.report.optimisation import optimisation_sentences
+from zwidth.study import Judge, member_changes, optimise, problem_of, run_job, study_of, values_at
 
 MASS = {"key": "plant.mass_kg", "distribution": "uniform", "plus_minus_percent": 5}
 PERIOD = {"key": "loop.sampling_period_s", "distribution": "uniform", "plus_minus": 1e-5}
@@ -38,7 +38,7 @@ def test_bars_are_those_of_the_closed_form():
     expected = np.quantile(STIFFEST * m / T**2, [0.05, 0.95])
     np.testing.assert_allclose([found.bars.low[0, 0], found.bars.high[0, 0]], expected, rtol=1e-9)
     assert found.bars.kept.tolist() == [1.0]
-    assert "64 devices were drawn within the tolerances of the best design found" in sentences(found)
+    assert "64 devices were drawn within the tolerances of the best design found" in optimisation_sentences(found)
     assert found.values[0, 0] == pytest.approx(STIFFEST * 0.3 / 1e-6, rel=1e-9)
 
 
@@ -51,7 +51,7 @@ def test_the_share_that_keeps_a_demand_is_that_of_the_closed_form():
     assert 0.2 < found.bars.kept[0] < 0.8
     share = percent(found.bars.kept[0])
     said = f"{share} of 64 devices within the tolerances of the best design found keep all demands"
-    assert said in sentences(found)
+    assert said in optimisation_sentences(found)
 
 
 def test_a_design_is_judged_by_the_worst_of_those_that_are_drawn():
@@ -59,14 +59,14 @@ def test_a_design_is_judged_by_the_worst_of_those_that_are_drawn():
     problem = problem_of(study)
     judge, shares = Judge(problem), np.array([[0.0], [0.4], [1.0]])
     designs = values_at(problem.variables, shares)
-    judged = judge.judge(run(judge.job(designs), workers=1))
+    judged = judge.judge(run_job(judge.job(designs), workers=1))
     changes = member_changes(problem.tolerances, 8, problem.seed)
     for n, (mass,) in enumerate(designs):
         m, T = changes.of({"plant.mass_kg": mass, "loop.sampling_period_s": 0.001}).T
         worst = min(STIFFEST * mass / 1e-6, float((STIFFEST * m / T**2).min()))
         assert judged.values[n, 0] == pytest.approx(worst, rel=1e-9)
     alone = Judge(problem, 0)
-    as_it_is = alone.judge(run(alone.job(designs), workers=1))
+    as_it_is = alone.judge(run_job(alone.job(designs), workers=1))
     assert (as_it_is.values > judged.values).all()
 
 
@@ -76,13 +76,13 @@ def test_operators_and_produced_devices_are_combined():
     document["set"] = ["plant.damping_Ns_per_m=0.0", "loop.sampling_period_s=0.001"]
     problem = problem_of(study_of(document, bounds=True))
     judge = Judge(problem)
-    judged = judge.judge(run(judge.job([(0.1,)]), workers=1))
+    judged = judge.judge(run_job(judge.job([(0.1,)]), workers=1))
     assert judged.cells.shape == (1, 1, 2 * 4)
     each = []
     for name in document["task"]["operators"]:
         single = problem_of(study_of(document | {"task": {"operators": [name]}}, bounds=True))
         judge = Judge(single)
-        each.append(judge.judge(run(judge.job([(0.1,)]), workers=1)).cells.ravel())
+        each.append(judge.judge(run_job(judge.job([(0.1,)]), workers=1)).cells.ravel())
     assert np.array_equal(judged.cells.ravel(), np.concatenate(each))
 
 

@@ -16,7 +16,7 @@ from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import FaultyJob, ProcessNumbersJob, RootsJob, same_but_for, same_cells
 from zwidth.errors import CannotStart, MeasureError, OutOfTime, WorkerLost
 from zwidth.measures import FAILED, OUT_OF_TIME
-from zwidth.study import RecoveredWarning, Store, open_executor, pack_job, run
+from zwidth.study import RecoveredWarning, Store, open_executor, pack_job, run_job
 from zwidth.study.jobs import workers
 from zwidth.study.jobs.workers import WorkerProcess, compute_range
 
@@ -31,7 +31,7 @@ def place(request):
 
 
 def test_a_cell_that_raises_fails_alone(place):
-    found = run(FaultyJob(40, raising=(3, 12, 13)), batch=5, **place)
+    found = run_job(FaultyJob(40, raising=(3, 12, 13)), batch=5, **place)
     assert same_but_for(found, TRUE_CELLS, [3, 12, 13])
     assert (found.status[[3, 12, 13]] == FAILED).all()
     assert np.isnan(found.values[[3, 12, 13]]).all()
@@ -42,7 +42,7 @@ def test_a_cell_that_raises_fails_alone(place):
 
 def test_cells_that_fail_do_not_depend_on_the_batches(place):
     job = FaultyJob(40, raising=(0, 7, 39))
-    assert same_cells(run(job, batch=7, **place), run(job, batch=40, workers=1))
+    assert same_cells(run_job(job, batch=7, **place), run_job(job, batch=40, workers=1))
 
 
 @dataclass
@@ -59,12 +59,12 @@ class WrongJob(RootsJob):
 
 def test_a_fault_that_every_cell_meets_is_raised(place, tmp_path):
     with pytest.raises(TypeError, match="a fault of the program"):
-        run(WrongJob(200), batch=20, **place)
+        run_job(WrongJob(200), batch=20, **place)
     job = WrongJob(200)
     with pytest.raises(TypeError):
-        run(job, Store(tmp_path / "cells", job), batch=20, **place)
+        run_job(job, Store(tmp_path / "cells", job), batch=20, **place)
     assert list(Store(tmp_path / "cells", job).stored_batches()) == [], "it is no result"
-    assert (run(WrongJob(200, right=1), batch=20, workers=1).status == FAILED).sum() == 2 * 199
+    assert (run_job(WrongJob(200, right=1), batch=20, workers=1).status == FAILED).sum() == 2 * 199
 
 
 def test_what_a_job_says_of_all_cells_ends_the_run_at_once():
@@ -83,7 +83,7 @@ def test_a_killed_process_is_replaced_and_told(tmp_path):
     """Killed once, from outside: nothing is lost."""
     job = FaultyJob(40, killing=(12,), starter=os.getpid(), once=str(tmp_path / "killed"))
     with pytest.warns(RecoveredWarning) as told:
-        found = run(job, workers=2, batch=5, patience=NO_PATIENCE)
+        found = run_job(job, workers=2, batch=5, patience=NO_PATIENCE)
     assert same_cells(found, TRUE_CELLS)
     (said,) = told
     assert str(said.message) == (
@@ -95,33 +95,33 @@ def test_a_killed_process_is_replaced_and_told(tmp_path):
 def test_a_cell_that_kills_every_process_fails_alone(tmp_path):
     job, path = FaultyJob(40, killing=(12,), starter=os.getpid()), tmp_path / "cells"
     with pytest.warns(RecoveredWarning) as told:
-        found = run(job, Store(path, job), workers=2, batch=5, patience=NO_PATIENCE)
+        found = run_job(job, Store(path, job), workers=2, batch=5, patience=NO_PATIENCE)
     assert str(told[-1].message).endswith("; number 12 is left out")
     assert same_but_for(found, TRUE_CELLS, [12])
     assert (found.status[12] == FAILED).all()
     assert found.notes[1][0].reason.endswith("was killed (SIGKILL), perhaps for lack of memory, 3 times")
-    assert same_cells(run(job, Store(path, job), workers=1), found), "kept"
+    assert same_cells(run_job(job, Store(path, job), workers=1), found), "kept"
 
 
 def test_where_every_cell_kills_its_process_the_run_ends(monkeypatch):
     monkeypatch.setattr("zwidth.study.jobs.executor.ENOUGH", 1)
     job = FaultyJob(2, killing=(0, 1))
     with pytest.warns(RecoveredWarning), pytest.raises(WorkerLost, match="SIGKILL"), open_executor(1) as executor:
-        run(job, executor=executor)
+        run_job(job, executor=executor)
 
 
 def test_a_cell_that_never_ends_is_out_of_time_and_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("zwidth.study.jobs.workers.LOADING", 1.0)
     job, path = FaultyJob(16, endless=(9,), starter=os.getpid()), tmp_path / "cells"
-    found = run(job, Store(path, job), workers=2, batch=8, time_limit=0.5)
+    found = run_job(job, Store(path, job), workers=2, batch=8, time_limit=0.5)
     truth = RootsJob(16).compute(0, 16)
     assert same_but_for(found, truth, [9])
     assert (found.status[9] == OUT_OF_TIME).all()
     assert found.notes[1][0].reason == "took longer than 0.5 s"
     # it is not tried again under the same limit, but under a longer one, or none
-    assert same_cells(run(job, Store(path, job), workers=2, time_limit=0.5), found)
+    assert same_cells(run_job(job, Store(path, job), workers=2, time_limit=0.5), found)
     mended = RootsJob(16)
-    assert same_cells(run(mended, Store(path, mended), workers=1), truth)
+    assert same_cells(run_job(mended, Store(path, mended), workers=1), truth)
     assert mended.computed_ranges == [(8, 16)]
 
 
@@ -186,18 +186,20 @@ def test_an_executor_s_limit_counts_where_a_store_is_gone_on_with(tmp_path, monk
     for _ in range(2):
         told.clear()
         with open_executor(1, time_limit=0.2) as executor:
-            found = run(job, Store(tmp_path / "cells", job), lambda *now: told.append(now[1]), executor=executor)
+            found = run_job(
+                job, Store(tmp_path / "cells", job), lambda *now: told.append(now[1]), executor=executor
+            )
         assert (found.status[5] == OUT_OF_TIME).all()
     assert told == [8], "not tried again under the same limit"
     mended = RootsJob(8)
-    run(mended, Store(tmp_path / "cells", mended), again=False)
+    run_job(mended, Store(tmp_path / "cells", mended), again=False)
     assert mended.computed_ranges == []
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("inf"), float("nan")])
 def test_a_time_limit_that_is_none_is_refused(limit):
     with pytest.raises(ValueError, match="time_limit must be positive, got"):
-        run(RootsJob(3), time_limit=limit)
+        run_job(RootsJob(3), time_limit=limit)
 
 
 def test_arguments_that_do_not_go_together_are_refused():
@@ -205,25 +207,25 @@ def test_arguments_that_do_not_go_together_are_refused():
         pass
 
     with pytest.raises(ValueError, match="time_limit needs other processes, and a measure of this study exists"):
-        run(Local(3), time_limit=1.0)
+        run_job(Local(3), time_limit=1.0)
     with (
         open_executor(1, time_limit=1.0) as executor,
         pytest.raises(ValueError, match="time_limit needs other processes, and a measure of this study exists"),
     ):
-        run(Local(3), executor=executor)
+        run_job(Local(3), executor=executor)
     with open_executor(1) as executor, pytest.raises(ValueError, match="give either it or them"):
-        run(RootsJob(3), executor=executor, workers=2)
+        run_job(RootsJob(3), executor=executor, workers=2)
 
 
 def test_one_executor_serves_many_jobs_in_the_same_processes():
     with open_executor(1) as executor:
-        own = [run(ProcessNumbersJob(8 + n), executor=executor).values[:, 0] for n in range(12)]
+        own = [run_job(ProcessNumbersJob(8 + n), executor=executor).values[:, 0] for n in range(12)]
         assert len({process for each in own for process in each}) == 1
         assert own[0][0] != os.getpid()
         batches = executor.compute(pack_job(RootsJob(40)), [(0, 5), (5, 10)])
         next(batches)
         batches.close()  # stopped early, which ends them
-        assert run(ProcessNumbersJob(3), executor=executor).values[0, 0] != own[0][0]
+        assert run_job(ProcessNumbersJob(3), executor=executor).values[0, 0] != own[0][0]
 
 
 def test_a_process_that_cannot_start_is_said():

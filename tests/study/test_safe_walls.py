@@ -12,7 +12,7 @@ from tests.study.safe_wall_cases import largest_radii, random_device, search_tab
 from zwidth.device.load import load
 from zwidth.errors import WorkspaceError
 from zwidth.measures import NO_VALUE, OK, OUT_OF_REACH, UNDECIDED
-from zwidth.study import Store, run, safe_walls
+from zwidth.study import Store, run_job, safe_walls
 from zwidth.study.wall_tables.cell_walls import cell_walls
 from zwidth.study.wall_tables.safe_walls import SafeWallsJob, compute_table, safe_walls_job
 from zwidth.study.wall_tables.table import rounded
@@ -245,7 +245,7 @@ def test_the_document_and_the_columns_hold_the_table(table):
 
 def test_cells_hang_on_neither_batches_nor_stops(tmp_path):
     job = job_of(load(MECHANISM), ranges=((-0.3, 0.1), (0.05, 0.15), None), cells=(4, 1), levels=2)
-    whole = run(job, workers=1, batch=4)
+    whole = run_job(job, workers=1, batch=4)
     assert set(whole.status[:, 0]) == {OK, OUT_OF_REACH}
     kept = []
 
@@ -258,10 +258,10 @@ def test_cells_hang_on_neither_batches_nor_stops(tmp_path):
             raise Stop
 
     with pytest.raises(Stop):
-        run(job, Store(tmp_path / "cells", job), stop, 1, batch=1)
-    continued = run(job, Store(tmp_path / "cells", job), lambda stage, done, of: kept.append(done), 1)
+        run_job(job, Store(tmp_path / "cells", job), stop, 1, batch=1)
+    continued = run_job(job, Store(tmp_path / "cells", job), lambda stage, done, of: kept.append(done), 1)
     assert kept[4] == 3, "what was done is not done again"
-    for one, other in ((whole, continued), (whole, run(job, workers=2, batch=2, patience=-1.0))):
+    for one, other in ((whole, continued), (whole, run_job(job, workers=2, batch=2, patience=-1.0))):
         np.testing.assert_array_equal(one.values, other.values)
         np.testing.assert_array_equal(one.status, other.status)
         assert one.notes == other.notes

@@ -12,11 +12,11 @@ from zwidth.device.load import load
 from zwidth.study.wall_tables.edge_chords import (
     GAPS,
     MOST_CHORDS,
-    EdgeChords,
+    LoopEdgeChords,
     _fill_all,
     common_interval,
     edges_of_points,
-    stable_intervals,
+    stable_damping_intervals,
 )
 from zwidth.study.wall_tables.grid import Sectors, cells_of
 
@@ -25,7 +25,7 @@ def chords_of(rings):
     """Polygons as the edge of one loop."""
     each = [np.column_stack([ring[:-1], ring[1:], np.zeros((len(ring) - 1, 2))]) for ring in map(np.array, rings)]
     chords = np.concatenate(each)
-    return EdgeChords(chords, np.array([0, len(chords)]), np.ones(1, dtype=bool))
+    return LoopEdgeChords(chords, np.array([0, len(chords)]), np.ones(1, dtype=bool))
 
 
 def square(low, high):
@@ -34,7 +34,7 @@ def square(low, high):
 
 
 def found(edges, low, high):
-    out = stable_intervals(edges, np.array([[low, high]]))[0, 0]
+    out = stable_damping_intervals(edges, np.array([[low, high]]))[0, 0]
     return out[~np.isnan(out[:, 0])].tolist()
 
 
@@ -104,7 +104,7 @@ def test_ranges_of_random_loops_are_stable_and_end_at_the_edge(seed):
         top = chart.stiffness_max
         ends = top * np.array([1e-6, 0.1, 0.3, 0.55, 0.8])
         bands = np.column_stack([ends[:-1], ends[1:]])
-        for (a, b), ranges in zip(bands, stable_intervals(edges, bands)[0], strict=True):
+        for (a, b), ranges in zip(bands, stable_damping_intervals(edges, bands)[0], strict=True):
             for low, high in ranges[~np.isnan(ranges[:, 0])]:
                 width, size = high - low, max(abs(low), abs(high))
                 K = a + (b - a) * rng.random(40)
@@ -121,7 +121,7 @@ def edges_of_loop(loop):
     _fill_all(loop.table, chords, counts, doubtful)
     if doubtful[0]:  # as `edges_of_points` does
         return chords_of(stability_chart(loop, decay=False).regions)
-    return EdgeChords(chords[0, : counts[0]], np.array([0, counts[0]]), np.ones(1, dtype=bool))
+    return LoopEdgeChords(chords[0, : counts[0]], np.array([0, counts[0]]), np.ones(1, dtype=bool))
 
 
 def test_points_alone_and_together_have_the_same_ranges():
@@ -133,7 +133,7 @@ def test_points_alone_and_together_have_the_same_ranges():
         alone = chords_of(point[n].chart(decay=False).regions)
         assert alone.largest_stiffness == pytest.approx(point[n].chart(decay=False).stiffness_max, rel=1e-5)
         bands = alone.largest_stiffness * np.array([[1e-4, 0.2], [0.5, 0.6]])
-        one, other = stable_intervals(alone, bands)[0], stable_intervals(together, bands)[n]
+        one, other = stable_damping_intervals(alone, bands)[0], stable_damping_intervals(together, bands)[n]
         width = one[0, 0, 1] - one[0, 0, 0]
         np.testing.assert_allclose(one[:, 0], other[:, 0], atol=1e-3 * width)
 

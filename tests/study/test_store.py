@@ -12,7 +12,7 @@ import zarr
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
 from zwidth.errors import StoreError
 from zwidth.measures import MISSING, STATUS
-from zwidth.study import Store, run
+from zwidth.study import Store, run_job
 
 
 def partial_store(path, job, batches, size=5):
@@ -29,12 +29,12 @@ def test_only_what_is_missing_is_computed(tmp_path, kind):
     partial_store(path, kind(33), [0, 2, 6])
     job = kind(33)
     told = []
-    found = run(job, Store(path, job), lambda *now: told.append(now), workers=1, batch=11)
+    found = run_job(job, Store(path, job), lambda *now: told.append(now), workers=1, batch=11)
     assert same_cells(found, kind(33).compute(0, 33))
     assert job.computed_ranges == [(5, 10), (15, 20), (20, 25), (25, 30)]
     assert told[0] == ("computing", 13, 33)
     again = kind(33)
-    assert same_cells(run(again, Store(path, again)), found)
+    assert same_cells(run_job(again, Store(path, again)), found)
     assert again.computed_ranges == []
 
 
@@ -64,7 +64,7 @@ def test_another_release_is_refused_by_its_number(tmp_path, monkeypatch):
 
 def test_others_can_read_it(tmp_path):
     job = RootsJob(12)
-    run(job, Store(tmp_path / "cells", job), batch=5)
+    run_job(job, Store(tmp_path / "cells", job), batch=5)
     group = zarr.open_group(str(tmp_path / "cells"), mode="r")
     assert group["values"].shape == (12, 2)
     assert group["values"].chunks == group["status"].chunks == (5, 2)
@@ -80,7 +80,7 @@ def test_others_can_read_it(tmp_path):
 @pytest.mark.parametrize("array", ["values", "status"])
 def test_a_damaged_batch_is_computed_again(tmp_path, array, damage):
     path, job = tmp_path / "cells", RootsJob(20)
-    run(job, Store(path, job), workers=1, batch=10)
+    run_job(job, Store(path, job), workers=1, batch=10)
     chunk = path / array / "c" / "1" / "0"
     data = chunk.read_bytes()
     if damage == "gone":
@@ -88,7 +88,7 @@ def test_a_damaged_batch_is_computed_again(tmp_path, array, damage):
     else:
         chunk.write_bytes(data[: len(data) // 2 if damage == "cut" else 0])
     again = RootsJob(20)
-    found = run(again, Store(path, again), workers=1)
+    found = run_job(again, Store(path, again), workers=1)
     assert same_cells(found, RootsJob(20).compute(0, 20))
     assert again.computed_ranges == [(10, 20)]
 
@@ -111,7 +111,7 @@ def test_what_is_no_store_is_left_alone(tmp_path, what):
 def test_an_empty_folder_is_begun(tmp_path):
     (tmp_path / "cells").mkdir()
     job = RootsJob(12)
-    run(job, Store(tmp_path / "cells", job), batch=5)
+    run_job(job, Store(tmp_path / "cells", job), batch=5)
     assert len(list(Store(tmp_path / "cells", job).stored_batches())) == 3
 
 

@@ -19,7 +19,7 @@ from tests.interruption import HANG_TIMEOUT_S
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.errors import StoreError
-from zwidth.study import FolderLock, Store, run
+from zwidth.study import FolderLock, Store, run_job
 from zwidth.study.jobs import executor
 from zwidth.study.jobs.store import StoredCells, owner_of
 
@@ -51,7 +51,7 @@ def test_a_second_run_is_refused_while_the_first_lives_and_a_killed_one_blocks_n
     try:
         store = Store(path, job)
         with pytest.raises(StoreError) as caught:
-            run(job, store, workers=1)
+            run_job(job, store, workers=1)
         here = f"process {running.pid} on {socket.gethostname()}"
         assert str(caught.value) == (
             f"cells: {here} is computing into it; wait until that has ended, or name another folder"
@@ -60,7 +60,7 @@ def test_a_second_run_is_refused_while_the_first_lives_and_a_killed_one_blocks_n
         running.send_signal(signal.SIGKILL)
         running.communicate(timeout=HANG_TIMEOUT_S)
     assert json.loads((path / "lock").read_text())["process"] == running.pid, "which has left its name behind"
-    found = run(job, Store(path, job), workers=1)
+    found = run_job(job, Store(path, job), workers=1)
     assert same_cells(found, RootsJob(100).compute(0, 100))
     assert (0, 2) not in job.computed_ranges
 
@@ -100,7 +100,7 @@ def test_a_full_disk_is_an_error_and_the_store_goes_on(tmp_path):
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, limits[1]))
         with pytest.raises(OSError) as caught:  # noqa: PT011  its number is looked at
-            run(job, Store(path, job), workers=1, batch=100)
+            run_job(job, Store(path, job), workers=1, batch=100)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, ignored)
@@ -108,8 +108,8 @@ def test_a_full_disk_is_an_error_and_the_store_goes_on(tmp_path):
     kept = len(list(Store(path, job).stored_batches()))
     assert 2 < kept < 30
     again = NotedJob(4000)
-    found = run(again, Store(path, again), workers=1)
-    assert same_cells(found, run(NotedJob(4000), workers=1, batch=4000))
+    found = run_job(again, Store(path, again), workers=1)
+    assert same_cells(found, run_job(NotedJob(4000), workers=1, batch=4000))
     assert len(again.computed_ranges) == 40 - kept
 
 
@@ -124,13 +124,13 @@ def test_a_disk_that_is_really_full(tmp_path):
         job = RootsJob(3000)
         (disk / "other").write_bytes(bytes(700_000))
         with pytest.raises(OSError, match="No space left"):
-            run(job, Store(disk / "cells", job), workers=1, batch=50)
+            run_job(job, Store(disk / "cells", job), workers=1, batch=50)
         kept = len(list(Store(disk / "cells", job).stored_batches()))
         assert kept > 2
         (disk / "other").unlink()
         again = RootsJob(3000)
 
-        assert same_cells(run(again, Store(disk / "cells", again), workers=1), RootsJob(3000).compute(0, 3000))
+        assert same_cells(run_job(again, Store(disk / "cells", again), workers=1), RootsJob(3000).compute(0, 3000))
         assert len(again.computed_ranges) == 60 - kept
     finally:
         subprocess.run(["umount", "-l", disk], check=True)
@@ -138,11 +138,11 @@ def test_a_disk_that_is_really_full(tmp_path):
 
 def test_many_cells_stay_in_the_store(tmp_path, monkeypatch):
     job = NotedJob(1000)
-    few = run(job, Store(tmp_path / "few", job), workers=1, batch=30)
+    few = run_job(job, Store(tmp_path / "few", job), workers=1, batch=30)
     monkeypatch.setattr(executor, "MOST_IN_MEMORY", 500)
-    many = run(job, Store(tmp_path / "many", job), workers=1, batch=30)
+    many = run_job(job, Store(tmp_path / "many", job), workers=1, batch=30)
     assert isinstance(many, StoredCells)
-    assert same_cells(few, run(NotedJob(1000), workers=1))
+    assert same_cells(few, run_job(NotedJob(1000), workers=1))
     assert same_cells(many, few)
     pieces = list(many.pieces())
     assert [first for first, _ in pieces] == list(range(0, 1000, 30))
@@ -160,8 +160,8 @@ def judge_flipped_bits(folder: Path, seed: int, most: int) -> dict[str, int]:
     kind = (RootsJob, NotedJob)[seed % 2]
     count = int(rng.integers(5, 40))
     batch = count // 2 + 1  # two batches: each attempt opens and reads the whole store
-    path, right = folder / f"cells-{seed}", run(kind(count), workers=1)
-    run(kind(count), Store(path, kind(count)), workers=1, batch=batch)
+    path, right = folder / f"cells-{seed}", run_job(kind(count), workers=1)
+    run_job(kind(count), Store(path, kind(count)), workers=1, batch=batch)
     intact = {file: file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
     assert {file.name for file in intact} >= {"zarr.json", "notes.jsonl", "lock", "0"}
     tally = {"refused": 0, "again": 0, "as it was": 0}
@@ -172,7 +172,7 @@ def judge_flipped_bits(folder: Path, seed: int, most: int) -> dict[str, int]:
             file.write_bytes(damaged)
             job = kind(count)
             try:
-                found = run(job, Store(path, job), workers=1)
+                found = run_job(job, Store(path, job), workers=1)
             except StoreError:
                 outcome = "refused"
             else:
@@ -201,7 +201,7 @@ def test_cells_that_are_damaged_after_the_run_are_refused(tmp_path, monkeypatch)
     """Cells that stay on the disk are read once more when they are asked for."""
     monkeypatch.setattr(executor, "MOST_IN_MEMORY", 5)
     job = RootsJob(40)
-    found = run(job, Store(tmp_path / "cells", job), workers=1, batch=10)
+    found = run_job(job, Store(tmp_path / "cells", job), workers=1, batch=10)
     chunk = tmp_path / "cells" / "values" / "c" / "2" / "0"
     chunk.write_bytes(chunk.read_bytes()[:-9] + b"x" * 9)
     with pytest.raises(StoreError, match="cells 20 to 29"):
@@ -210,7 +210,7 @@ def test_cells_that_are_damaged_after_the_run_are_refused(tmp_path, monkeypatch)
 
 def test_a_store_without_checksums_is_refused_by_its_version(tmp_path):
     job = RootsJob(40)
-    run(job, Store(tmp_path / "cells", job), workers=1, batch=10)
+    run_job(job, Store(tmp_path / "cells", job), workers=1, batch=10)
     header = tmp_path / "cells" / "zarr.json"
     parts = json.loads(header.read_text())
     parts["attributes"] |= {"version": 1}
@@ -221,10 +221,10 @@ def test_a_store_without_checksums_is_refused_by_its_version(tmp_path):
 
 def test_lines_of_notes_that_are_damaged_cost_their_own_batch_alone(tmp_path):
     path, job = tmp_path / "cells", NotedJob(40)
-    run(job, Store(path, job), workers=1, batch=10)
+    run_job(job, Store(path, job), workers=1, batch=10)
     notes = path / "notes.jsonl"
     notes.write_text(notes.read_text().replace("cell 13", "cell 14"))
     again = NotedJob(40)
-    found = run(again, Store(path, again), workers=1)
+    found = run_job(again, Store(path, again), workers=1)
     assert same_cells(found, NotedJob(40).compute(0, 40))
     assert again.computed_ranges == [(10, 20)]

@@ -29,7 +29,7 @@ from zwidth.study import (
     Store,
     Sweep,
     over_the_workspace,
-    run,
+    run_job,
     run_study,
     study_of,
     sweep,
@@ -194,7 +194,7 @@ def test_why_a_design_failed_is_stored_with_its_values(tmp_path):
     whole = job.compute(0, 3)
     assert whole.notes[0]
     for _ in range(2):
-        assert same_cells(run(job, Store(tmp_path / "cells", job), workers=1), whole)
+        assert same_cells(run_job(job, Store(tmp_path / "cells", job), workers=1), whole)
 
 
 def test_a_mechanism_that_moves_no_mass_is_no_device():
@@ -282,9 +282,9 @@ def test_the_same_bits_however_it_is_cut_and_whoever_computes_it(tmp_path):
     )
     whole = job.compute(0, 6)
     assert set(np.unique(whole.status)) > {OK}
-    assert same_cells(run(job, workers=1, batch=1), whole)
-    assert same_cells(run(job, Store(tmp_path / "cells", job), workers=1, batch=4), whole)
-    assert same_cells(run(job, workers=2, batch=3, patience=-1.0), whole)
+    assert same_cells(run_job(job, workers=1, batch=1), whole)
+    assert same_cells(run_job(job, Store(tmp_path / "cells", job), workers=1, batch=4), whole)
+    assert same_cells(run_job(job, workers=2, batch=3, patience=-1.0), whole)
 
 
 def test_the_question_is_the_study_s():

@@ -15,7 +15,7 @@ from zwidth.study import (
     count_bounds,
     drawn_values,
     question_over,
-    run,
+    run_job,
     sweep_job,
 )
 from zwidth.study.tolerances.intervals import Interval
@@ -35,7 +35,7 @@ def found(device: Device, numbers, wall, seed: int, samples: int = 200, index_sa
     question = question_over(device, numbers, (), None, wanted, draw)
 
     def compute(name, job, stage):
-        return run(job, workers=1, batch=job.count)
+        return run_job(job, workers=1, batch=job.count)
 
     values = drawn_values(question.tolerances, question.seed, question.samples)
     job, cells, indices = _measured(question, values, compute)
@@ -133,7 +133,7 @@ def test_a_cautious_wall_holds_what_it_says():
             )
         ]
         job = EdgeJob(sweep_job(question.study_of(axes, ())), np.linspace(20.0, 120.0, 101))
-        edges = run(job, workers=1, batch=120)
+        edges = run_job(job, workers=1, batch=120)
         coverage = Coverage(job.dampings, edges.values.reshape(120, 101, -1, 2))
         wall = coverage.stiffest(count_bounds(0.95, 120)[0])
         T = np.linspace(0.95, 1.05, 101) * PERIOD
@@ -192,7 +192,7 @@ def devices_with_true_bands(count: int) -> int:
         verdicts = [loop.check(*wall).names[0] for loop in loops]
         assert one.outcomes == {name: verdicts.count(name) for name in one.outcomes}
         dampings = np.linspace(0.0, 1.2 * wall[1] + 1e-3, 7)
-        edges = run(EdgeJob(one.job, dampings), workers=1)
+        edges = run_job(EdgeJob(one.job, dampings), workers=1)
         assert not edges.status.any()
         coverage = Coverage(dampings, edges.values.reshape(72, 7, -1, 2))
         inside = [

@@ -10,7 +10,7 @@ from zwidth.study import Tie, count_bounds, drawn_values, member_changes, shares
 from zwidth.study.tolerances.distribution import (
     CUT,
     Distribution,
-    Limits,
+    NumberLimits,
     Tolerance,
     lognormal,
     normal,
@@ -26,14 +26,14 @@ from zwidth.study.tolerances.intervals import (
 from zwidth.study.tolerances.tolerance_study import DRAWN, UNSEEN
 
 SHARES = np.linspace(0.001, 0.999, 97)
-NONE = Limits()
+NONE = NumberLimits()
 LAWS = [
     (Distribution("uniform", 3.0, 2.0, 4.0), stats.uniform(2.0, 2.0)),
     (Distribution("triangular", 2.5, 2.0, 4.0), stats.triang(0.25, 2.0, 2.0)),
     (Distribution("triangular", 4.0, 2.0, 4.0), stats.triang(1.0, 2.0, 2.0)),
     (normal(3.0, 0.5, NONE), stats.truncnorm(-CUT, CUT, 3.0, 0.5)),
     (normal(3.0, 0.5, NONE, 1.5), stats.truncnorm(-1.5, 1.5, 3.0, 0.5)),
-    (normal(0.1, 0.5, Limits(0.0)), stats.truncnorm(-0.2, CUT, 0.1, 0.5)),
+    (normal(0.1, 0.5, NumberLimits(0.0)), stats.truncnorm(-0.2, CUT, 0.1, 0.5)),
     (lognormal(3.0, 0.2, NONE, 8.0), stats.lognorm(0.2, scale=3.0)),
 ]
 
@@ -46,12 +46,12 @@ def test_values_are_the_quantiles_of_the_distribution(law, judge):
 
 def test_what_is_cut_off_is_known():
     assert normal(3.0, 0.5, NONE).cut_off == pytest.approx(2.0 * stats.norm.sf(CUT), rel=1e-6)
-    assert normal(0.1, 0.5, Limits(0.0)).cut_off == pytest.approx(stats.norm.cdf(-0.2) + stats.norm.sf(CUT))
+    assert normal(0.1, 0.5, NumberLimits(0.0)).cut_off == pytest.approx(stats.norm.cdf(-0.2) + stats.norm.sf(CUT))
     assert Distribution("uniform", 3.0, 2.0, 4.0).cut_off == 0.0
 
 
 def test_a_limit_that_is_not_allowed_is_never_drawn():
-    law = normal(0.01, 1.0, Limits(0.0, without_least=True))
+    law = normal(0.01, 1.0, NumberLimits(0.0, without_least=True))
     assert law.values(np.array([0.0, 1e-300, 0.5])).min() > 0.0
 
 

@@ -12,7 +12,7 @@ import zwidth
 from tests.study.tolerance_cases import MASS, PERIOD, STIFFEST, free_mass, least_mass, radius, uniform
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.show import band_path
-from zwidth.study import EdgeJob, JobSeries, count_bounds, run, run_tolerances, shares_of, tolerance
+from zwidth.study import EdgeJob, JobSeries, count_bounds, run_job, run_tolerances, shares_of, tolerance
 from zwidth.study.tolerances.result import tightened
 from zwidth.study.tolerances.tolerance_study import UNSEEN, answer
 
@@ -339,13 +339,13 @@ def test_the_same_question_has_the_same_answer_bit_for_bit_whoever_computes_and_
     )
     assert json.dumps(going_on.document()) == whole
     assert json.dumps(run_tolerances(question).document()) == whole
-    batches = answer(question, lambda name, job, stage: run(job, batch=7))
+    batches = answer(question, lambda name, job, stage: run_job(job, batch=7))
     assert json.dumps(batches.document()) == whole
 
 
 def test_processes_compute_the_same_edges():
     job = EdgeJob(few_masses().job, np.linspace(0.0, 100.0, 5))
-    alone, shared = run(job), run(job, batch=9, workers=2, patience=0.0)
+    alone, shared = run_job(job), run_job(job, batch=9, workers=2, patience=0.0)
     assert np.array_equal(alone.values, shared.values)
     assert alone.values.any()
 

@@ -15,8 +15,8 @@ from zwidth.errors import DeviceError, MeasureError, NoValueError, PostureError,
 from zwidth.measures import FAILED, MEASURES, NO_VALUE, OK, OUT_OF_REACH, STATUS, Measure, WantedWall
 from zwidth.measures.evaluation import evaluate_safely
 from zwidth.study import Store, map_job, over_the_workspace, plane_of, workspace_map
-from zwidth.study.designs.column import positions
-from zwidth.study.workspace.map import MapJob, as_dataset
+from zwidth.study.designs.column import plane_positions
+from zwidth.study.workspace.map import MapJob, map_dataset
 
 SINGLE_POINT_MEASURE = Measure(
     "each", "Asked one by one", "N", "lower", "", lambda place: 10.0 * float(place.effective.rigid_mass), each=True
@@ -68,7 +68,7 @@ def test_what_a_map_holds(device):
     assert found.attrs["direction"] == [0.0, 1.0, 0.0]
     assert found.attrs["wanted_stiffness_N_per_m"] == 5.0
     assert found.attrs["sampling_period_s"] == 0.00125
-    np.testing.assert_allclose(positions(found), plane_of(device, cells=(13, 7)).positions)
+    np.testing.assert_allclose(plane_positions(found), plane_of(device, cells=(13, 7)).positions)
 
 
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
@@ -192,7 +192,7 @@ def test_a_map_s_job_can_be_sent_to_other_processes(device):
     job = map_job(device, ["rigid_mass"], plane_of(device, cells=(5, 4)), "lowest")
     sent = pickle.loads(pickle.dumps(job))
     assert sent.question == job.question
-    assert as_dataset(sent, sent.compute(0, 20)).equals(as_dataset(job, job.compute(0, 20)))
+    assert map_dataset(sent, sent.compute(0, 20)).equals(map_dataset(job, job.compute(0, 20)))
 
 
 def test_many_cells_cost_little():

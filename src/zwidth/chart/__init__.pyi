@@ -37,7 +37,7 @@ from .polar import circle as circle
 from .robust.instability import softening as softening
 from .robust.instability import unstable as unstable
 from .several_directions.curve_set import trace_curves as trace_curves
-from .several_directions.wall_curves import Box as Box
+from .several_directions.wall_curves import WallBox as WallBox
 from .table_radii import spectral_radii as spectral_radii
 from .traced_edge import TracedEdge as TracedEdge
 from .tracer import Tracer as Tracer

@@ -35,7 +35,7 @@ from zwidth.chart.edge_samples import (
     fill_curve,
     flag_all,
 )
-from zwidth.chart.hurwitz import is_stable
+from zwidth.chart.hurwitz import all_roots_inside
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
@@ -205,7 +205,7 @@ def _read_damping(memory: EdgeMemory, scale: float) -> bool:
         if stops[k] - stops[k - 1] <= least:
             continue
         middle = 0.5 * (stops[k] + stops[k - 1])
-        flag = is_stable(
+        flag = all_roots_inside(
             memory.polynomials.coefficients, memory.circle.sizes[DEGREE], BESIDE_AXIS * scale, middle, memory.room
         )
         if flag == 0:

@@ -26,7 +26,7 @@ EdgeKind = Literal["lower", "upper", "tip"]
 MOST_STEPS: Final = 30  # of false position between the ends of a chord
 
 
-class WallCurve(Protocol):
+class EdgeCurve(Protocol):
     """Walls with a pair of roots on the circle, by the angle of the pair."""
 
     @property
@@ -49,7 +49,7 @@ class EdgeChords:
     first: Floats
     last: Floats
     frequency: Floats
-    curve: WallCurve | None = None
+    curve: EdgeCurve | None = None
 
     @classmethod
     def of(cls, chart: Chart) -> EdgeChords:
@@ -130,7 +130,7 @@ class EdgeChords:
         return value, frequency
 
     def _on_edge(
-        self, curve: WallCurve, chord: NDArray[np.intp], at: Floats, across: int
+        self, curve: EdgeCurve, chord: NDArray[np.intp], at: Floats, across: int
     ) -> tuple[Floats, Floats]:
         """Move crossings from the chords to the curve, by false position in the angle, the retained end's value
         halved (Illinois)."""

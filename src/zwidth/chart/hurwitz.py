@@ -179,7 +179,7 @@ def quotient_flag(polynomials: Floats, N: int, first: int, degree: int, K: float
 
 
 @compiled_lean
-def is_stable(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> int:
+def all_roots_inside(polynomials: Floats, N: int, K: float, B: float, room: Floats) -> int:
     """Whether the wall K, B has all its roots inside the circle that `polynomials` were built for: 1, -1 or 0."""
     combine(polynomials, N, K, B, room)
     return hurwitz(room, P, N)

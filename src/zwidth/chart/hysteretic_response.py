@@ -52,7 +52,7 @@ from numpy.polynomial import Chebyshev
 from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.chart.arcs import MINUS, PAIR, PLUS, ArcPoints, Arcs
 from zwidth.chart.chart import stability_chart
-from zwidth.chart.edge_crossings import EdgeChords, WallCurve
+from zwidth.chart.edge_crossings import EdgeChords, EdgeCurve
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.nyquist import terms_along
@@ -449,7 +449,7 @@ class MovedArcs:
 
 
 def moved_arcs(
-    arcs: Arcs, curve: WallCurve, lines: dict[int, tuple[float, float]], size: Floats
+    arcs: Arcs, curve: EdgeCurve, lines: dict[int, tuple[float, float]], size: Floats
 ) -> MovedArcs | None:
     """Arcs of pairs of roots and of real roots with their corners on a curve near the one they were traced on.
 
@@ -510,7 +510,7 @@ def _room(angles: Floats) -> Floats:
     return np.minimum(angles, np.pi - angles)
 
 
-def _slopes(curve: WallCurve, angles: Floats) -> tuple[Floats, Floats]:
+def _slopes(curve: EdgeCurve, angles: Floats) -> tuple[Floats, Floats]:
     """Walls (k, 2) at angles (k,), and their derivatives by the angle (k, 2), by central differences."""
     step = SLOPE_STEP * _room(angles)
     K, B = curve.walls(np.concatenate([angles, angles + step, angles - step]))
@@ -518,7 +518,7 @@ def _slopes(curve: WallCurve, angles: Floats) -> tuple[Floats, Floats]:
     return walls[0], (walls[1] - walls[2]) / (2.0 * step[:, None])
 
 
-def _self_crossings(curve: WallCurve, a: Floats, b: Floats, size: Floats) -> tuple[Floats, Floats, bool]:
+def _self_crossings(curve: EdgeCurve, a: Floats, b: Floats, size: Floats) -> tuple[Floats, Floats, bool]:
     """Angles (k,), (k,) near a and b at which a curve has the same wall, and whether all are found.
 
     size  (2,) of the edge [N/m, N s/m]
@@ -544,7 +544,7 @@ def _self_crossings(curve: WallCurve, a: Floats, b: Floats, size: Floats) -> tup
     return a, b, False
 
 
-def _line_crossings(curve: WallCurve, a: Floats, h: float, w: float, size: Floats) -> tuple[Floats, bool]:
+def _line_crossings(curve: EdgeCurve, a: Floats, h: float, w: float, size: Floats) -> tuple[Floats, bool]:
     """Angles (k,) near a at which a curve crosses the line K + B w = h, and whether all are found."""
     if not len(a):
         return a, True

@@ -27,7 +27,7 @@ from zwidth.loop.circle_factors import (
     half_angle,
     minus_inverse_plant,
     quadratic,
-    scaled,
+    scaled_factors,
     velocity_on_circle,
 )
 
@@ -46,12 +46,12 @@ def terms_at(circle: CircleFactors, theta: float) -> tuple[complex, complex, com
     cc, ss, sc = half_angle(np.tan(0.5 * theta))
     X, _, top, _ = minus_inverse_plant(circle, cc, ss, sc)
     Y, _, size, _ = velocity_on_circle(circle, cc, ss, sc)
-    P, w = divide(-top, X), scaled(Y, 1.0 / size)
+    P, w = divide(-top, X), scaled_factors(Y, 1.0 / size)
     turns = 0.5 * circle.sizes[DEGREE] * theta
     A = complex(np.cos(turns), np.sin(turns))
     for k in range(circle.sizes[SECTIONS]):
         den, _ = quadratic(circle.plant[k, 0], circle.plant[k, 1], circle.plant[k, 2], cc, ss, sc)
-        A *= scaled(den, 1.0 / abs(den))
+        A *= scaled_factors(den, 1.0 / abs(den))
     A = _times_denominators(A, circle.force, circle.sizes[FORCE], cc, ss, sc)
     A = _times_denominators(A, circle.velocity, circle.sizes[VELOCITY], cc, ss, sc)
     late = circle.sizes[WHOLE_DELAY] + circle.sizes[SPLIT] + circle.sizes[WINDOW] - 1
@@ -68,7 +68,7 @@ def _times_denominators(A: complex, rows: Floats, count: int, cc: float, ss: flo
             den = complex(rows[k, 4] * np.sqrt(cc), rows[k, 5] * np.sqrt(ss))
         else:
             den, _ = quadratic(rows[k, 4], rows[k, 5], rows[k, 6], cc, ss, sc)
-        A *= scaled(den, 1.0 / abs(den))
+        A *= scaled_factors(den, 1.0 / abs(den))
     return A
 
 

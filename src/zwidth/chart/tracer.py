@@ -22,7 +22,7 @@ from zwidth.chart.circle_sampling import (
 )
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, trace, wall_at, walls, zero_between
 from zwidth.chart.edge_samples import LONGEST
-from zwidth.chart.hurwitz import edges_on_line, is_stable, work_array
+from zwidth.chart.hurwitz import all_roots_inside, edges_on_line, work_array
 from zwidth.chart.loop_polynomials import LoopPolynomials, polynomial_memory, polynomials_of_loop
 from zwidth.chart.nyquist import phase_flags, terms_along
 from zwidth.chart.wall_samples import EDGE, HIDDEN, MOST_DEGREE, NO_EDGE
@@ -191,7 +191,7 @@ class Tracer:
         if self.is_high_degree:
             flag = int(self.flags_by_phase(np.array([[K, B]]), np.zeros(1), 0)[0])
         else:
-            flag = is_stable(self.polynomials, self.degree, K, B, work_array(self.degree))
+            flag = all_roots_inside(self.polynomials, self.degree, K, B, work_array(self.degree))
         if flag == 0:
             return bool(np.abs(np.linalg.eigvals(self.loop.transition_matrix(K, B))).max() < self.radius)
         return bool(flag > 0)

@@ -31,7 +31,7 @@ from .wall_limit_cycles import predict_limit_cycles as predict_limit_cycles
 from .boundary_experiment import StableExtent as StableExtent
 from .boundary_experiment import measure_edges as measure_edges
 from .boundary_experiment import measure_tips as measure_tips
-from .computer import normal as normal
+from .computer import normal_number as normal_number
 from .environments.surface_patterns import friction_patch as friction_patch
 from .environments.surface_patterns import grating as grating
 from .environments.surface_patterns import texture as texture

@@ -254,7 +254,7 @@ def _largest_stiffnesses(
     begins = np.array(
         [observation.stable for observation in observe(trial, np.column_stack([start, B]), levels)], dtype=bool
     )
-    lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (m, 1)))
+    lines = SearchLines(np.column_stack([start, B]), np.tile([1.0, 0.0], (m, 1)))
     farthest = np.where(begins, np.minimum(most, 1e6 * start) - start, 0.0)
     brackets = march(trial, lines, 0.5 * start if step is None else step, np.maximum(farthest, 0.0), levels)
     brackets = bisect(trial, lines, brackets, tolerance * start, levels)
@@ -300,7 +300,7 @@ def measure_edges(
         return []
     starts = np.column_stack([np.tile(stiffness, 2), np.tile(inside, 2)])
     sign = np.repeat([-1.0, 1.0], k)
-    lines = Lines(starts, np.column_stack([np.zeros(2 * k), sign]))
+    lines = SearchLines(starts, np.column_stack([np.zeros(2 * k), sign]))
     scale = max(abs(place.damping), 0.1 * abs(place.largest_damping))
     low, high = (-np.inf, np.inf) if box is None else box.damping
     farthest = np.where(sign < 0.0, starts[:, 1] - low, high - starts[:, 1])
@@ -336,7 +336,7 @@ def measure_tips(
     start = np.full(len(damping), (TIP_SHARE - 0.03) * place.stiffness)
     start = _lowered(trial, damping, start, least)
     B, start = damping[start > 0.0], start[start > 0.0]
-    lines = Lines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
+    lines = SearchLines(np.column_stack([start, B]), np.tile([1.0, 0.0], (len(B), 1)))
     most = min(most, 1e3 * place.stiffness)
     brackets = march(trial, lines, (1.0 / (TIP_SHARE - 0.03) - 1.0) * start, np.maximum(most - start, 0.0))
     tolerance = np.full(len(B), 0.1 * ACCURACY * place.stiffness)
@@ -392,7 +392,7 @@ LOWERED: Final = 4  # times a way without a stable wall is looked at again, furt
 AFTER: Final = np.array([1.05, 1.2, 1.5])  # times the way to the first unstable wall: looked at beyond it
 
 
-class Lines(NamedTuple):
+class SearchLines(NamedTuple):
     """Lines through the plane of walls: a start (m, 2), and the direction outwards (m, 2)."""
 
     start: Floats
@@ -401,8 +401,8 @@ class Lines(NamedTuple):
     def at(self, t: Floats) -> Floats:
         return np.asarray(self.start + t[:, None] * self.outwards)
 
-    def only(self, lanes: Flags | NDArray[np.intp]) -> Lines:
-        return Lines(self.start[lanes], self.outwards[lanes])
+    def only(self, lanes: Flags | NDArray[np.intp]) -> SearchLines:
+        return SearchLines(self.start[lanes], self.outwards[lanes])
 
 
 class Brackets(NamedTuple):
@@ -414,7 +414,7 @@ class Brackets(NamedTuple):
 
 
 def march(
-    trial: StabilityTrial, lines: Lines, step: Floats, farthest: Floats, levels: int | None = None
+    trial: StabilityTrial, lines: SearchLines, step: Floats, farthest: Floats, levels: int | None = None
 ) -> Brackets:
     """Step outwards, twice as far each time, until a wall is unstable.
 
@@ -440,7 +440,7 @@ def march(
 
 
 def bisect(
-    trial: StabilityTrial, lines: Lines, brackets: Brackets, tolerance: Floats, levels: int | None = None
+    trial: StabilityTrial, lines: SearchLines, brackets: Brackets, tolerance: Floats, levels: int | None = None
 ) -> Brackets:
     """Halve the gap between stable and unstable until it is below the tolerance (m,)."""
     stable, unstable, beyond = brackets.stable.copy(), brackets.unstable.copy(), list(brackets.observations)
@@ -457,14 +457,14 @@ def bisect(
                 unstable[i], beyond[i] = middle[i], observation
 
 
-def stiffness_lines(damping: Floats, least: float) -> Lines:
+def stiffness_lines(damping: Floats, least: float) -> SearchLines:
     """The lines of growing stiffness, from the softest wall that is looked at [N/m], at dampings (m,)."""
     m = len(damping)
-    return Lines(np.column_stack([np.full(m, least), damping]), np.tile([1.0, 0.0], (m, 1)))
+    return SearchLines(np.column_stack([np.full(m, least), damping]), np.tile([1.0, 0.0], (m, 1)))
 
 
 def nearest_change(
-    trial: StabilityTrial, lines: Lines, brackets: Brackets, tolerance: Floats, *, start_stable: bool
+    trial: StabilityTrial, lines: SearchLines, brackets: Brackets, tolerance: Floats, *, start_stable: bool
 ) -> Brackets:
     """Move the end of each line back to the first change of the verdict; ends with a stable way to them stay.
 
@@ -501,7 +501,7 @@ def nearest_change(
     return Brackets(halved.stable, np.where(changed, halved.unstable, unstable), halved.observations)
 
 
-def stable_beyond(trial: StabilityTrial, lines: Lines, unstable: Floats) -> Flags:
+def stable_beyond(trial: StabilityTrial, lines: SearchLines, unstable: Floats) -> Flags:
     """Whether a wall beyond the first unstable one (m,) is stable again; False where none is unstable."""
     known = np.flatnonzero(np.isfinite(unstable))
     again = np.zeros(len(unstable), dtype=bool)

@@ -186,7 +186,7 @@ def read_encoder(place: float, step: float, noise: float, seed: np.uint64, sampl
     channel  number of the encoder: each draws noise of its own
     """
     if noise > 0.0:
-        place += noise * normal(seed, sample, channel)
+        place += noise * normal_number(seed, sample, channel)
     return round_to_step(place, step)
 
 
@@ -297,7 +297,7 @@ def uniform(seed: np.uint64, sample: int, channel: int, draw: int) -> float:
 
 
 @compiled
-def normal(seed: np.uint64, sample: int, channel: int) -> float:
+def normal_number(seed: np.uint64, sample: int, channel: int) -> float:
     """Standard normal, by Box and Muller."""
     radius = np.sqrt(-2.0 * np.log(uniform(seed, sample, channel, 0)))
     return float(radius * np.cos(2.0 * np.pi * uniform(seed, sample, channel, 1)))

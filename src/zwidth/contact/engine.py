@@ -32,7 +32,7 @@ from zwidth.contact.computer import (
     computer_at,
     estimate_velocity,
     filter_force,
-    normal,
+    normal_number,
     send,
     send_force,
     signals_of,
@@ -43,7 +43,7 @@ from zwidth.contact.fixed_feedback import (
     FeedbackArrays,
     FeedbackMemory,
     feedback_memory,
-    measured_force,
+    read_force,
     sample_local_loop,
     with_feedback,
 )
@@ -78,7 +78,9 @@ def draw_noise(devices: PlantArrays, d: int, seed: np.uint64, sample: int, fast:
     """
     for c in range(drawn.size):
         noise = devices.noise[d, c]
-        drawn[c] = noise * normal(seed, sample, devices.encoder[d, c] + ENCODERS * fast) if noise > 0.0 else 0.0
+        drawn[c] = (
+            noise * normal_number(seed, sample, devices.encoder[d, c] + ENCODERS * fast) if noise > 0.0 else 0.0
+        )
 
 
 @compiled_inline
@@ -268,7 +270,7 @@ def run_member(
         total_force = controlled_force
         if controls:
             push = hand_force(members.push, m, time)
-            measured = measured_force(feedback, d, states, kept.first[2], push, own.forces)
+            measured = read_force(feedback, d, states, kept.first[2], push, own.forces)
             total_force = with_feedback(feedback, d, kept, controlled_force, counted, measured, j, T)
         command = send_force(computer, signals, 0, total_force)
         traces[m, j, READING], traces[m, j, TRUTH], traces[m, j, VELOCITY] = counted, truth, speed

@@ -200,7 +200,7 @@ def interval_parts(loop: Loop, substeps: int) -> list[IntervalPart]:
     ]
 
 
-def measured_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Floats:
+def reading_rows(held_devices: Sequence[HeldDevice], plants: PlantArrays) -> Floats:
     """Weights (D, N + 2 + E) of states, command, push and elements in what each device's force sensor measures:
     the force of the hand, less what the mass between sensor and hand takes.
     """

@@ -176,7 +176,7 @@ def feedback_memory(arrays: FeedbackArrays, d: int) -> FeedbackMemory:
 
 
 @compiled_inline
-def measured_force(
+def read_force(
     arrays: FeedbackArrays, d: int, states: Floats, command: float, push: float, forces: Floats
 ) -> float:
     """The force between sensor and hand just before a sample, under the command that has acted until then."""

@@ -14,7 +14,7 @@ from zwidth.arrays import Floats, Ints
 from zwidth.conditions.traits import reading_noise, reading_step
 from zwidth.contact.computer import ENTRIES, TRACES, PlantArrays, Records, RunArrays, computers
 from zwidth.contact.engine import run_several
-from zwidth.contact.engine_inputs import HeldDevice, measured_rows, pack_plants, start_states
+from zwidth.contact.engine_inputs import HeldDevice, pack_plants, reading_rows, start_states
 from zwidth.contact.environments.environment import Environment
 from zwidth.contact.fixed_feedback import feedback_arrays
 from zwidth.contact.hand import PUSH_NUMBERS, REFLEX_NUMBERS, Hand
@@ -132,7 +132,7 @@ def simulate_batch(
     )
     controllers = [held_device.loop.controller for held_device in held_devices]
     own = computers(controllers, [held_device.limit for held_device in held_devices])
-    feedback = feedback_arrays(controllers, measured_rows(held_devices, plants))
+    feedback = feedback_arrays(controllers, reading_rows(held_devices, plants))
     records = Records(
         np.zeros(m, dtype=np.int64),
         np.full((m, S, TRACES), np.nan),

@@ -85,7 +85,7 @@ class LoopArrays(NamedTuple):
 
 
 @compiled
-def held_response(A: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:
+def held_vibration_response(A: Floats, b: Floats, share: float) -> tuple[Floats, Floats]:
     """exp(A share), and what an input held over that share of a sample leaves."""
     N, size = len(A), 0.0
     for i in range(N):
@@ -131,7 +131,7 @@ def plant_steps(loop: LoopArrays, sizes: Floats) -> tuple[Floats, Floats]:
     at = 0
     for which in range(1 if loop.fractional_delay > 0.0 else 0, -1, -1):
         share = loop.fractional_delay if which else 1.0 - loop.fractional_delay
-        one, gain = held_response(A, loop.drive, share / PARTS)
+        one, gain = held_vibration_response(A, loop.drive, share / PARTS)
         for _ in range(PARTS):
             multiply(one, E, product)
             E[:] = product
@@ -302,7 +302,7 @@ def vibrations(loop: LoopArrays, sizes: Floats, size: float, by_velocity: bool) 
 
 
 @compiled
-def difference(loop: LoopArrays, one: Floats, other: Floats, root: complex) -> float:
+def size_difference(loop: LoopArrays, one: Floats, other: Floats, root: complex) -> float:
     """Largest relative difference of two rows of sizes.
 
     A friction that holds its motion fast is a damper that grows without end and a velocity that falls as fast,
@@ -337,7 +337,7 @@ def iterate_vibration(
         # the root nearest to the last one: the branch is followed, not the fastest root
         k = np.argmin(np.abs(roots - z))
         after = all_sizes[k]
-        change = max(abs(roots[k] - z), difference(loop, now, after, roots[k]))
+        change = max(abs(roots[k] - z), size_difference(loop, now, after, roots[k]))
         if change < same:
             return True, roots[k], after
         # two blocks without progress end the iteration, as the changes may rise and fall within a block

@@ -173,21 +173,21 @@ def rivals(steps: KeyPath) -> list[str]:
     return [rival for group in groups if steps[-1] not in group for rival in sorted(group)]
 
 
-def numbers(document: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, float]]:
+def number_paths(document: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, float]]:
     """Path and value of every number in the document, in its order; `dotted` writes a path as users do."""
     if isinstance(document, dict):
         for key, inner in document.items():
-            yield from numbers(inner, (*path, key))
+            yield from number_paths(inner, (*path, key))
     elif isinstance(document, list):
         for index, inner in enumerate(document):
-            yield from numbers(inner, (*path, index))
+            yield from number_paths(inner, (*path, index))
     elif isinstance(document, int | float) and not isinstance(document, bool):
         yield path, document
 
 
 def numeric_addresses(document: dict[str, Any]) -> dict[str, float]:
     """Dotted path -> value of every number in the document: what sweeps and sensitivities can vary."""
-    return {dotted(path, document): value for path, value in numbers(document)}
+    return {dotted(path, document): value for path, value in number_paths(document)}
 
 
 def resolve(document: dict[str, Any], path: str) -> KeyPath:

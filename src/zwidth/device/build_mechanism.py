@@ -15,7 +15,7 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.device.build import drive_nonlinearity, in_space, per_drive, roll_pitch_yaw, value_or
 from zwidth.device.consistency import HELD
-from zwidth.device.legs import Member, members, of_copies
+from zwidth.device.legs import LegMember, members, of_copies
 from zwidth.device.schema.beam import BeamSection, MaterialSection, RectangleShape, RodShape, TubeShape
 from zwidth.device.schema.mechanism import (
     AssemblySection,
@@ -31,8 +31,8 @@ from zwidth.model.arm import Arm
 from zwidth.model.beam_bodies import flexible_link
 from zwidth.model.beam_section import (
     BeamProperties,
+    CrossSection,
     Material,
-    Section,
     beam_properties,
     rectangle,
     rectangular_tube,
@@ -84,7 +84,7 @@ class Tree:
     first, last  entry of each link's first joint coordinate and of its body, by name; -1 of the base
     """
 
-    members: list[Member]
+    members: list[LegMember]
     first: dict[str, int]
     last: dict[str, int]
     tips: dict[str, list[Any]]
@@ -152,9 +152,9 @@ def joint_entries(joint: str) -> int:
     return len(SINGLE[joint])
 
 
-def _tree(links: Sequence[Member]) -> Tree:
+def _tree(links: Sequence[LegMember]) -> Tree:
     """Links sorted so that every parent stands before its children; otherwise in the file's order."""
-    ordered: list[Member] = []
+    ordered: list[LegMember] = []
     placed, waiting = {"base"}, list(links)
     while waiting:
         for member in waiting:
@@ -207,7 +207,7 @@ def _of_joints(tree: Tree, what: str, turning: str, sliding: str) -> Floats | No
     return stack_numbers(rows) if any(np.any(row) for row in rows) else None
 
 
-def _entries(member: Member, tree: Tree, table: RatioTable | None) -> list[tuple[Any, ...]]:
+def _entries(member: LegMember, tree: Tree, table: RatioTable | None) -> list[tuple[Any, ...]]:
     """One row of `Links` for each joint coordinate of a link. Only the last is a body, and only the first is apart
     from the parent. A joint without limits has those of the ratio table of its drive."""
     link: LinkSection = member.entry
@@ -258,7 +258,7 @@ def _inertia(link: LinkSection, axis: Floats) -> Floats:
     return 0.5 * rows + 0.5 * np.swapaxes(rows, -1, -2)
 
 
-def _closures(loops: Sequence[Member], tree: Tree) -> Closures:
+def _closures(loops: Sequence[LegMember], tree: Tree) -> Closures:
     ends = [_points(member, tree) for member in loops]
     points = join_designs(ends, 2) if ends else np.zeros((0, 2, 3))
     kind = np.array([CLOSES[member.entry.closes] for member in loops], dtype=np.int64)
@@ -284,26 +284,26 @@ def _closures(loops: Sequence[Member], tree: Tree) -> Closures:
     )
 
 
-def _points(member: Member, tree: Tree) -> Floats:
+def _points(member: LegMember, tree: Tree) -> Floats:
     """The meeting points (..., 2, 3) of a loop, each in the frame of its link."""
     loop: LoopClosure = member.entry
     points = stack_numbers(list(loop.points_m or [tree.tips[name] for name in loop.links]))
     return _turned_ends(member, points)
 
 
-def _closing_axes(member: Member) -> Floats:
+def _closing_axes(member: LegMember) -> Floats:
     loop: LoopClosure = member.entry
     return _turned_ends(member, join_designs([_unit(axis) for axis in loop.axes or (Z, Z)], 1))
 
 
-def _turned_ends(member: Member, vectors: Floats) -> Floats:
+def _turned_ends(member: LegMember, vectors: Floats) -> Floats:
     """Vectors (..., 2, 3), one in the frame of each of a loop's links; those in shared frames turn with the
     copy."""
     turns = np.stack([member.turn_of(name) for name in member.entry.links])
     return np.asarray((turns @ vectors[..., None])[..., 0])
 
 
-def _closing_rotation(member: Member) -> Floats:
+def _closing_rotation(member: LegMember) -> Floats:
     """Axes of the second link in the frame of the first."""
     loop: LoopClosure = member.entry
     rotation = roll_pitch_yaw(loop.orientation_rad or (0.0, 0.0, 0.0))
@@ -330,7 +330,7 @@ def _listed(value: Any, count: int) -> list[Any]:
     return list(value) if isinstance(value, tuple) else [value] * count
 
 
-def _free(tree: Tree, loops: Sequence[Member]) -> tuple[int, ...]:
+def _free(tree: Tree, loops: Sequence[LegMember]) -> tuple[int, ...]:
     """The joint coordinates that are free: all of a free joint, of a spherical one in a loop the turn about x."""
     looped = _links_in_loops(tree, loops)
     free: list[int] = []
@@ -342,7 +342,7 @@ def _free(tree: Tree, loops: Sequence[Member]) -> tuple[int, ...]:
     return tuple(free)
 
 
-def _links_in_loops(tree: Tree, loops: Sequence[Member]) -> set[str]:
+def _links_in_loops(tree: Tree, loops: Sequence[LegMember]) -> set[str]:
     """Names of the links whose joint is part of a closed chain: those between the ends of a loop and their
     fork."""
     parent = {member.entry.name: member.entry.parent for member in tree.members}
@@ -487,7 +487,7 @@ def properties_of(section: BeamSection, length: float) -> BeamProperties:
     return BeamProperties(length, *(float(number) for number in (*bending, *rest) if number is not None))
 
 
-def _section(beam: BeamSection) -> Section:
+def _section(beam: BeamSection) -> CrossSection:
     match beam.section:
         case RodShape() as rod:
             return round_rod(rod.diameter_m)

@@ -23,7 +23,7 @@ GROUPS: Final = ("links", "loops", "drives")
 
 
 @dataclass(frozen=True)
-class Member:
+class LegMember:
     """A link, loop or drive of a mechanism, of a leg's copy or not.
 
     entry     its table or section, with the names of the copy
@@ -48,14 +48,14 @@ class Member:
         return rotation_matrix(self.angle * axis / np.linalg.norm(axis))
 
 
-def members(mechanism: Any, group: str) -> list[Member]:
+def members(mechanism: Any, group: str) -> list[LegMember]:
     """All links, loops or drives of a mechanism in the order of its coordinates: first those written by
     themselves, then leg by leg and copy by copy.
 
     mechanism  a file's table (what is faulty is left out), or its checked section
     group      "links", "loops" or "drives"
     """
-    found = [Member(entry, (group, i)) for i, entry in _entries(mechanism, group)]
+    found = [LegMember(entry, (group, i)) for i, entry in _entries(mechanism, group)]
     for n, leg in _entries(mechanism, "legs"):
         given = (_get(link, "name") for _, link in _entries(leg, "links"))
         names = frozenset(name for name in given if isinstance(name, str))
@@ -64,7 +64,7 @@ def members(mechanism: Any, group: str) -> list[Member]:
             for i, entry in _entries(leg, group):
                 renamed = _renamed(entry, group, names, copy)
                 axis = _get(leg, "axis") or (0.0, 0.0, 1.0)
-                found.append(Member(renamed, ("legs", n, group, i), angle, axis, own))
+                found.append(LegMember(renamed, ("legs", n, group, i), angle, axis, own))
     return found
 
 

@@ -35,7 +35,7 @@ def mechanism_faults(mechanism: Mechanism, section: MechanismSection, *, assembl
     yield from _moments_left_open(mechanism, mech, section)
     if assembled:
         return
-    angles, gaps = close_loops(mechanism, mech)
+    angles, gaps = check_loops_close(mechanism, mech)
     loops = members(section, "loops")
     open_loops = [k for k, gap in enumerate(gaps) if gap > CLOSED * mech.size[0]]
     for k in open_loops:
@@ -54,7 +54,7 @@ def surplus_drives(mechanism: Mechanism) -> tuple[int, ...]:
     mech = pack(mechanism)
     if not mech.a.size or mech.driven < 2:
         return ()
-    angles, gaps = close_loops(mechanism, mech)
+    angles, gaps = check_loops_close(mechanism, mech)
     if gaps.max() > CLOSED * mech.size[0]:
         return ()
     _, _, motions = _least_free(mech, angles)
@@ -170,7 +170,7 @@ def _moments_left_open(mechanism: Mechanism, mech: MechanismArrays, section: Mec
                 break
 
 
-def close_loops(mechanism: Mechanism, mech: MechanismArrays) -> tuple[Floats, Floats]:
+def check_loops_close(mechanism: Mechanism, mech: MechanismArrays) -> tuple[Floats, Floats]:
     """Joint coordinates that close the loops as well as may be, (n,), and the gap left in each loop, (k,) [m]."""
     n = len(mechanism.links.names)
     random = np.random.default_rng(0)

@@ -398,7 +398,7 @@ def _of_its_unit(document: dict[str, Any], steps: KeyPath) -> float:
 
 
 def _finite(document: dict[str, Any]) -> Iterator[tuple[KeyPath, float]]:
-    return ((path, value) for path, value in address.numbers(document) if isfinite(value))
+    return ((path, value) for path, value in address.number_paths(document) if isfinite(value))
 
 
 def _from_zero(document: dict[str, Any], steps: KeyPath) -> float:

@@ -13,7 +13,7 @@ from zwidth.guarantees.port import hold_fixed, port
 from zwidth.guarantees.region import Region, empty_region, outline_columns, stiffness_text
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.guarantees.two_port import (
-    Demand,
+    CouplingDemand,
     coupling_impedance,
     llewellyn_demand,
     raisbeck_demand,
@@ -133,7 +133,7 @@ def coupling_angles(loop: Loop, held: Floats) -> Floats:
     return np.minimum(np.union1d(angles, even), np.pi * (1.0 - 1e-9))
 
 
-def coupling_region(demand: Demand, period: float) -> Region:
+def coupling_region(demand: CouplingDemand, period: float) -> Region:
     """The couplings that meet a demand for every passive environment: rings of [k_c, b_c].
 
     Along a ray from 0 couplings meet it up to  min over angles of Re(1/Z_c)/conductance;  each angle asks for an
@@ -160,7 +160,7 @@ def coupling_region(demand: Demand, period: float) -> Region:
     return Region((ring,), top * float(np.cos(best)) / period, top * float(np.sin(best)))
 
 
-def _excludes_springs(demand: Demand) -> bool:
+def _excludes_springs(demand: CouplingDemand) -> bool:
     """Whether no coupling with a spring meets the demand in the limit of the angle to 0.
 
     Re(1/Z_c) of every coupling with k_c != 0 falls there as theta^2. So does the demand of a device that
@@ -194,7 +194,7 @@ def _stiffest(reach: Callable[[Floats], Floats], near: float) -> float:
     return ends[0] if stiffness(ends[0]) >= (1.0 - LEVEL) * stiffness(top) else top
 
 
-def softest_limit(demand: Demand, wall_stiffness: float, wall_damping: float, period: float) -> Coupling:
+def softest_limit(demand: CouplingDemand, wall_stiffness: float, wall_damping: float, period: float) -> Coupling:
     """The stiffest coupling through which one wall is stable with every passive operator.
 
     Wall Z_w = B + K T z/(z - 1) and coupling in series must stay clear of the disk that the device shows,

@@ -101,7 +101,7 @@ def empty_region(reason: str) -> Region:
     return Region((), float("nan"), float("nan"), reason)
 
 
-def rings_of(shape: Any) -> tuple[Floats, ...]:
+def polygon_rings(shape: Any) -> tuple[Floats, ...]:
     """The rings of a polygon without holes, or of several."""
     parts: Iterable[Any] = getattr(shape, "geoms", [shape])
     solid = [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]

@@ -30,13 +30,13 @@ def with_spring(plant: Plant, stiffness: float) -> Plant:
     >>> with_spring(free, 500.0).stiffness.tolist()
     [[500.0]]
     """
-    handle = handle_of(plant)
+    handle = spring_handle(plant)
     if np.isinf(stiffness):
         return hold_fixed(plant, handle)
     return replace(plant, stiffness=plant.stiffness + stiffness * np.outer(handle, handle))
 
 
-def handle_of(plant: Plant) -> Floats:
+def spring_handle(plant: Plant) -> Floats:
     """The plant's handle. Raises ValueError if it has none."""
     if plant.handle is None:
         raise ValueError("the plant has no handle for a spring to act at")
@@ -49,7 +49,7 @@ def spring_for(plant: Plant, frequency: Floats) -> Floats:
     k = -1/G_hh(jw),      G_hh the undamped compliance at the handle
     """
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
-    part = (shapes.T @ handle_of(plant)) ** 2
+    part = (shapes.T @ spring_handle(plant)) ** 2
     with np.errstate(divide="ignore"):
         compliance = np.sum(part / (squared - np.asarray(frequency)[:, None] ** 2), axis=-1)
         return np.asarray(-1.0 / compliance)

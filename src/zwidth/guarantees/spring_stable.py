@@ -14,8 +14,8 @@ from zwidth.chart.robust.common_edge import common_edge
 from zwidth.chart.robust.members import Member, intersect_members, member_polygons
 from zwidth.guarantees.envelope import EnvelopeCuts
 from zwidth.guarantees.port import without_idle_motions
-from zwidth.guarantees.region import Region, empty_region, rings_of, stiffest_corner
-from zwidth.guarantees.spring_family import SpringFamily, handle_of, polygons_of, spring_for
+from zwidth.guarantees.region import Region, empty_region, polygon_rings, stiffest_corner
+from zwidth.guarantees.spring_family import SpringFamily, polygons_of, spring_for, spring_handle
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import require
@@ -82,7 +82,7 @@ def nyquist_region(loop: Loop) -> Region:
     if poles and poles[0] < DOUBLE**2 * max(poles):  # a double root at -1 that takes long to chart
         return empty_region(UNDAMPED)
     member = springs.member(share)
-    rings = () if member is None else rings_of(member_polygons(member, springs.unit))
+    rings = () if member is None else polygon_rings(member_polygons(member, springs.unit))
     if not rings:
         return empty_region(f"nothing is stable with the Nyquist spring of {k:.6g} N/m")
     return _region(rings, springs.unit, NO_NYQUIST)
@@ -142,7 +142,7 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
         clean = 0 if len(new) else clean + 1
         if clean == CLEAN:
             break
-    region = _region(rings_of(left), springs.unit, NO_SPRING)
+    region = _region(polygon_rings(left), springs.unit, NO_SPRING)
     return replace(region, warning=UNSETTLED.format(len(new))) if len(new) else region
 
 
@@ -302,7 +302,7 @@ def _springs_of_one_alias(springs: SpringFamily) -> Floats:
         return np.zeros(0)
     k = np.geomspace(1e-9 * top, top, MODES_AT)
     root = np.linalg.inv(np.linalg.cholesky(plant.mass))
-    handle = root @ handle_of(plant)
+    handle = root @ spring_handle(plant)
     squared = np.linalg.eigvalsh(root @ plant.stiffness @ root.T + k[:, None, None] * np.outer(handle, handle))
     alias = np.abs((np.sqrt(np.maximum(squared, 0.0)) * T + np.pi) % (2.0 * np.pi) - np.pi)
     first, second = np.triu_indices(alias.shape[1], 1)

@@ -35,7 +35,7 @@ from zwidth.loop.loop import Loop
 
 
 @dataclass(frozen=True)
-class Demand:
+class CouplingDemand:
     """What a device demands of the coupling at each of the angles (k,).
 
     centre, radius  of the disk of admittances it shows, held by any passive operator [m/(N s)]
@@ -75,7 +75,7 @@ def hybrid_matrix(loop: Loop, angles: Floats, held: Floats) -> tuple[Complexes, 
     )
 
 
-def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
+def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand:
     """Absolute stability of the two-port: 2 Re h11 Re h22 >= |h12 h21| + Re(h12 h21), Re h11 >= 0, Re h22 >= 0."""
     h11, h12, h21, h22 = hybrid_matrix(loop, angles, held)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -84,7 +84,7 @@ def llewellyn_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
     return _demand(angles, h22, swing, need, h11.real)
 
 
-def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
+def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand:
     """Passivity of the two-port: 4 Re h11 Re h22 >= |h12 + conj(h21)|^2, Re h11 >= 0, Re h22 >= 0."""
     h11, h12, h21, h22 = hybrid_matrix(loop, angles, held)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -93,24 +93,26 @@ def raisbeck_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
     return _demand(angles, h22, swing, need, h11.real)
 
 
-def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> Demand:
+def sampled_demand(loop: Loop, angles: Floats, held: Floats) -> CouplingDemand:
     """Stability with any passive operator and environment of the sampled device, velocity by (z - 1)/(T z)."""
     disks = response_disks(loop, port(loop.plant, held), angles)
     difference = 2j * np.sin(angles / 2.0) * np.exp(-0.5j * angles) / loop.period
     centre, radius = disks.centre * difference, disks.radius * np.abs(difference)
-    return Demand(angles, centre, radius, disks.power * np.abs(difference) ** 2, radius - centre.real)
+    return CouplingDemand(angles, centre, radius, disks.power * np.abs(difference) ** 2, radius - centre.real)
 
 
-def _demand(angles: Floats, fixed: Complexes, swing: Complexes, need: Floats, resistance: Floats) -> Demand:
+def _demand(
+    angles: Floats, fixed: Complexes, swing: Complexes, need: Floats, resistance: Floats
+) -> CouplingDemand:
     """The demand of a device that shows the admittance `fixed` where it is held fixed, and up to the swing more or
     less; inf where it dissipates nothing at the handle."""
     dead = ~(resistance > 0.0)
     centre, radius = np.where(dead, 0.0, fixed - swing), np.where(dead, np.inf, np.abs(swing))
     power = np.abs(fixed) ** 2 - 2.0 * np.real(fixed * swing.conj())
-    return Demand(angles, centre, radius, np.where(dead, -np.inf, power), np.where(dead, np.inf, need))
+    return CouplingDemand(angles, centre, radius, np.where(dead, -np.inf, power), np.where(dead, np.inf, need))
 
 
-def allows(demand: Demand, stiffness: ArrayLike, damping: ArrayLike, period: float) -> Flags:
+def allows(demand: CouplingDemand, stiffness: ArrayLike, damping: ArrayLike, period: float) -> Flags:
     """Whether couplings k_c, b_c (...) meet a demand at all its angles."""
     Z = coupling_impedance(stiffness, damping, demand.angles, period)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -20,7 +20,7 @@ from .arm.parameters import base_parameters as base_parameters
 from .boundary.fit import fit_boundary as fit_boundary
 from .boundary.model import BoundaryModel as BoundaryModel
 from .boundary.parameters import BoundaryParameters as BoundaryParameters
-from .boundary.points import read_points as read_points
+from .boundary.points import read_boundary_points as read_boundary_points
 from .profile_likelihood import fit_least_squares as fit_least_squares
 from .records.record import Columns as Columns
 from .records.sampling import check_sampling as check_sampling

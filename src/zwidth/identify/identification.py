@@ -168,7 +168,7 @@ class Identification(Result):
             if one.told == "no":
                 lines.append(f"  {one.path or one.name} is not told: {one.reason}")
                 continue
-            lines.append(f"  {one.path or one.name} = {value_text(one)}, {interval(one)} {one.unit}".rstrip())
+            lines.append(f"  {one.path or one.name} = {estimate_text(one)}, {interval(one)} {one.unit}".rstrip())
         lines += [f"  {text}" for text in self.left_out]
         return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
 
@@ -188,7 +188,7 @@ def interval(estimate: Estimate) -> str:
     return f"above {low}" if estimate.high == inf else f"{low} to {high}"
 
 
-def value_text(estimate: Estimate) -> str:
+def estimate_text(estimate: Estimate) -> str:
     """The value with the digits of its interval; in words where it is not told."""
     if estimate.told == "no":
         return "not told"

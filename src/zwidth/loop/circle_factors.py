@@ -134,7 +134,7 @@ def half_angle(t: float) -> tuple[float, float, float]:
 
 
 @compiled_inline
-def scaled(value: complex, factor: float) -> complex:
+def scaled_factors(value: complex, factor: float) -> complex:
     """A complex number times a real one; the plain product would make that complex, too."""
     return complex(value.real * factor, value.imag * factor)
 
@@ -195,7 +195,7 @@ def minus_inverse_plant(
         num, dnum = quadratic(plant[k, 3], plant[k, 4], plant[k, 5], cc, ss, sc)
         if split:
             old, dold = quadratic(plant[k, 6], plant[k, 7], plant[k, 8], cc, ss, sc)
-            back = scaled(u.conjugate(), 1.0 / f.radius[0])
+            back = scaled_factors(u.conjugate(), 1.0 / f.radius[0])
             num, dnum = num + old * back, dnum + (dold - turned(old)) * back
         if plant[k, 9] != 0.0:
             dbeside = (dbeside - turned(beside)) * u.conjugate()
@@ -209,9 +209,9 @@ def minus_inverse_plant(
     bottom, dbottom = -bottom, -dbottom
     top, dtop, size, dsize = factor_product(f.force, f.sizes[FORCE], cc, ss, sc, top, dtop)
     for _ in range(delay):
-        dbottom = scaled((dbottom + turned(bottom)) * u, f.radius[0])
-        bottom = scaled(bottom * u, f.radius[0])
-    return scaled(bottom, size), scaled(dbottom, size) + scaled(bottom, dsize), top, dtop
+        dbottom = scaled_factors((dbottom + turned(bottom)) * u, f.radius[0])
+        bottom = scaled_factors(bottom * u, f.radius[0])
+    return scaled_factors(bottom, size), scaled_factors(dbottom, size) + scaled_factors(bottom, dsize), top, dtop
 
 
 @compiled_inline
@@ -222,7 +222,7 @@ def velocity_on_circle(f: CircleFactors, cc: float, ss: float, sc: float) -> tup
     value, slope = complex(window[n - 1], 0.0), 0.0 + 0.0j
     if n > 1:
         # Horner's scheme in 1/z, oldest sample first
-        back = scaled(complex(cc - ss, -2.0 * sc), 1.0 / f.radius[0])
+        back = scaled_factors(complex(cc - ss, -2.0 * sc), 1.0 / f.radius[0])
         for k in range(n - 2, -1, -1):
             slope = slope * back + value
             value = value * back + complex(window[k], 0.0)
@@ -236,11 +236,11 @@ def wall_with_slopes(f: CircleFactors, t: float) -> tuple[float, float, float, f
     cc, ss, sc = half_angle(t)
     X, dX, N, dN = minus_inverse_plant(f, cc, ss, sc)
     Y, dY, Q, dQ = velocity_on_circle(f, cc, ss, sc)
-    inverse = scaled(N.conjugate(), 1.0 / (N.real * N.real + N.imag * N.imag))
+    inverse = scaled_factors(N.conjugate(), 1.0 / (N.real * N.real + N.imag * N.imag))
     h = X * inverse
     dh = (dX - h * dN) * inverse
-    w = scaled(Y, 1.0 / Q)
-    dw = scaled(dY - scaled(w, dQ), 1.0 / Q)
+    w = scaled_factors(Y, 1.0 / Q)
+    dw = scaled_factors(dY - scaled_factors(w, dQ), 1.0 / Q)
     across = 1.0 / w.imag
     B = h.imag * across
     dB = (dh.imag - B * dw.imag) * across

@@ -14,7 +14,7 @@ from zwidth.loop.exact_polynomials import (
     MOST_STATES,
     characteristic_polynomial,
     decimals,
-    dot,
+    exact_dot,
     refined_root,
 )
 from zwidth.loop.hold import lag_share
@@ -128,12 +128,19 @@ def exact_rows(form: FirstOrderForm, sampled: SampledForm, period: float) -> Flo
             (x, y), (x2, y2) = found
             d1, d0 = -(x + x2), x * x2 - y * y2
             row = [d1, d0]
-            through = [[dot(line, G) for line in E] for _, G in parts]
+            through = [[exact_dot(line, G) for line in E] for _, G in parts]
             for (direct, G), moved in zip(parts, through, strict=True):
-                row += [direct, dot(c, G) + direct * d1, dot(c, moved) + d1 * dot(c, G) + direct * d0]
+                row += [
+                    direct,
+                    exact_dot(c, G) + direct * d1,
+                    exact_dot(c, moved) + d1 * exact_dot(c, G) + direct * d0,
+                ]
             rows.append([float(value) for value in row])
             parts = [
-                (Decimal(0), [dot(line, moved) + d1 * m + d0 * g for line, m, g in zip(E, moved, G, strict=True)])
+                (
+                    Decimal(0),
+                    [exact_dot(line, moved) + d1 * m + d0 * g for line, m, g in zip(E, moved, G, strict=True)],
+                )
                 for (_, G), moved in zip(parts, through, strict=True)
             ]
     return np.array(rows).reshape(-1, 8)

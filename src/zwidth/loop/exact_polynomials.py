@@ -116,7 +116,7 @@ def decimals(values: Floats) -> list[Decimal]:
     return list(map(Decimal, values.tolist()))
 
 
-def dot(first: Sequence[Decimal], second: Sequence[Decimal]) -> Decimal:
+def exact_dot(first: Sequence[Decimal], second: Sequence[Decimal]) -> Decimal:
     """Sum of products, in the digits of the context that is in force."""
     return sum((a * b for a, b in zip(first, second, strict=True)), Decimal(0))
 

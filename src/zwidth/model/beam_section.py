@@ -25,7 +25,7 @@ ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True)
-class Section:
+class CrossSection:
     """A cross section with two axes of symmetry, y and z.
 
     area             A [m^2]
@@ -51,7 +51,7 @@ class Section:
         return self.second_moment_y + self.second_moment_z
 
 
-def round_rod(diameter: float) -> Section:
+def round_rod(diameter: float) -> CrossSection:
     """A solid round rod: A = pi d^2 / 4, I = pi d^4 / 64, J = 2 I, all exact.
 
     diameter  d [m]
@@ -62,10 +62,10 @@ def round_rod(diameter: float) -> Section:
     """
     check_number("diameter", diameter, "m", above=0.0)
     I = pi * diameter**4 / 64.0
-    return Section(pi * diameter**2 / 4.0, I, I, 2.0 * I)
+    return CrossSection(pi * diameter**2 / 4.0, I, I, 2.0 * I)
 
 
-def tube(outer_diameter: float, wall: float) -> Section:
+def tube(outer_diameter: float, wall: float) -> CrossSection:
     """A round tube: A = pi (D^2 - d^2) / 4, I = pi (D^4 - d^4) / 64, J = 2 I, all exact, with d = D - 2 wall.
 
     outer_diameter  D [m]
@@ -79,10 +79,10 @@ def tube(outer_diameter: float, wall: float) -> Section:
     sum_, difference = outer_diameter + d, outer_diameter - d
     A = pi * difference * sum_ / 4.0
     I = A * (outer_diameter**2 + d**2) / 16.0
-    return Section(A, I, I, 2.0 * I)
+    return CrossSection(A, I, I, 2.0 * I)
 
 
-def rectangle(width: float, height: float) -> Section:
+def rectangle(width: float, height: float) -> CrossSection:
     """A solid rectangle, `width` along y and `height` along z [m].
 
         I_y = width height^3 / 12,   I_z = height width^3 / 12
@@ -102,10 +102,10 @@ def rectangle(width: float, height: float) -> Section:
     # tanh x = 1 - 2 / (exp(2 x) + 1): the ones sum to a constant, and the rest falls at least by exp(-2 pi) a term
     rest = sum(2.0 / (n**5 * (exp(min(n * pi * a / b, 700.0)) + 1.0)) for n in range(1, 12, 2))
     J = a * b**3 / 3.0 * (1.0 - 192.0 * b / (pi**5 * a) * (ODD_FIFTH_POWERS - rest))
-    return Section(width * height, width * height**3 / 12.0, height * width**3 / 12.0, J)
+    return CrossSection(width * height, width * height**3 / 12.0, height * width**3 / 12.0, J)
 
 
-def rectangular_tube(width: float, height: float, wall: float) -> Section:
+def rectangular_tube(width: float, height: float, wall: float) -> CrossSection:
     """A box, `width` along y and `height` along z on the outside, with one wall thickness [m] and sharp corners.
 
     A, I_y and I_z are exact. The torsion constant is Bredt's for a thin wall,
@@ -123,7 +123,7 @@ def rectangular_tube(width: float, height: float, wall: float) -> Section:
     _check_wall(wall, min(width, height), shorter, f"rectangle({width:.10g}, {height:.10g})")
     inner_width, inner_height = max(width - 2.0 * wall, 0.0), max(height - 2.0 * wall, 0.0)
     b, h = width - wall, height - wall
-    return Section(
+    return CrossSection(
         width * height - inner_width * inner_height,
         (width * height**3 - inner_width * inner_height**3) / 12.0,
         (height * width**3 - inner_height * inner_width**3) / 12.0,
@@ -217,7 +217,7 @@ class BeamProperties:
         check_number("torsional_inertia_per_length", self.torsional_inertia_per_length, "kg m", above=0.0)
 
 
-def beam_properties(length: float, section: Section, material: Material) -> BeamProperties:
+def beam_properties(length: float, section: CrossSection, material: Material) -> BeamProperties:
     """The beam of a section and a material, `length` long [m].
 
     Raises  ValueError  unless the length is a finite number greater than 0

@@ -60,7 +60,7 @@ from .designs.study_schema import StudyFile as StudyFile
 from .designs.sweep_job import SweepJob as SweepJob
 from .designs.sweep_job import sweep_job as sweep_job
 from .jobs.executor import RecoveredWarning as RecoveredWarning
-from .jobs.executor import run as run
+from .jobs.executor import run_job as run_job
 from .jobs.job import CellValues as CellValues
 from .jobs.journal import Journal as Journal
 from .jobs.journal import fingerprint as fingerprint
@@ -70,7 +70,7 @@ from .jobs.workers import pack_job as pack_job
 from .optimisation.evaluation import Judge as Judge
 from .optimisation.optimisation import hypervolume as hypervolume
 from .optimisation.polish import gradients as gradients
-from .optimisation.polish import neighbours as neighbours
+from .optimisation.polish import neighbouring_designs as neighbouring_designs
 from .optimisation.problem import problem_of as problem_of
 from .optimisation.problem import study_to_optimise as study_to_optimise
 from .optimisation.search import settle as settle

@@ -55,7 +55,7 @@ SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
 
 
 @dataclass(frozen=True)
-class Fit:
+class ModelFit:
     """Error of one model against the full one along the edge.
 
     key           "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
@@ -98,7 +98,7 @@ class Validity(Result):
     frequency: Floats
     walls: Floats
     arc: Ints
-    fits: tuple[Fit, ...]
+    fits: tuple[ModelFit, ...]
 
     def document(self) -> dict[str, Any]:
         """The tolerance, and where along the edge each model stays within it, by key and unit."""
@@ -259,16 +259,16 @@ class _Edge:
 
 def _fit(
     edge: _Edge, controller: Controller, key: str, label: str, plant: Plant | None, reason: str, tolerance: float
-) -> Fit:
-    """The `Fit` of one model to the full one; `reason` says why it has no plant."""
+) -> ModelFit:
+    """The `ModelFit` of one model to the full one; `reason` says why it has no plant."""
     none = np.empty(0)
     if plant is None:
-        return Fit(key, label, none, none, (), reason)
+        return ModelFit(key, label, none, none, (), reason)
     try:
         model = Loop(plant, controller)
         chart, tracer = stability_chart(model, decay=False).drawn(), Tracer(model)
     except (ChartError, ModelError) as problem:
-        return Fit(key, label, none, none, (), str(problem))
+        return ModelFit(key, label, none, none, (), str(problem))
 
     def fits(frequency: float) -> bool:
         return bool(_error(edge.wall(frequency), chart, tracer)[0] <= tolerance)
@@ -278,7 +278,7 @@ def _fit(
         (_range_end(edge.frequency, fits, first, first - 1), _range_end(edge.frequency, fits, last, last + 1))
         for first, last in _runs(np.asarray(error <= tolerance))
     ]
-    return Fit(key, label, edge.frequency, error, tuple(within))
+    return ModelFit(key, label, edge.frequency, error, tuple(within))
 
 
 def _range_end(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:

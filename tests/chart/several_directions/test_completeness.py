@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from zwidth.chart import Box, multi_chart, trace_curves
+from zwidth.chart import WallBox, multi_chart, trace_curves
 from zwidth.chart.several_directions.completeness import shows_all_walls, walls_beside_regions
 from zwidth.chart.verdict import sides_of_circle
 from zwidth.loop import Controller, MultiLoop, WallMatrices
@@ -72,10 +72,10 @@ def test_an_edge_of_a_cell_that_is_left_out_is_found():
     cell = shapely.Polygon(ring * (loop.period, 1.0))
     low, high = np.array(cell.bounds).reshape(2, 2)
     angles = curves.angles
-    assert len(walls_beside_regions(loop, curves.equations, angles, [cell], Box(low, high))) == 0
+    assert len(walls_beside_regions(loop, curves.equations, angles, [cell], WallBox(low, high))) == 0
     sliver = shapely.box(*low, *(low + 1e-3 * (high - low)))
-    assert len(walls_beside_regions(loop, curves.equations, angles, [sliver], Box(low, high))) > 20
-    assert len(walls_beside_regions(loop, curves.equations, angles, [], Box(low, high))) > 20
+    assert len(walls_beside_regions(loop, curves.equations, angles, [sliver], WallBox(low, high))) > 20
+    assert len(walls_beside_regions(loop, curves.equations, angles, [], WallBox(low, high))) > 20
 
 
 def test_walls_on_the_stability_limit_and_beside_it_are_told_apart():

@@ -62,7 +62,7 @@ class Boundary:
         )
 
 
-def first_angles(loop: MeasuredLoop) -> Floats:
+def first_measured_angles(loop: MeasuredLoop) -> Floats:
     """The measured angles, three between each two, and angles that close in on ends and asymptotes."""
     measured = loop.angles_below_pi
     shares = np.arange(4) / 4.0
@@ -116,7 +116,7 @@ def coarse_angles(loop: MeasuredLoop) -> Floats:
     def tolerances(a: Floats, b: Floats, middle: Floats) -> Floats:
         return np.asarray(COARSE * np.hypot(*middle.T))
 
-    return _bisect_chords(loop, first_angles(loop), np.zeros(2), scales, tolerances)
+    return _bisect_chords(loop, first_measured_angles(loop), np.zeros(2), scales, tolerances)
 
 
 def _bisect_chords(
@@ -202,7 +202,7 @@ def sample_boundary(loop: MeasuredLoop, angles: Floats, reference_boundary: Boun
     return _with_reference(loop, Boundary(angles, walls, orientation, segments, jumps, at, np.zeros(2), 0))
 
 
-def real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
+def measured_real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float]:
     """h and w of the line K + B w = h of real roots at z = 1 (kind -1) or -1 (kind -2); h is inf without one."""
     if kind == -1:
         near = np.array([NEAREST * loop.angles[0]])
@@ -219,7 +219,7 @@ def _real_line(loop: MeasuredLoop, near: float, kind: int, far: float) -> tuple[
     On it D = K + B w - h = 0. The root moves by -dK / D', and D' (z = +-1) has the sign of -+(B Im w - Im h)
     at an angle just beside.
     """
-    h, w = real_root(loop, kind)
+    h, w = measured_real_root(loop, kind)
     if not np.isfinite(h):
         return np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     theta = np.array([near])
@@ -253,7 +253,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[In
 
     Returns  (n,) counts, and the least |1 + L| / (1 + |L|) along the way (n,): near 0 the count is not sure
     """
-    h, w = real_root(loop, -1)
+    h, w = measured_real_root(loop, -1)
     static = np.sign(walls[:, 0]) if loop.integrators else np.sign(1.0 - (walls[:, 0] + walls[:, 1] * w) / h)
     start = np.where(static > 0.0, 0.0, np.pi)
     turn, clear, last = np.empty(len(walls)), np.empty(len(walls)), np.empty(len(walls), dtype=np.complex128)
@@ -264,7 +264,7 @@ def nyquist_count(loop: MeasuredLoop, angles: Floats, walls: Floats) -> tuple[In
         turn[some] = first - 0.5 * np.pi * loop.integrators + np.sum(np.angle(F[:, 1:] / F[:, :-1]), axis=1)
         last[some] = F[:, -1]
     if loop.interpolation.closed:
-        h, w = real_root(loop, -2)
+        h, w = measured_real_root(loop, -2)
         end = 1.0 - (walls[:, 0] + walls[:, 1] * w) / h
         turn += np.angle(end / last)
     else:

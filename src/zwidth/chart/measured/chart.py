@@ -24,8 +24,8 @@ from zwidth.chart.chart_base import BoundaryArc, Chart, DrawnChart
 from zwidth.chart.measured.boundary import (
     Boundary,
     coarse_angles,
-    first_angles,
-    real_root,
+    first_measured_angles,
+    measured_real_root,
     refine_angles,
     sample_boundary,
 )
@@ -33,8 +33,8 @@ from zwidth.chart.measured.doubt import Doubt, EdgeFrequencies, MeasuredVerdicts
 from zwidth.chart.measured.loop import MeasuredLoop, UnusableRange
 from zwidth.chart.measured.stable_regions import (
     LINES,
-    Band,
     CertainWall,
+    DoubtBand,
     StableRegions,
     angles_at_wall,
     band_rings,
@@ -92,7 +92,7 @@ class MeasuredChart(DrawnChart):
     edge: Boundary
     interpolation_error: float
     measured_stiffness_max: float
-    band: Band | None
+    band: DoubtBand | None
     stiffness_max_of_sweeps: tuple[float, ...]
     unusable: tuple[UnusableRange, ...]
     open: bool
@@ -307,7 +307,7 @@ def _empty_chart(loop: MeasuredLoop) -> MeasuredChart:
         edge=sample_boundary(loop, coarse_angles(loop)),
         interpolation_error=nan,
         measured_stiffness_max=nan,
-        band=None if loop.errors is None else Band((), nan, nan, _meaning(loop)),
+        band=None if loop.errors is None else DoubtBand((), nan, nan, _meaning(loop)),
         stiffness_max_of_sweeps=(),
         unusable=loop.unusable,
         open=False,
@@ -361,7 +361,7 @@ def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredCh
 
 def _within_error(
     loop: MeasuredLoop, cells: StableRegions, zoomed: StableRegions, nominal: CertainWall, opened: bool
-) -> tuple[CertainWall, Band | None]:
+) -> tuple[CertainWall, DoubtBand | None]:
     """The stiffest wall that is stable for certain, and the band of the error.
 
     The nominal one and None where no error is known; none and None where the edge is open.
@@ -381,7 +381,7 @@ def _within_error(
         certain = certain if closer.stiffness < certain.stiffness else closer
     if nominal.stiffness < certain.stiffness:  # it is found with finer chords
         certain = nominal
-    return certain, Band(
+    return certain, DoubtBand(
         regions=band_rings(loop, cells),
         stiffness_low=certain.stiffness,
         stiffness_high=largest_possible(cells.edge, doubt, nominal, most_damping),
@@ -393,7 +393,7 @@ def doubt_along(loop: MeasuredLoop, edge: Boundary, box: Window) -> Doubt | None
     """What the measurement's error leaves in doubt, at angles close enough for walls within a box."""
     if loop.errors is None:
         return None
-    every = np.union1d(first_angles(loop), edge.angles[:: max(1, len(edge.angles) // MOST_DOUBTED)])
+    every = np.union1d(first_measured_angles(loop), edge.angles[:: max(1, len(edge.angles) // MOST_DOUBTED)])
     return doubt_of(loop, refine_angles(loop, every, box, DOUBT_CHORD))
 
 
@@ -423,7 +423,7 @@ def _arcs(loop: MeasuredLoop, cells: StableRegions) -> Iterator[BoundaryArc]:
             yield BoundaryArc(K, B, given, stiffness_low=least, stiffness_high=most)
     lines = [(-1, 0.0), (-2, half)] if loop.interpolation.closed else [(-1, 0.0)]
     for kind, frequency in lines:
-        static, turned = real_root(loop, kind)
+        static, turned = measured_real_root(loop, kind)
         if not np.isfinite(static):
             continue
         for cell in cells.polygons:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Complexes, Flags, Floats, Ints
-from zwidth.chart.measured.boundary import Boundary, real_root
+from zwidth.chart.measured.boundary import Boundary, measured_real_root
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.verdict import STABLE, UNDECIDED, UNSTABLE, WallVerdicts
 from zwidth.model.argument_checks import broadcast_walls as broadcast_walls
@@ -153,7 +153,7 @@ def doubt_of(loop: MeasuredLoop, angles: Floats) -> Doubt | None:
 
 def _real_root(loop: MeasuredLoop, kind: int) -> tuple[float, float, complex, complex, float, float]:
     """The doubt about a root at z = 1 (kind -1) or z = -1 (kind -2): angle, scale, response, w, radius, rest."""
-    h, w = real_root(loop, kind)
+    h, w = measured_real_root(loop, kind)
     if kind == -1:
         rest = float(loop.error_below(np.zeros(1))[0])
         return 0.0, abs(h), complex(-np.sign(h) or -1.0), complex(w), 0.0, rest

@@ -30,7 +30,13 @@ from shapely.geometry.polygon import orient
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.chart.arcs import DAMPING, STIFFNESS, Arcs, Window, cut_at_holes
 from zwidth.chart.area import find_peak
-from zwidth.chart.measured.boundary import Boundary, real_root, refine_angles, sample_boundary, wall_scales
+from zwidth.chart.measured.boundary import (
+    Boundary,
+    measured_real_root,
+    refine_angles,
+    sample_boundary,
+    wall_scales,
+)
 from zwidth.chart.measured.doubt import Doubt
 from zwidth.chart.measured.loop import MeasuredLoop
 
@@ -160,7 +166,7 @@ def _walls_in_sectors(loop: MeasuredLoop, beside: float) -> Floats:
 
     beside  their distance from it, in damping
     """
-    (h0, w0), (h1, w1) = real_root(loop, -1), real_root(loop, -2)
+    (h0, w0), (h1, w1) = measured_real_root(loop, -1), measured_real_root(loop, -2)
     if not loop.interpolation.closed or not np.isfinite(h1) or abs(w1 - w0) * loop.period < 1e-9:
         return np.empty((0, 2))
     B = (h1 - h0) / (w1 - w0)
@@ -243,7 +249,7 @@ LARGEST_DRAWN = 0.9  # relative error of the response whose ellipse is drawn at 
 
 
 @dataclass(frozen=True)
-class Band:
+class DoubtBand:
     """The doubtful walls along the stable set's edge.
 
     regions         rings (k, 2) of [stiffness, damping] that cover them

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.chart.hurwitz import is_stable, work_array
+from zwidth.chart.hurwitz import all_roots_inside, work_array
 from zwidth.chart.loop_polynomials import (
     LoopPolynomials,
     fill_loop_polynomials,
@@ -34,7 +34,7 @@ def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Flags:
     N = polynomials.shape[1] - 1
     room = work_array(N)
     for i in range(len(K)):
-        out[i] = is_stable(polynomials, N, K[i], B[i], room) <= 0
+        out[i] = all_roots_inside(polynomials, N, K[i], B[i], room) <= 0
     return out
 
 
@@ -42,7 +42,7 @@ def perhaps_unstable(polynomials: Floats, K: Floats, B: Floats) -> Flags:
 def mark_unstable(polynomials: Floats, N: int, K: Floats, B: Floats, room: Floats, out: Flags) -> None:
     """Mark the walls (k,) that are certainly unstable for a loop of degree N."""
     for i in range(len(K)):
-        out[i] = is_stable(polynomials, N, K[i], B[i], room) < 0
+        out[i] = all_roots_inside(polynomials, N, K[i], B[i], room) < 0
 
 
 def unstable_walls(loops: LoopTable, K: Floats, B: Floats) -> Flags:
@@ -129,13 +129,13 @@ def _softening(polynomials: Floats, N: int, K: float, B: float, room: Floats) ->
         good = min(bad + step, 1.0)
         if good >= 1.0:
             return K
-        if is_stable(polynomials, N, K * (1.0 - good), B, room) > 0:
+        if all_roots_inside(polynomials, N, K * (1.0 - good), B, room) > 0:
             break
         bad = good
         step = 0.25 * bad
     for _ in range(40):
         middle = 0.5 * (bad + good)
-        if is_stable(polynomials, N, K * (1.0 - middle), B, room) > 0:
+        if all_roots_inside(polynomials, N, K * (1.0 - middle), B, room) > 0:
             good = middle
         else:
             bad = middle

@@ -13,7 +13,7 @@ import shapely
 
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import MINUS, PLUS, signed_area
-from zwidth.chart.hurwitz import is_stable, work_array
+from zwidth.chart.hurwitz import all_roots_inside, work_array
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import ROOTS, Tracer
@@ -44,7 +44,7 @@ class Member:
     def unstable(self, K: float, B: float) -> bool:
         """Whether a wall is unstable beyond doubt: by its polynomial, and by its eigenvalues, too."""
         tracer = self.tracer
-        if is_stable(tracer.polynomials, tracer.degree, K, B, work_array(tracer.degree)) >= 0:
+        if all_roots_inside(tracer.polynomials, tracer.degree, K, B, work_array(tracer.degree)) >= 0:
             return False
         radius = np.abs(np.linalg.eigvals(tracer.loop.transition_matrix(K, B))).max()
         return bool(radius > 1.0 + BEYOND_DOUBT)

@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, correct
-from zwidth.chart.several_directions.wall_curves import Box
+from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, correct_point
+from zwidth.chart.several_directions.wall_curves import WallBox
 
 # A wall continues in another one if it misses it by less than these shares of their distance, and of what it
 # misses the next best by.
@@ -36,7 +36,7 @@ MOST: Final = 20000
 
 
 @dataclass(frozen=True)
-class Samples:
+class BranchSamples:
     """All walls at ascending parameters.
 
     parameters  (N,)
@@ -49,7 +49,7 @@ class Samples:
     slopes: Floats
 
     @classmethod
-    def of(cls, equation: RootEquation, parameters: Floats) -> Samples:
+    def of(cls, equation: RootEquation, parameters: Floats) -> BranchSamples:
         """Samples at ascending parameters (N,)."""
         with np.errstate(all="ignore"):
             walls = equation.solutions(parameters)
@@ -61,12 +61,12 @@ class Samples:
             slopes[n, q, 1] = (J[:, 1, 1] * J[:, 0, 0] - J[:, 0, 1] * J[:, 1, 0]) / volume
         return cls(parameters, walls, slopes)
 
-    def with_more(self, equation: RootEquation, parameters: Floats) -> Samples:
+    def with_more(self, equation: RootEquation, parameters: Floats) -> BranchSamples:
         """These samples and those at more parameters."""
-        more = Samples.of(equation, np.setdiff1d(parameters, self.parameters))
+        more = BranchSamples.of(equation, np.setdiff1d(parameters, self.parameters))
         together = np.concatenate([self.parameters, more.parameters])
         order = np.argsort(together)
-        return Samples(
+        return BranchSamples(
             together[order],
             np.concatenate([self.walls, more.walls])[order],
             np.concatenate([self.slopes, more.slopes])[order],
@@ -91,7 +91,9 @@ class _Fold(NamedTuple):
     direction: Floats
 
 
-def trace_branches(equation: RootEquation, samples: Samples, box: Box) -> tuple[Samples, list[CurvePoints]]:
+def trace_branches(
+    equation: RootEquation, samples: BranchSamples, box: WallBox
+) -> tuple[BranchSamples, list[CurvePoints]]:
     """The branches within a box, and the samples that it took. A closed branch ends in the point it begins in."""
     for _ in range(ROUNDS):
         forward, folds, unclear = _link(equation, samples, box)
@@ -105,7 +107,7 @@ def trace_branches(equation: RootEquation, samples: Samples, box: Box) -> tuple[
 
 
 @np.errstate(all="ignore")
-def _link(equation: RootEquation, samples: Samples, box: Box) -> tuple[Ints, list[_Fold], Flags]:
+def _link(equation: RootEquation, samples: BranchSamples, box: WallBox) -> tuple[Ints, list[_Fold], Flags]:
     """Number (N - 1, q) of the wall at the next parameter in which each continues, -1 for none; folds; and the
     intervals (N - 1,) in which links are missing."""
     forward = _continuations(samples, box)
@@ -121,7 +123,7 @@ def _link(equation: RootEquation, samples: Samples, box: Box) -> tuple[Ints, lis
     return forward, folds, np.asarray(ahead[:-1].any(axis=1) | behind[1:].any(axis=1))
 
 
-def _continuations(samples: Samples, box: Box) -> Ints:
+def _continuations(samples: BranchSamples, box: WallBox) -> Ints:
     """Number (N - 1, q) of the wall at the next parameter in which each clearly continues, -1 for none."""
     x, slopes = samples.walls / box.size, samples.slopes / box.size
     step = np.diff(samples.parameters)[:, None, None, None]
@@ -147,7 +149,7 @@ def _continuations(samples: Samples, box: Box) -> Ints:
     return np.where(forwards | (first & (length <= SAME)), best, -1)
 
 
-def _folds(equation: RootEquation, samples: Samples, box: Box, open_: Flags, way: int) -> list[_Fold]:
+def _folds(equation: RootEquation, samples: BranchSamples, box: WallBox, open_: Flags, way: int) -> list[_Fold]:
     """Pairs of walls at one parameter, without continuation one way, that turn back into each other.
 
     open_  (N, q)  which walls lack a continuation
@@ -165,7 +167,7 @@ def _folds(equation: RootEquation, samples: Samples, box: Box, open_: Flags, way
     scale = np.array([1.0, *box.size])
     middles = np.column_stack([u[n], 0.5 * (x[n, a] + x[n, b])])
     normals = np.column_stack([np.zeros(len(n)), chord / box.size])
-    points, tangents, settled = correct(equation, middles, normals, scale)
+    points, tangents, settled = correct_point(equation, middles, normals, scale)
     length = np.linalg.norm(chord, axis=1)
     off = np.linalg.norm((points - middles)[:, 1:] / box.size, axis=1)
     straight = np.abs(_cosine(tangents[:, 1:], chord)) > ALONG
@@ -188,7 +190,7 @@ def _cosine(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.einsum("ni,ni->n", one, other) / length)
 
 
-def _walks(samples: Samples, forward: Ints, folds: list[_Fold]) -> list[CurvePoints]:
+def _walks(samples: BranchSamples, forward: Ints, folds: list[_Fold]) -> list[CurvePoints]:
     """Linked walls, one branch after the other."""
     q = samples.walls.shape[1]
     joints: list[_Fold | None] = []

@@ -28,7 +28,7 @@ from zwidth.chart.several_directions.completeness import (
 )
 from zwidth.chart.several_directions.curve_set import CurveSet, trace_curves
 from zwidth.chart.several_directions.polygon_arcs import Branch, ring_arcs
-from zwidth.chart.several_directions.wall_curves import Box, WallCurve
+from zwidth.chart.several_directions.wall_curves import WallBox, WallCurve
 from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import Verdicts, sides_of_circle, verdicts
 from zwidth.loop.loop import Loop
@@ -61,7 +61,7 @@ class _Cells:
     curves: CurveSet
     inside: list[WallCurve]
     polygons: list[shapely.Polygon]
-    box: Box
+    box: WallBox
     raster: Raster
 
 
@@ -238,10 +238,10 @@ def _stable_cells(loop: MultiLoop, curves: CurveSet) -> _Cells:
     if box is None:
         raster = try_orders(loop, curves.samples)
         if not raster.differs.any():
-            return _Cells(curves, [], [], Box(-np.ones(2), np.ones(2)), raster)
-        curves = curves.with_angles(missed_angles(loop, raster, [], Box(np.zeros(2), np.ones(2))))
+            return _Cells(curves, [], [], WallBox(-np.ones(2), np.ones(2)), raster)
+        curves = curves.with_angles(missed_angles(loop, raster, [], WallBox(np.zeros(2), np.ones(2))))
         far = ROOM * np.abs(raster.walls[raster.differs]).max(axis=0)
-        box = box_of_edges(loop, curves.samples, curves.lines) or Box(-far, far)
+        box = box_of_edges(loop, curves.samples, curves.lines) or WallBox(-far, far)
     tolerance = COARSE
     for _ in range(MOST_LOOKS):
         curves, inside = curves.within(box, tolerance)
@@ -272,15 +272,15 @@ def _angles_beside(loop: MultiLoop, off: Floats) -> Floats:
     return np.unique(np.abs(np.angle(z[np.abs(z) > 1.0 - NEAR_CIRCLE]))[:, None] * (1.0 + BESIDE))
 
 
-def _fitting_box(polygons: list[shapely.Polygon], box: Box) -> Box:
+def _fitting_box(polygons: list[shapely.Polygon], box: WallBox) -> WallBox:
     """A box with a margin about stable cells found in another one; wider where they end at its side, and smaller
     where there are none."""
     if not polygons:
-        return Box(box.low / NARROWER, box.high / NARROWER)
+        return WallBox(box.low / NARROWER, box.high / NARROWER)
     low, high = np.array(shapely.total_bounds(np.array(polygons))).reshape(2, 2)
     near = AT_SIDE * box.size
-    fitting = Box(low, high).with_margin(MARGIN)
-    return Box(
+    fitting = WallBox(low, high).with_margin(MARGIN)
+    return WallBox(
         np.where(low - box.low <= near, box.low - WIDER * box.size, fitting.low),
         np.where(box.high - high <= near, box.high + WIDER * box.size, fitting.high),
     )

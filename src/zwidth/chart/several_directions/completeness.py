@@ -37,7 +37,7 @@ import scipy.linalg
 import shapely
 
 from zwidth.arrays import Complexes, Flags, Floats
-from zwidth.chart.several_directions.wall_curves import Box, StraightLine, WallCurve
+from zwidth.chart.several_directions.wall_curves import StraightLine, WallBox, WallCurve
 from zwidth.chart.several_directions.wall_equation import WallEquation
 from zwidth.chart.verdict import WALL_ROUNDING, distances_from_circle
 from zwidth.loop.multi_loop import MultiLoop
@@ -58,7 +58,7 @@ def walls_beside_regions(
     equations: Sequence[WallEquation],
     thetas: Floats,
     polygons: Sequence[shapely.Polygon],
-    box: Box,
+    box: WallBox,
 ) -> Floats:
     """Walls (k, 2) of [K T, B] on the edge of the stable set that lie on no edge of its polygons.
 
@@ -140,7 +140,7 @@ ROOM, MOST_JUDGED = 30.0, 4000
 PARALLEL = 1e-9
 
 
-def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]) -> Box | None:
+def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]) -> WallBox | None:
     """A box about the origin that holds the stable set, in [K T, B]; None where no sample lies on its edge.
 
     Samples of the edge (no root outside the circle) and crossings of lines show where it is. A box much larger
@@ -160,10 +160,10 @@ def box_of_edges(loop: MultiLoop, samples: Floats, lines: Sequence[StraightLine]
     if not far.any():  # none, or the origin alone
         return None
     far = np.where(far > 0.0, far, max(far))
-    return Box(-far, far)
+    return WallBox(-far, far)
 
 
-def cut_lines(curves: Sequence[WallCurve], box: Box) -> list[shapely.LineString]:
+def cut_lines(curves: Sequence[WallCurve], box: WallBox) -> list[shapely.LineString]:
     """Every curve as far as it runs inside a box, and the box itself."""
     pieces: list[shapely.Geometry] = [shapely.box(*box.low, *box.high).exterior]
     for curve in curves:
@@ -223,7 +223,7 @@ class Raster:
     differs: Flags
 
 
-def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: Box) -> Raster:
+def try_walls(loop: MultiLoop, polygons: list[shapely.Polygon], box: WallBox) -> Raster:
     """Compare stable polygons [K T, B] with eigenvalues at walls all over a box and beside their edges."""
     cells = sorted(polygons, key=lambda cell: -cell.area)[:MOST_CELLS]
     bounds = [np.array(cell.bounds).reshape(2, 2) for cell in cells if len(polygons) > 1]
@@ -257,7 +257,7 @@ def try_orders(loop: MultiLoop, samples: Floats) -> Raster:
     return Raster(walls, stable, stable.copy())
 
 
-def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygon], box: Box) -> Floats:
+def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygon], box: WallBox) -> Floats:
     """Angles at which roots cross the circle, on no known edge, on the way from walls that differ; and around."""
     first = np.flatnonzero(raster.differs)
     first = first[:: max(1, len(first) // FROM)]
@@ -287,7 +287,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
     return np.unique(thetas * (1.0 + BESIDE))
 
 
-def _beside(cell: shapely.Polygon, box: Box) -> Floats:
+def _beside(cell: shapely.Polygon, box: WallBox) -> Floats:
     """Walls (n, 2) on both sides of a cell's outer edge."""
     edge = shapely.transform(cell.exterior, lambda points: points / box.size)
     share = (np.arange(ALONG) + 0.5) / ALONG

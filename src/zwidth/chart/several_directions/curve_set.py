@@ -47,9 +47,9 @@ import scipy.linalg
 from scipy.optimize import brentq, linear_sum_assignment
 
 from zwidth.arrays import Complexes, Flags, Floats, Ints
-from zwidth.chart.several_directions.branches import Samples, trace_branches
-from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, TracedCurve, correct
-from zwidth.chart.several_directions.wall_curves import Box, StraightLine, WallCurve
+from zwidth.chart.several_directions.branches import BranchSamples, trace_branches
+from zwidth.chart.several_directions.traced_curve import CurvePoints, RootEquation, TracedCurve, correct_point
+from zwidth.chart.several_directions.wall_curves import StraightLine, WallBox, WallCurve
 from zwidth.chart.several_directions.wall_equation import (
     WallEquation,
     adjugate,
@@ -228,7 +228,7 @@ class CurveSet:
 
     loop: MultiLoop
     equations: tuple[WallEquation, ...]
-    pairs: tuple[tuple[WallEquation, Samples], ...]
+    pairs: tuple[tuple[WallEquation, BranchSamples], ...]
     real: tuple[RealRootEquation, ...]
     lines: tuple[StraightLine, ...]
 
@@ -253,7 +253,7 @@ class CurveSet:
             )
         return replace(self, pairs=tuple(pairs))
 
-    def within(self, box: Box, tolerance: float) -> tuple[CurveSet, list[WallCurve]]:
+    def within(self, box: WallBox, tolerance: float) -> tuple[CurveSet, list[WallCurve]]:
         """The curves as they run through a box, and all samples that this took.
 
         tolerance  largest distance of a chord from its curve, in shares of the box
@@ -268,7 +268,7 @@ class CurveSet:
                 curves.append(with_limits(TracedCurve(equation, traced, scale, self.loop.period), samples))
         for real in self.real:
             scale = np.array([box.size[0] / real.period, *box.size])
-            first = Samples.of(real, _steps_across(real, box))
+            first = BranchSamples.of(real, _steps_across(real, box))
             _, branches = followed_branches(real, first, box, scale, tolerance)
             curves += [TracedCurve(real, traced, scale, real.period) for traced in branches]
         reach = float(np.hypot(*box.size) + 2.0 * np.hypot(*np.abs([box.low, box.high]).max(axis=0)))
@@ -279,13 +279,13 @@ class CurveSet:
 def trace_curves(loop: MultiLoop) -> CurveSet:
     """The curves of a loop, sampled where its poles and zeros say that they turn."""
     thetas = first_angles(loop)
-    pairs: list[tuple[WallEquation, Samples]] = []
+    pairs: list[tuple[WallEquation, BranchSamples]] = []
     real: list[RealRootEquation] = []
     lines: list[StraightLine] = []
     equations = wall_equations(loop)
     for equation in equations:
         if (equation.stiffness > 0.0).any() and (equation.damping > 0.0).any():
-            pairs.append((equation, Samples.of(equation, thetas)))
+            pairs.append((equation, BranchSamples.of(equation, thetas)))
         else:
             lines += pair_lines(equation, thetas)
         own_lines, own_real = real_root_walls(equation)
@@ -294,7 +294,7 @@ def trace_curves(loop: MultiLoop) -> CurveSet:
     return CurveSet(loop, tuple(equations), tuple(pairs), tuple(real), tuple(lines))
 
 
-def _steps_across(real: RealRootEquation, box: Box) -> Floats:
+def _steps_across(real: RealRootEquation, box: WallBox) -> Floats:
     """Parameters (n,) of a curve of real roots from one side of a box to the other, and beyond."""
     corners = np.array([(x, b) for x in (box.low[0], box.high[0]) for b in (box.low[1], box.high[1])])
     s = 0.5 * (corners[:, 0] / real.period - corners[:, 1] * real.estimate)
@@ -318,8 +318,8 @@ ROUNDS, SHARES = 4, (0.25, 0.5, 0.75)
 
 
 def followed_branches(
-    equation: RootEquation, samples: Samples, box: Box, scale: Floats, tolerance: float
-) -> tuple[Samples, list[CurvePoints]]:
+    equation: RootEquation, samples: BranchSamples, box: WallBox, scale: Floats, tolerance: float
+) -> tuple[BranchSamples, list[CurvePoints]]:
     """All branches that run through a box, followed by chords there; and the samples that this took.
 
     scale      (3,) size of u, k T and b
@@ -341,7 +341,7 @@ def followed_branches(
 
 
 def _followed(
-    equation: RootEquation, branch: CurvePoints, box: Box, scale: Floats, tolerance: float
+    equation: RootEquation, branch: CurvePoints, box: WallBox, scale: Floats, tolerance: float
 ) -> tuple[CurvePoints, Floats]:
     """A branch with more points, and parameters at which to sample where none fit."""
     traced, unfit = branch.forwards(scale), [np.empty(0)]
@@ -354,7 +354,7 @@ def _followed(
             break
         chord = points[k + 1] - points[k]
         guess = traced.guess(k, np.full(len(k), 0.5), scale)
-        middles, along, settled = correct(equation, guess, chord / scale**2, scale)
+        middles, along, settled = correct_point(equation, guess, chord / scale**2, scale)
         along *= np.where(np.einsum("ni,ni->n", along, chord / scale) < 0.0, -1.0, 1.0)[:, None] * scale
         fits = settled & _fits(points[k], chord, middles, scale)
         unfit.append(_steps_between(points[k[~fits]], points[k[~fits] + 1]))
@@ -387,7 +387,7 @@ def _steps_between(first: Floats, last: Floats) -> Floats:
     return np.asarray((u[apart, None] + step[apart, None] * np.array(SHARES)).ravel())
 
 
-def _turns(traced: CurvePoints, k: Ints, box: Box) -> Flags:
+def _turns(traced: CurvePoints, k: Ints, box: WallBox) -> Flags:
     """Which steps from points k turn so much that a loop may hide there."""
     ahead = traced.directions[:, 1:] / box.size
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
@@ -411,7 +411,7 @@ NEAR_PARABOLA: Final = 1e-3
 FAR: Final = 1.0
 
 
-def with_limits(curve: TracedCurve, samples: Samples) -> TracedCurve:
+def with_limits(curve: TracedCurve, samples: BranchSamples) -> TracedCurve:
     """A curve of pairs of roots with its limits, where it begins or ends in the first or the last sample."""
     lowest, highest = samples.parameters[[0, -1]]
     traced, limits = curve.traced, []
@@ -440,7 +440,7 @@ def _limit(curve: TracedCurve, k: int, end: float) -> Floats | None:
         guess[:, 0] = end + away * ANGLES
         guess[:, 1:] = point[1:] + parabola * (ANGLES[:, None] ** 2 - 1.0)
         upright = np.tile([1.0, 0.0, 0.0], (len(ANGLES), 1))
-        near, _, settled = correct(curve.equation, guess, upright, curve.scale)
+        near, _, settled = correct_point(curve.equation, guess, upright, curve.scale)
     near[~settled] = np.nan
     windows = np.lib.stride_tricks.sliding_window_view(near[:, 1:], 4, axis=0)
     by_four = windows @ FOUR

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from zwidth.arrays import Floats, Ints
 from zwidth.chart.arcs import CHORD, CURVED, DAMPING, END_MARGIN, STIFFNESS, Arc, ArcPoints, Wall
 from zwidth.chart.area import straight_integrals
-from zwidth.chart.several_directions.wall_curves import Box, WallCurve
+from zwidth.chart.several_directions.wall_curves import WallBox, WallCurve
 
 # Runs of sides shorter than this share of a ring's size are rounding of its corners.
 SHORT = 1e-7
@@ -141,7 +141,7 @@ class _CurveSteps:
 
 def _steps(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
     """Steps of curves on which a side of the ring can lie."""
-    around = Box(ring.min(axis=0), ring.max(axis=0)).with_margin(AROUND)
+    around = WallBox(ring.min(axis=0), ring.max(axis=0)).with_margin(AROUND)
     parts: list[tuple[Floats, Floats, Ints, Ints, Floats, Floats]] = []
     for i, curve in enumerate(curves):
         walls, places = curve.walls, curve.parameters
@@ -261,7 +261,7 @@ class Branch:
         inside = self.curve.regular(places)
         places[0] += END_MARGIN * (places[1] - places[0])
         places[-1] -= END_MARGIN * (places[-1] - places[-2])
-        return sign_changes(self.curve, places[inside], component)
+        return sign_change_places(self.curve, places[inside], component)
 
     def dense_points(self, arc: Arc) -> ArcPoints:
         """Angles strictly between an arc's ends, from first to last, with K and B: chords within
@@ -303,7 +303,7 @@ class Branch:
         return total
 
 
-def sign_changes(curve: WallCurve, places: Floats, component: int) -> Floats:
+def sign_change_places(curve: WallCurve, places: Floats, component: int) -> Floats:
     """Parameters between neighbours of `places` (n,) at which K, B or dK changes sign, to rounding.
 
     Where rounding hides the curve, as beside the wall 0, 0 of an undamped motion, there is nothing closer to find.

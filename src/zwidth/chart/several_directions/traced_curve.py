@@ -94,7 +94,7 @@ class CurvePoints(NamedTuple):
 
 
 @np.errstate(all="ignore")
-def correct(
+def correct_point(
     equation: RootEquation, points: Floats, normals: Floats, scale: Floats
 ) -> tuple[Floats, Floats, Flags]:
     """Move points (n, 3) of [u, k T, b] onto curves, each within the plane across its normal (n, 3).
@@ -144,7 +144,7 @@ def _solve(a: Floats, b: Floats, c: Floats, value: Floats, off: Floats) -> Float
 
 @dataclass(frozen=True)
 class TracedCurve:
-    """A branch of an equation through points that are close enough for `correct` to find what lies between.
+    """A branch of an equation through points that are close enough for `correct_point` to find what lies between.
 
     equation  whose branch it is
     traced    its points, and its directions there
@@ -214,7 +214,7 @@ class TracedCurve:
         if on.any():
             chord = slopes[on]
             normals = chord / self.scale**2
-            places[on], along, _ = correct(self.equation, places[on], normals, self.scale)
+            places[on], along, _ = correct_point(self.equation, places[on], normals, self.scale)
             along *= self.scale
             advance = np.einsum("ni,ni->n", along, normals)
             slopes[on] = along * (np.einsum("ni,ni->n", chord, normals) / advance)[:, None]

@@ -1,6 +1,6 @@
 """What cuts the plane of walls of several directions: curves and lines of walls with a root on the circle.
 
-`Box` is a part of that plane.
+`WallBox` is a part of that plane.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class StraightLine:
 
 
 @dataclass(frozen=True)
-class Box:
+class WallBox:
     """A part of the plane of walls [k T, b]: low (2,), high (2,)."""
 
     low: Floats
@@ -138,9 +138,9 @@ class Box:
         """(2,)"""
         return self.high - self.low
 
-    def with_margin(self, share: float) -> Box:
+    def with_margin(self, share: float) -> WallBox:
         """The box with a margin in shares of its size."""
-        return Box(self.low - share * self.size, self.high + share * self.size)
+        return WallBox(self.low - share * self.size, self.high + share * self.size)
 
     def meets(self, walls: Floats) -> Flags:
         """Which steps (n - 1,) between walls (n, 2) may run through the box; what is not finite does not."""

@@ -16,9 +16,9 @@ from zwidth.contact.mechanism.rendering import (
     render,
     rendering_memory_of,
 )
-from zwidth.contact.mechanism.stepping import configure, linearise, prepare, step, turned
+from zwidth.contact.mechanism.stepping import configure, linearise_drives, prepare, step_mechanism, turned_vector
 from zwidth.contact.mechanism.surfaces import penetration
-from zwidth.contact.mechanism.system import Memory, System, memory_of
+from zwidth.contact.mechanism.system import Memory, System, motion_memory
 from zwidth.model.closure import equations, orientation, passive_rates
 from zwidth.model.continuation import joint_beyond_limit, keep_rows
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links
@@ -70,7 +70,7 @@ def run_motion(
     computers  the one that renders the law;   fraction  of its delay that is no whole sample
     start (N,) first state, angles (links,) near its posture;   push (1 or samples, 3) at the handle
     """
-    computer, memory = computer_at(computers, 0), memory_of(system)
+    computer, memory = computer_at(computers, 0), motion_memory(system)
     own, period = rendering_memory_of(system.mech, computer), computer.period
     d, samples = system.mech.driven, trace.depth.size - 1
     x, trial, hand = start.copy(), np.zeros(start.size), np.zeros(3)
@@ -100,8 +100,8 @@ def run_motion(
         if j == samples:
             break
         # the linear part of a step is made anew only where the mechanism has turned far enough to change it
-        if j == 0 or turned(memory, x):
-            linearise(system, memory, x)
+        if j == 0 or turned_vector(memory, x):
+            linearise_drives(system, memory, x)
             for part in range(2):
                 if counts[part] > 0:
                     prepare(system, memory, lengths[part] / counts[part], part)
@@ -118,7 +118,9 @@ def run_motion(
             for _ in range(counts[part]):
                 if not configured and configure(system, memory, x) < 0.0:
                     return LOOP_LOST, j + 1
-                lost = step(system, memory, x, lengths[part] / counts[part], part, hand, trial, friction, resting)
+                lost = step_mechanism(
+                    system, memory, x, lengths[part] / counts[part], part, hand, trial, friction, resting
+                )
                 if not np.isfinite(lost):
                     return LOOP_LOST, j + 1
                 work[2] += lost

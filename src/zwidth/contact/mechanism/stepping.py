@@ -36,7 +36,7 @@ SWEEPS: Final = 20  # of the drives' frictions against each other
 
 
 @compiled_lean
-def turned(memory: Memory, x: Floats) -> bool:
+def turned_vector(memory: Memory, x: Floats) -> bool:
     """Have the joints turned so far since A was taken that it is worth taking anew?"""
     base = memory.base
     most = 0.0
@@ -46,7 +46,7 @@ def turned(memory: Memory, x: Floats) -> bool:
 
 
 @compiled_lean
-def linearise(system: System, memory: Memory, x: Floats) -> None:
+def linearise_drives(system: System, memory: Memory, x: Floats) -> None:
     """Fill A at a configured state."""
     A, rest, base = memory.linear, memory.rest, memory.base
     motor, spring, B, along = system.motor, system.spring, system.damping, system.lag_along
@@ -73,7 +73,7 @@ def linearise(system: System, memory: Memory, x: Floats) -> None:
                     rest[i] += torque
                     rest[motor[i]] -= torque
         # each column of forces becomes one of accelerations, by the mass matrix of this state
-        solve(system, memory, rest, 0)
+        solve_small(system, memory, rest, 0)
         for i in range(n):
             A[n + i, j] = rest[i]
     for k in range(lags):
@@ -114,7 +114,7 @@ def prepare(system: System, memory: Memory, h: float, part: int) -> None:
     for j in range(motor.size):
         for i in range(n):
             rest[i] = 1.0 if i == motor[j] else 0.0
-        solve(system, memory, rest, 0)
+        solve_small(system, memory, rest, 0)
         for i in range(N):
             stages[0, i] = 0.0
             for k in range(n):
@@ -238,7 +238,7 @@ def add_friction(
     for i in range(motor.size):
         rest[motor[i]] = friction[i]
         memory.hold[motor[i]] += friction[i]
-    solve(system, memory, rest, 0)
+    solve_small(system, memory, rest, 0)
     for i in range(n):
         stages[0, n + i] += rest[i]
 
@@ -259,7 +259,7 @@ def release(system: System, memory: Memory, x: Floats, trial: Floats, resting: F
 
 
 @compiled
-def step(
+def step_mechanism(
     system: System,
     memory: Memory,
     x: Floats,
@@ -371,11 +371,11 @@ def accelerate(system: System, memory: Memory, x: Floats, hand: Floats) -> None:
     for i in range(n):
         rate[i] = x[n + i]
         rate[n + i] = rest[i]
-    solve(system, memory, rate, n)
+    solve_small(system, memory, rate, n)
 
 
 @compiled_lean
-def solve(system: System, memory: Memory, forces: Floats, first: int) -> None:
+def solve_small(system: System, memory: Memory, forces: Floats, first: int) -> None:
     """M^-1 times the forces (n,) that stand in an array from `first` on, in place."""
     L, motor, rotor = memory.factor, system.motor, system.rotor
     d = motor.size

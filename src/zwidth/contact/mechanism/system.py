@@ -152,7 +152,7 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
 
 
 @compiled
-def memory_of(system: System) -> Memory:
+def motion_memory(system: System) -> Memory:
     """Fresh memory for one thread."""
     mech = system.mech
     d, n, N = mech.driven, system.damping.shape[0], 2 * system.damping.shape[0] + system.lag_time.size

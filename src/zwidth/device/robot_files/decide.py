@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from zwidth.arrays import Floats
 from zwidth.device.build_mechanism import mechanism as build_mechanism
 from zwidth.device.faults import Fault, comma_list, dotted, fail, suggestion
-from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
+from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, check_loops_close, closed_nearby, null_space
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
@@ -60,7 +60,7 @@ class Decided:
     """
 
     tree: LinkTree
-    motions: Motions
+    motions: FreeMotions
     motors: list[Motor]
     shape: Shape
     handle: tuple[int, Place]
@@ -170,7 +170,7 @@ def _motors(robot: Robot, fixed: frozenset[str]) -> list[Motor] | None:
     return kept
 
 
-def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkTree, Motions]:
+def _draft(robot: Robot, shape: Shape, handle: tuple[int, Place]) -> tuple[LinkTree, FreeMotions]:
     """The links with this shape, and how they move."""
     tree = link_tree(robot, shape)
     single = next((link["name"] for link in tree.links if link["joint"] in ("revolute", "prismatic")), None)
@@ -238,7 +238,7 @@ def closure_tables(robot: Robot, tree: LinkTree) -> list[dict[str, Any]]:
     return tables
 
 
-def _check_loops(robot: Robot, motions: Motions) -> None:
+def _check_loops(robot: Robot, motions: FreeMotions) -> None:
     if not motions.open_loops:
         return
     faults = []
@@ -256,7 +256,7 @@ def _check_loops(robot: Robot, motions: Motions) -> None:
     raise DeviceError(faults)
 
 
-def _assumed(robot: Robot, tree: LinkTree, motions: Motions) -> list[Motor]:
+def _assumed(robot: Robot, tree: LinkTree, motions: FreeMotions) -> list[Motor]:
     """As many driven joints as the loops leave freedom, those next to the base first."""
     followers = {one.joint for one in robot.followers}
     singles = [
@@ -269,7 +269,7 @@ def _assumed(robot: Robot, tree: LinkTree, motions: Motions) -> list[Motor]:
 
 
 def _set_free(
-    robot: Robot, tree: LinkTree, motions: Motions, shape: Shape, driven: list[int], drives: set[str]
+    robot: Robot, tree: LinkTree, motions: FreeMotions, shape: Shape, driven: list[int], drives: set[str]
 ) -> Shape:
     """The shape with every motion that drives and loops leave given to a free joint.
 
@@ -334,7 +334,7 @@ def _looped(robot: Robot) -> set[int]:
     return found
 
 
-def _spins(motions: Motions, tree: LinkTree, joints: dict[str, Any], name: str, left: Floats) -> bool:
+def _spins(motions: FreeMotions, tree: LinkTree, joints: dict[str, Any], name: str, left: Floats) -> bool:
     """Whether a ball joint in a loop turns about one axis of its body while all joints of one coordinate rest."""
     if joints[name][1].kind != "spherical" or name not in tree.link_of:
         return False
@@ -371,7 +371,7 @@ def _axes_along(axis: Floats) -> Floats:
 def _controls(
     robot: Robot,
     tree: LinkTree,
-    motions: Motions,
+    motions: FreeMotions,
     driven: list[Motor],
     kept: list[int],
     shape: Shape,
@@ -381,7 +381,7 @@ def _controls(
     if not kept:
         raise fail(robot.label, "", _nothing_moves(robot, motions))
     free = [row for name in sorted(shape.free) for row in _free_rows(robot, tree, motions, name)]
-    each = [handle_motions(place, kept, free) for place in motions.places]
+    each = [free_handle_motions(place, kept, free) for place in motions.places]
     found = [controls for H in each if (controls := controls_of(H))]
     if not found:
         raise fail(robot.label, "", _not_controlled(motions, tree, driven, kept, each))
@@ -402,7 +402,7 @@ def _controls(
     return controls, each[0]
 
 
-def _nothing_moves(robot: Robot, motions: Motions) -> str:
+def _nothing_moves(robot: Robot, motions: FreeMotions) -> str:
     """Why no drive moves anything."""
     if motions.basis.shape[1]:
         return "drives no joint that moves; name a motor for each degree of freedom"
@@ -413,7 +413,7 @@ def _nothing_moves(robot: Robot, motions: Motions) -> str:
     )
 
 
-def _free_rows(robot: Robot, tree: LinkTree, motions: Motions, name: str) -> list[int]:
+def _free_rows(robot: Robot, tree: LinkTree, motions: FreeMotions, name: str) -> list[int]:
     rows = motions.rows(tree.link_of[name])
     found = robot.joints.get(name)
     spins = found is not None and found[1].kind == "spherical" and found[0] in _looped(robot)
@@ -421,7 +421,7 @@ def _free_rows(robot: Robot, tree: LinkTree, motions: Motions, name: str) -> lis
 
 
 def _not_controlled(
-    motions: Motions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
+    motions: FreeMotions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
 ) -> str:
     names = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
     resting = set.intersection(*(set(idle(H)) for H in each))
@@ -457,7 +457,7 @@ class Configuration:
 
 
 @dataclass(frozen=True)
-class Motions:
+class FreeMotions:
     """What a mechanism can do.
 
     entries  name of what each of the m joint coordinates moves: its link's, of a joint of several coordinates with
@@ -497,7 +497,7 @@ class Motions:
         return [k for k, gap in enumerate(self.gaps) if gap > CLOSED * self.size]
 
 
-def mechanism_motions(section: dict[str, Any], label: str) -> Motions:
+def mechanism_motions(section: dict[str, Any], label: str) -> FreeMotions:
     """The motions of a draft of [mechanism] whose handle is given by its pose, whichever joints the draft says are
     driven or free.
 
@@ -514,11 +514,11 @@ def mechanism_motions(section: dict[str, Any], label: str) -> Motions:
         raise DeviceError(faults) from None
     mechanism = build_mechanism(checked)
     mech = pack(mechanism)
-    angles, gaps = close_loops(mechanism, mech)
+    angles, gaps = check_loops_close(mechanism, mech)
     names = [mechanism.links.names[i] for i in mech.joint]
     places = [_configuration(mech, place) for place in closed_nearby(mech, angles)]
     size = float(mech.size[0])
-    return Motions(mechanism, names, places, angles, gaps, size, handle_goal(mech, 0, angles))
+    return FreeMotions(mechanism, names, places, angles, gaps, size, handle_goal(mech, 0, angles))
 
 
 def _configuration(mech: MechanismArrays, angles: Floats) -> Configuration:
@@ -551,7 +551,7 @@ def _rank(rows: Floats) -> int:
     return int(np.sum(values > INDEPENDENT * max(values[0], np.finfo(float).tiny))) if values.size else 0
 
 
-def handle_motions(place: Configuration, driven: Sequence[int], free: Sequence[int]) -> Floats:
+def free_handle_motions(place: Configuration, driven: Sequence[int], free: Sequence[int]) -> Floats:
     """Motions of the handle by each driven coordinate while the free ones rest, (6, d)."""
     rows = [*driven, *free]
     rates = np.linalg.lstsq(place.basis[rows], np.eye(len(rows)), rcond=None)[0]

@@ -104,13 +104,13 @@ def import_file(
     unknown = unknown_numbers(document)
     for entry in unknown:
         robot.note(entry.group, f"is not in the file; {entry.needed_for}")
-    findings = merged(robot.findings)
+    findings = merged_tables(robot.findings)
     return ImportedDevice(
-        document, device_text(document, findings), findings, [k for e in unknown for k in e.paths]
+        document, robot_device_text(document, findings), findings, [k for e in unknown for k in e.paths]
     )
 
 
-def merged(findings: Sequence[Finding]) -> list[Finding]:
+def merged_tables(findings: Sequence[Finding]) -> list[Finding]:
     """The findings with those that say the same of several places made one; warnings first."""
     places: dict[tuple[str, str], list[str]] = {}
     for one in findings:
@@ -432,7 +432,7 @@ HEADINGS = {
 }
 
 
-def device_text(document: dict[str, Any], findings: Sequence[Finding]) -> str:
+def robot_device_text(document: dict[str, Any], findings: Sequence[Finding]) -> str:
     """The text of a device file.
 
     document  its tables: name, source, mechanism with lists of tables, loop

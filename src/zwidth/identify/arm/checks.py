@@ -41,7 +41,7 @@ BETTER: Final = 0.3  # share of the unexplained torque, below which another read
 
 
 @dataclass(frozen=True)
-class Survey:
+class MotionSurvey:
     """What is seen of the first rows of a record.
 
     rows          of its longest stretch among the first ones, a piece of the record
@@ -53,7 +53,7 @@ class Survey:
     forces: Floats
 
 
-def motion_check(drives: Sequence[str], surveys: Sequence[Survey], counts: Floats, turning: Floats) -> Check:
+def motion_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], counts: Floats, turning: Floats) -> Check:
     """That the joints move by more than ten counts.
 
     counts   (d,) of the encoders, at the joint [rad], [m]; nan where not known: the step that the readings show
@@ -83,7 +83,7 @@ def _steps(values: Floats) -> list[float]:
     return [encoder_step([column]) for column in values.T]
 
 
-def torque_check(drives: Sequence[str], surveys: Sequence[Survey], limits: Floats) -> Check:
+def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits: Floats) -> Check:
     """That torques vary, stay within the drives' limits (d,) at the joint, and are not cut."""
     constant, cut, beyond = list[str](), list[str](), list[str]()
     for k, name in enumerate(drives):
@@ -122,7 +122,7 @@ def _clipped_share(forces: Floats) -> float:
 
 
 def velocity_check(
-    drives: Sequence[str], channels: Channels, survey: Survey, rate_taps: Floats, taps: Floats
+    drives: Sequence[str], channels: DriveChannels, survey: MotionSurvey, rate_taps: Floats, taps: Floats
 ) -> Check | None:
     """That recorded velocities are the derivatives of the positions; None where there are none.
 
@@ -241,7 +241,7 @@ SLIDING: Final = ("position_m", "force_N", "velocity_m_per_s")
 
 
 @dataclass(frozen=True)
-class Channels:
+class DriveChannels:
     """The columns of one record, drive by drive, d drives.
 
     coordinate, force  (d,) names of columns;   velocity  (d,) names, "" where there is none
@@ -265,7 +265,7 @@ class Channels:
         return np.stack([piece[name] for name in self.force], axis=1) @ self.to_force.T
 
 
-def channels_of(device: Device, record: Record, side: Side) -> Channels:
+def drive_channels_of(device: Device, record: Record, side: Side) -> DriveChannels:
     """The columns of a record of this device, each named by the link of its joint, or by its drive.
 
     side   "joint": coordinates of the links' joints, torques at the joints; "motor": the motors' angles and
@@ -290,7 +290,7 @@ def channels_of(device: Device, record: Record, side: Side) -> Channels:
     if side == "joint":
         to_drive = pack(mechanism).to_drive[0]
         to_force = np.linalg.inv(to_drive).T
-    return Channels(coordinate, force, velocity, to_drive, to_force)
+    return DriveChannels(coordinate, force, velocity, to_drive, to_force)
 
 
 def _column(record: Record, quantity: str, words: Sequence[str], *, alone: bool, needed: bool) -> str:
@@ -339,7 +339,7 @@ def check_mechanism(device: Device) -> Mechanism:
     return replace(mechanism, flexible=())
 
 
-def left_out(device: Device) -> list[str]:
+def samples_left_out(device: Device) -> list[str]:
     """Parts of the device's file that the inverse dynamics leave out, in words."""
     mechanism = device.mechanism
     assert mechanism is not None

@@ -56,7 +56,7 @@ def quantile(fit: Regression) -> float:
     return float(t.ppf(0.5 + 0.5 * LEVEL, fit.freedom))
 
 
-def mass_estimates(
+def link_mass_estimates(
     point: OperatingPoint, masses: Iterable[EffectiveMass], base: BaseParameters, fit: Regression
 ) -> Iterator[Estimate]:
     """Effective masses at a point; their intervals are those of their logarithm, without bound where the data
@@ -85,7 +85,7 @@ def _listed(numbers: Floats) -> str:
     return ", ".join(f"{value:.4g}" for value in numbers)
 
 
-def friction_estimates(
+def joint_friction_estimates(
     device: Device, mechanism: Mechanism, base: BaseParameters, fit: Regression, beta: Floats
 ) -> Iterator[Estimate]:
     """Dry and viscous friction and offset of each drive. Dry friction stands in the file at the motor, viscous

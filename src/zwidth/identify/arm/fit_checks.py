@@ -17,8 +17,8 @@ from zwidth.errors import NoAnswerError
 from zwidth.identify.arm.estimates import ConsistentLinks, mass_columns
 from zwidth.identify.arm.parameters import BaseParameters
 from zwidth.identify.arm.regression import Regression
-from zwidth.identify.arm.smoothing import Band, convolved
-from zwidth.identify.arm.stretches import Stretch
+from zwidth.identify.arm.smoothing import TorqueBand, convolved
+from zwidth.identify.arm.stretches import TorqueStretch
 from zwidth.identify.identification import Check
 from zwidth.model.continuation import moved_posture
 from zwidth.model.inertia_regressor import inertia_regressor
@@ -221,7 +221,7 @@ class Compared:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class TorqueComparison:
     """How stretches are turned into torques and columns.
 
     base          the parameters
@@ -232,12 +232,12 @@ class Comparison:
     """
 
     base: BaseParameters
-    band: Band
+    band: TorqueBand
     gravity: Floats
     known_rotors: Floats
     start: Floats
 
-    def of(self, stretch: Stretch, static: Sequence[Floats] = ()) -> Compared:
+    def of(self, stretch: TorqueStretch, static: Sequence[Floats] = ()) -> Compared:
         """Torques and columns of a stretch.
 
         static   gravities (3,) of which further columns are made
@@ -268,7 +268,7 @@ class Comparison:
         return Compared(stretch.record, time, np.concatenate([made, rate[..., None]], axis=2), torque, weights)
 
     def _links(
-        self, one: Stretch, angles: Floats, rates: Floats, accelerations: Floats, gravity: Floats
+        self, one: TorqueStretch, angles: Floats, rates: Floats, accelerations: Floats, gravity: Floats
     ) -> tuple[Floats, Floats]:
         mech = self.base.parameters.mech
         links, places, reached = inertia_regressor(mech, angles, one.coordinates, rates, accelerations, gravity)
@@ -276,11 +276,11 @@ class Comparison:
             raise NoAnswerError(self._where(one, reached))
         return links, places
 
-    def _where(self, one: Stretch, row: int) -> str:
+    def _where(self, one: TorqueStretch, row: int) -> str:
         numbers = ", ".join(f"{value:.4g}" for value in one.coordinates[row])
         return f"at {one.time[row]:.6g} s the drives stand at {numbers} (rad or m), where no posture leads"
 
-    def first_posture(self, stretch: Stretch) -> Floats:
+    def first_posture(self, stretch: TorqueStretch) -> Floats:
         """Joint coordinates (n,) of a posture at the stretch's first sample."""
         mech = self.base.parameters.mech
         own = mech.joint[-mech.driven :]

@@ -20,14 +20,14 @@ from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, quote
 from zwidth.errors import NoAnswerError
 from zwidth.identify.arm.checks import (
-    Channels,
+    DriveChannels,
+    MotionSurvey,
     Side,
-    Survey,
-    channels_of,
     check_mechanism,
-    left_out,
+    drive_channels_of,
     motion_check,
     other_readings,
+    samples_left_out,
     sign_check,
     torque_check,
     velocity_check,
@@ -39,13 +39,13 @@ from zwidth.identify.arm.estimates import (
     consistent_links,
     delay_estimate,
     effective_masses,
-    friction_estimates,
+    joint_friction_estimates,
+    link_mass_estimates,
     link_settings,
-    mass_estimates,
 )
 from zwidth.identify.arm.fit_checks import (
     Compared,
-    Comparison,
+    TorqueComparison,
     consistency_check,
     excitation_check,
     gravity_check,
@@ -57,11 +57,11 @@ from zwidth.identify.arm.fit_checks import (
 )
 from zwidth.identify.arm.parameters import BaseParameters, Parameters, base_parameters
 from zwidth.identify.arm.regression import Regression, regress
-from zwidth.identify.arm.smoothing import Band, choose_band
-from zwidth.identify.arm.stretches import Stretch, TorqueTiming, smoothed
+from zwidth.identify.arm.smoothing import TorqueBand, choose_band
+from zwidth.identify.arm.stretches import TorqueStretch, TorqueTiming, smoothed
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling, check_mass_in_file, check_periods, check_sampling
+from zwidth.identify.records.sampling import SampleTimes, check_mass_in_file, check_periods, check_sampling
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.progress import Progress
@@ -201,7 +201,7 @@ class _Work:
 
     def identified(self) -> ArmIdentification:
         """Checks, fit, validation."""
-        channels = [channels_of(self.device, record, self.side) for record in self.records]
+        channels = [drive_channels_of(self.device, record, self.side) for record in self.records]
         checks, samplings = self._sampled()
         if stop := self.refusal(checks):
             return stop
@@ -218,7 +218,7 @@ class _Work:
         parameters = Parameters.of(self.mechanism, self.rotors == "fitted")
         start = self._start()
         base = base_parameters(parameters, start, self.gravity)
-        comparison = Comparison(base, band, self.gravity, self._known_rotors(), start)
+        comparison = TorqueComparison(base, band, self.gravity, self._known_rotors(), start)
         try:
             self.progress("torques", 0, 1)
             weights = self._other_gravity()
@@ -245,8 +245,8 @@ class _Work:
 
     # --- before the fit ---------------------------------------------------------------------------------
 
-    def _sampled(self) -> tuple[list[Check], list[Sampling]]:
-        checks, samplings = list[Check](), list[Sampling]()
+    def _sampled(self) -> tuple[list[Check], list[SampleTimes]]:
+        checks, samplings = list[Check](), list[SampleTimes]()
         for number, record in enumerate(self.records):
             self.progress("checking", number, len(self.records))
             sampling, check = check_sampling(record)
@@ -268,7 +268,7 @@ class _Work:
                 checks.append(Check("sampling", False, f"{reason}; correct loop.sampling_period_s, or the time"))
         return checks, samplings
 
-    def _survey(self, record: Record, sampling: Sampling, channels: Channels) -> Survey:
+    def _survey(self, record: Record, sampling: SampleTimes, channels: DriveChannels) -> MotionSurvey:
         """The longest stretch among the first rows."""
         best, rows = None, 0
         for piece in sampling.stretches(record):
@@ -278,9 +278,9 @@ class _Work:
             if rows >= SEEN:
                 break
         assert best is not None
-        return Survey(best, channels.coordinates(best), channels.forces(best))
+        return MotionSurvey(best, channels.coordinates(best), channels.forces(best))
 
-    def _seen(self, surveys: Sequence[Survey]) -> list[Check]:
+    def _seen(self, surveys: Sequence[MotionSurvey]) -> list[Check]:
         drives, links = self.mechanism.drives, self.mechanism.links
         counts = 2.0 * np.pi / (np.asarray(drives.encoder_counts) * drives.transmission)
         turning = np.array([links.joint[joint] != PRISMATIC for joint in drives.joint], dtype=float)
@@ -306,7 +306,11 @@ class _Work:
         return 1.0 / (2.0 * np.pi * np.sqrt(largest)) if largest > 0.0 else np.inf
 
     def _band_checks(
-        self, band: Band, samplings: Sequence[Sampling], channels: Sequence[Channels], surveys: Sequence[Survey]
+        self,
+        band: TorqueBand,
+        samplings: Sequence[SampleTimes],
+        channels: Sequence[DriveChannels],
+        surveys: Sequence[MotionSurvey],
     ) -> list[Check]:
         checks = list[Check]()
         wide, narrow = band.wide, band.narrow
@@ -328,13 +332,13 @@ class _Work:
                 f"{100.0 * (band.edge / soft) ** 2:.2g} % at most; move more slowly, or measure at the links"
             )
             checks.append(Check("flexible drives", False, reason, warning=True))
-        if left := left_out(self.device):
+        if left := samples_left_out(self.device):
             checks.append(Check("device", False, f"left out: {comma_list(left)}", warning=True))
         return checks
 
     def _smoothed(
-        self, samplings: Sequence[Sampling], channels: Sequence[Channels], band: Band
-    ) -> Iterator[Stretch]:
+        self, samplings: Sequence[SampleTimes], channels: Sequence[DriveChannels], band: TorqueBand
+    ) -> Iterator[TorqueStretch]:
         timing = TorqueTiming()
         if self.torque == "commanded":
             controller, T = self.device.controller, band.period
@@ -366,7 +370,7 @@ class _Work:
 
     # --- the fit ------------------------------------------------------------------------------------------
 
-    def _noisy(self, comparison: Comparison, fitted: Sequence[Stretch]) -> Iterator[list[Compared]]:
+    def _noisy(self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch]) -> Iterator[list[Compared]]:
         """The fitted part with as much noise of the positions again, and then with the same of the other sign."""
         rng = np.random.default_rng(0)
         for number in range(PAIRS):
@@ -388,7 +392,7 @@ class _Work:
         seen: Sequence[Compared],
         validation: Sequence[Compared],
         weights: Sequence[Floats],
-        band: Band,
+        band: TorqueBand,
     ) -> list[Check]:
         by_record = {one.record for one in (*seen, *validation)}
         groups = [[one for one in (*seen, *validation) if one.record == number] for number in sorted(by_record)]
@@ -431,7 +435,7 @@ class _Work:
         base: BaseParameters,
         fit: Regression,
         beta: Floats,
-        band: Band,
+        band: TorqueBand,
         validation: Sequence[Compared],
     ) -> ArmIdentification:
         links = consistent_links(base, self.mechanism, beta, fit.information)
@@ -443,8 +447,8 @@ class _Work:
         shares, total = _explained(validation, best)
         checks = [*checks, consistency_check(links), validation_check(self.drives, shares, band.edge)]
         estimates = [
-            *mass_estimates(self.point, masses, base, fit),
-            *friction_estimates(self.device, self.mechanism, base, fit, beta),
+            *link_mass_estimates(self.point, masses, base, fit),
+            *joint_friction_estimates(self.device, self.mechanism, base, fit, beta),
             *base_estimates(base, fit, beta),
             delay_estimate(fit),
         ]
@@ -506,13 +510,13 @@ class _Work:
         return columns
 
 
-def _split(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[Stretch]]:
+def _split(stretches: Sequence[TorqueStretch]) -> tuple[list[TorqueStretch], list[TorqueStretch]]:
     """What is fitted and what is predicted: the last record, or of a single one its last part."""
     last = stretches[-1].record if stretches else 0
     if stretches and stretches[0].record != last:
         return [one for one in stretches if one.record != last], [one for one in stretches if one.record == last]
     count, seen = sum(len(one.time) for one in stretches), 0
-    fitted, unseen = list[Stretch](), list[Stretch]()
+    fitted, unseen = list[TorqueStretch](), list[TorqueStretch]()
     for one in stretches:
         cut = int(np.clip(FITTED * count - seen, 0, len(one.time)))
         seen += len(one.time)
@@ -522,14 +526,14 @@ def _split(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[Stretch]]:
 
 
 def _compared(
-    comparison: Comparison, stretches: Sequence[Stretch], static: Sequence[Floats] = ()
+    comparison: TorqueComparison, stretches: Sequence[TorqueStretch], static: Sequence[Floats] = ()
 ) -> list[Compared]:
     """The stretches that are long enough for the kernel."""
     least = 2 * comparison.band.narrow.half(comparison.band.step) + 1
     return [comparison.of(one, static) for one in stretches if len(one.time) > least]
 
 
-def _with_noise(stretch: Stretch, noise: tuple[Floats, Floats, Floats], sign: float) -> Stretch:
+def _with_noise(stretch: TorqueStretch, noise: tuple[Floats, Floats, Floats], sign: float) -> TorqueStretch:
     q, v, a = noise
     return replace(
         stretch,
@@ -549,7 +553,7 @@ def _unbiased(fit: Regression, noisy: Sequence[Sequence[Compared]]) -> Floats:
 
 
 def error_sources(
-    band: Band, fit: Regression, seen: Sequence[Compared], noisy: Sequence[Sequence[Compared]]
+    band: TorqueBand, fit: Regression, seen: Sequence[Compared], noisy: Sequence[Sequence[Compared]]
 ) -> list[Floats]:
     """Autocovariances (t, d) of what noise of the torques, and noise of the positions, makes of the residuals."""
     taps, thin = band.narrow.taps(band.step), band.thinning

@@ -24,7 +24,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.identify.records.sampling import Sampling
+from zwidth.identify.records.sampling import SampleTimes
 
 WIDE: Final = 1.6  # edge of the positions' band over that of the analysed one
 WIDTH: Final = 1.2  # s f of the wide kernel: H is flat to 1e-4 up to f/2, 0.5 at f, and 1e-4 at 1.5 f
@@ -98,7 +98,7 @@ def _exact_for_powers(taps: Floats, g: Floats, t: Floats, derivative: int) -> Fl
 
 
 @dataclass(frozen=True)
-class Band:
+class TorqueBand:
     """What is analysed.
 
     edge    of the analysed band [Hz]
@@ -167,7 +167,9 @@ def convolved(signals: Floats, taps: Floats, down: int = 1) -> Floats:
     return made.reshape(len(made), *signals.shape[1:])
 
 
-def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highest: float = np.inf) -> Band:
+def choose_band(
+    positions: Sequence[Floats], sampling: Sequence[SampleTimes], highest: float = np.inf
+) -> TorqueBand:
     """The band in which records of one period are analysed.
 
     positions  (n, d) of each record, its longest stretch or the beginning of that
@@ -189,7 +191,7 @@ def choose_band(positions: Sequence[Floats], sampling: Sequence[Sampling], highe
     analysed = min(max(edge, lowest), most)
     stride = max(int(1.0 / (SAMPLES * 1.5 * WIDE * analysed * period)), 1)
     stride = stride if stride < FINE else FINE * (stride // FINE)
-    return Band(analysed, period, stride, noise, edge)
+    return TorqueBand(analysed, period, stride, noise, edge)
 
 
 def _spectrum(positions: Floats, period: float) -> tuple[Floats, Floats]:

@@ -9,17 +9,17 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.identify.arm.checks import Channels
-from zwidth.identify.arm.smoothing import Band, convolved
+from zwidth.identify.arm.checks import DriveChannels
+from zwidth.identify.arm.smoothing import TorqueBand, convolved
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling
+from zwidth.identify.records.sampling import SampleTimes
 from zwidth.memory_limit import check_memory
 
 Table = tuple[bool, Floats]  # whether a stretch begins with it; time, coordinates and forces (n, 1 + 2 d)
 
 
 @dataclass(frozen=True)
-class Stretch:
+class TorqueStretch:
     """A part of a record without gaps, smoothed, n samples.
 
     record   number of the record
@@ -37,9 +37,9 @@ class Stretch:
     signs: Floats
     forces: Floats
 
-    def part(self, rows: slice) -> Stretch:
+    def part(self, rows: slice) -> TorqueStretch:
         """Some of its samples."""
-        return Stretch(self.record, *(getattr(self, name)[rows] for name in STRETCH))
+        return TorqueStretch(self.record, *(getattr(self, name)[rows] for name in STRETCH))
 
 
 STRETCH: Final = ("time", "coordinates", "rates", "accelerations", "signs", "forces")
@@ -57,8 +57,13 @@ class TorqueTiming:
 
 
 def smoothed(
-    record: Record, number: int, sampling: Sampling, channels: Channels, band: Band, timing: TorqueTiming
-) -> Iterator[Stretch]:
+    record: Record,
+    number: int,
+    sampling: SampleTimes,
+    channels: DriveChannels,
+    band: TorqueBand,
+    timing: TorqueTiming,
+) -> Iterator[TorqueStretch]:
     """The stretches of a record, smoothed and thinned; those too short for the kernel are left out."""
     check_memory(
         6.0 * len(channels.force) * sampling.rows / band.stride,
@@ -69,7 +74,7 @@ def smoothed(
     if band.coarse > 1:
         tables, period = _guarded(tables, band), band.coarse * period
     half = band.wide.half(period)
-    parts = list[Stretch]()
+    parts = list[TorqueStretch]()
     for begins, table in _windows(tables, 2 * half, band.stride // band.coarse):
         if begins and parts:
             yield _joined(parts)
@@ -79,7 +84,7 @@ def smoothed(
         yield _joined(parts)
 
 
-def _tables(record: Record, sampling: Sampling, channels: Channels) -> Iterator[Table]:
+def _tables(record: Record, sampling: SampleTimes, channels: DriveChannels) -> Iterator[Table]:
     """The pieces of the record's stretches."""
     starts = set(sampling.runs[:, 0].tolist())
     for piece in sampling.stretches(record):
@@ -102,7 +107,7 @@ def _windows(tables: Iterator[Table], reach: int, stride: int) -> Iterator[Table
         rest = own[max(count, 0) * stride :].copy()
 
 
-def _guarded(tables: Iterator[Table], band: Band) -> Iterator[Table]:
+def _guarded(tables: Iterator[Table], band: TorqueBand) -> Iterator[Table]:
     """Tables thinned to one row of `coarse`, by a short kernel that takes nothing from the positions' band."""
     from scipy.signal import upfirdn
 
@@ -117,11 +122,13 @@ def _guarded(tables: Iterator[Table], band: Band) -> Iterator[Table]:
         yield begins, np.column_stack([time, upfirdn(taps, rows, 1, down)[:, kept : kept + len(time)].T])
 
 
-def _joined(parts: Sequence[Stretch]) -> Stretch:
-    return Stretch(parts[0].record, *(np.concatenate([getattr(one, name) for one in parts]) for name in STRETCH))
+def _joined(parts: Sequence[TorqueStretch]) -> TorqueStretch:
+    return TorqueStretch(
+        parts[0].record, *(np.concatenate([getattr(one, name) for one in parts]) for name in STRETCH)
+    )
 
 
-def _smooth(table: Floats, number: int, band: Band, period: float, timing: TorqueTiming) -> Stretch:
+def _smooth(table: Floats, number: int, band: TorqueBand, period: float, timing: TorqueTiming) -> TorqueStretch:
     """The smoothed samples of a table that reaches two kernels' halves beyond them."""
     kernel, down, d = band.wide, band.stride // band.coarse, table.shape[1] // 2
     half = kernel.half(period)
@@ -130,7 +137,7 @@ def _smooth(table: Floats, number: int, band: Band, period: float, timing: Torqu
     taps = [kernel.taps(period, k) for k in range(3)]
     late = kernel.taps(period, 0, timing.shift) + timing.spread * kernel.taps(period, 2, timing.shift)
     rates = convolved(q, taps[1])
-    return Stretch(
+    return TorqueStretch(
         number,
         table[middle, 0],
         convolved(q[near], taps[0], down),
@@ -141,7 +148,7 @@ def _smooth(table: Floats, number: int, band: Band, period: float, timing: Torqu
     )
 
 
-def _signs(rates: Floats, band: Band, period: float) -> Floats:
+def _signs(rates: Floats, band: TorqueBand, period: float) -> Floats:
     """Signs of rates, going through 0 in a straight line where noise decides on them."""
     taps = band.wide.taps(period, 1)
     size = np.sqrt(band.noise / (2.0 * period) * float(taps @ taps))

@@ -17,7 +17,7 @@ from zwidth.arrays import Flags, Floats
 from zwidth.chart.edge_crossings import EdgeChords
 from zwidth.device.faults import comma_list, plural
 from zwidth.errors import DeviceError
-from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likelihood, ranges
+from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likelihood, search_ranges
 from zwidth.identify.boundary.model import BoundaryModel, Scatter
 from zwidth.identify.boundary.parameters import BoundaryParameters
 from zwidth.identify.boundary.points import (
@@ -165,7 +165,7 @@ SAME_PERIOD: Final = 0.01  # relative difference of the periods below which noth
 OFF: Final = 0.1  # relative difference of the periods that is a fault of the file in any case
 
 
-def check_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
+def check_file_period(model: BoundaryModel, fit: BoundaryFit) -> list[Check]:
     """Whether the points are explained much better by a sampling period other than the file's; [] where they are
     not, or where the period is fitted already.
 
@@ -225,7 +225,7 @@ LOST: Final = 0.25  # share of points beyond any stable set, or of tried walls o
 WRONG: Final = 3.0  # standard deviations on the wrong side of the edge, from which on a tried wall contradicts it
 
 
-def explained_share(values: Floats, kinds: NDArray[np.str_], deviations: Floats, units: Floats) -> float:
+def explained_share_of_points(values: Floats, kinds: NDArray[np.str_], deviations: Floats, units: Floats) -> float:
     """Share of the points' spread that is explained: 1 - sum (deviation / unit)^2 / sum (value - mean)^2 / unit^2,
     the mean over the points of a kind; nan where they have no spread."""
     own = [((values - values[kinds == kind].mean()) / units)[kinds == kind] for kind in np.unique(kinds)]
@@ -234,11 +234,11 @@ def explained_share(values: Floats, kinds: NDArray[np.str_], deviations: Floats,
 
 
 def share_of_points(points: BoundaryPoints, fit_deviations: Floats, scatter: Scatter) -> float:
-    """`explained_share` of the points on the boundary: what was bisected; of unknown edges the damping."""
+    """`explained_share_of_points` of those on the boundary: what was bisected; of unknown edges the damping."""
     edges = points[points.on_edge]
     units = np.where(edges.kind == TIP, scatter.stiffness, scatter.damping)
     deviations = np.where(edges.kind == EDGE, fit_deviations * scatter.damping, fit_deviations)
-    return explained_share(edges.bisected, edges.kind, deviations, units)
+    return explained_share_of_points(edges.bisected, edges.kind, deviations, units)
 
 
 def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
@@ -248,13 +248,13 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
     How often, with up to 24 points on random devices of two masses, scatter of 0.1-2 %, and the delay fitted:
     of 113 right models none was refused or warned of (below 2.7 % with 95 % confidence); of 22 with both masses
     wrong by factors of 1.3 to 2 all were refused, of 22 that were other devices 21, and one was warned of. A wrong
-    sampling period, which a different delay makes up for in part, is looked for by `check_period`.
+    sampling period, which a different delay makes up for in part, is looked for by `check_file_period`.
     """
     points, deviations = model.points, fit.deviations
     edges = points[points.on_edge]
     units = model.units(fit.scatter)
     share = share_of_points(points, deviations.value, fit.scatter)
-    reach = ranges(points)
+    reach = search_ranges(points)
     most = np.where(edges.kind == TIP, np.max(edges.stiffness), np.max(np.abs(edges.damping)))
     sizes = np.where(edges.kind == EDGE, deviations.value * fit.scatter.damping, deviations.value)
     remains = float(np.sqrt(np.mean((sizes / np.maximum(most, 1e-300)) ** 2)))

@@ -61,7 +61,7 @@ class BoundaryFit:
         return value, least, most
 
 
-def ranges(points: BoundaryPoints) -> Scatter:
+def search_ranges(points: BoundaryPoints) -> Scatter:
     """How far the measured points reach: in stiffness, in damping, in frequency; each above 0."""
     edges = points[points.on_edge]
     frequency = edges.frequency[edges.frequency > 0.0]
@@ -74,7 +74,7 @@ def ranges(points: BoundaryPoints) -> Scatter:
 
 def first_scatter(points: BoundaryPoints) -> Scatter:
     """The scatter that a fit begins with."""
-    return Scatter(*(FIRST_SCATTER * one for one in ranges(points)))
+    return Scatter(*(FIRST_SCATTER * one for one in search_ranges(points)))
 
 
 def fit_boundary(
@@ -89,7 +89,7 @@ def fit_boundary(
     profiled  False: intervals by the curvature alone
     Raises    ValueError  for fewer points on the boundary than numbers
     """
-    reach, x = ranges(model.points), start
+    reach, x = search_ranges(model.points), start
     scatter = first_scatter(model.points)
     if x is None:
         x = _best_start(model, parameters, scatter)
@@ -267,7 +267,7 @@ def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, 
     Each kind of points has its own standard deviation, of which the likelihood is largest at what remains:
     sum n ln(SS / n); tried walls add -2 ln Phi(d).
     """
-    reach, residuals = ranges(model.points), fit.fit.residuals
+    reach, residuals = search_ranges(model.points), fit.fit.residuals
     total, count, kinds, used = 0.0, 0, 0, np.zeros(len(residuals), dtype=bool)
     for name, part in _parts(model).items():
         if part.any():
@@ -279,7 +279,7 @@ def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, 
     return total + float(np.sum(residuals[~used] ** 2)), count, kinds
 
 
-def without(points: BoundaryPoints, every: int = 3) -> Flags:
+def without_points(points: BoundaryPoints, every: int = 3) -> Flags:
     """Which points (n,) are kept where every third on the boundary is left out, along each edge."""
     order = np.lexsort((points.chosen, points.kind, ~points.on_edge))
     keep = np.ones(len(points), dtype=bool)

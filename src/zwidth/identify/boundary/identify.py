@@ -22,8 +22,8 @@ from zwidth.errors import DeviceError
 from zwidth.identify.boundary.checks import (
     check_circumstances,
     check_explained,
+    check_file_period,
     check_magnitudes,
-    check_period,
     check_points,
     complete_points,
     share_of_points,
@@ -35,11 +35,11 @@ from zwidth.identify.boundary.fit import (
     first_scatter,
     fit_boundary,
     log_likelihood,
-    without,
+    without_points,
 )
 from zwidth.identify.boundary.model import BoundaryModel
 from zwidth.identify.boundary.parameters import BoundaryParameters
-from zwidth.identify.boundary.points import COLUMNS, BoundaryPoints, read_points
+from zwidth.identify.boundary.points import COLUMNS, BoundaryPoints, read_boundary_points
 from zwidth.identify.boundary.trials import TrialModel, TrialPlan, model_by_trials, needs_trials
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.records.record import Record
@@ -99,7 +99,7 @@ def identify_boundary(
         raise fail(device.label, "paths", text)
     report = progress or (lambda stage, done, of: None)
     report("reading the points", 0, 0)
-    points, checks = complete_points(read_points(records), records)
+    points, checks = complete_points(read_boundary_points(records), records)
     models = models_of(damping_models, device, point) if damping_models else []
     choices = [BoundaryParameters.of(device, point, paths, model) for model in models]
     choices = choices or [BoundaryParameters.of(device, point, paths)]
@@ -124,7 +124,7 @@ def identify_boundary(
         return nothing
     if plan is None:
         report("trying other sampling periods", 0, 0)
-        checks += check_period(model, fit)
+        checks += check_file_period(model, fit)
         if (nothing := refused(KIND, device.label, checks)) is not None:
             return nothing
     report("validating", 0, 0)
@@ -232,7 +232,7 @@ def _alike(fit: BoundaryFit) -> list[Check]:
 def _validate(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, str]:
     """Share of the spread of every third point that a fit to the others explains."""
     edges = int(model.points.on_edge.sum())
-    kept = without(model.points)
+    kept = without_points(model.points)
     left = int(np.sum(kept & model.points.on_edge))
     if edges < FEWEST_VALIDATED or left < len(fit.vector) + 1:
         return float("nan"), f"nothing: {plural(edges, 'point')} on the boundary are too few to leave some out"

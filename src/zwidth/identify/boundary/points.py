@@ -122,7 +122,7 @@ class BoundaryPoints:
         return np.where(self.kind == TIP, self.damping, self.stiffness)
 
 
-def read_points(records: Sequence[Record]) -> BoundaryPoints:
+def read_boundary_points(records: Sequence[Record]) -> BoundaryPoints:
     """The points of all records.
 
     Raises  DeviceError  for words that are not known, for a point that is on the edge and a tried wall, for walls

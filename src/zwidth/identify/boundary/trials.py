@@ -163,7 +163,7 @@ def needs_trials(point: OperatingPoint, through: str | None) -> bool:
     return "dry friction" in loop.nonlinear.kinds or isinstance(loop.controller.velocity, Foaw | Levant)
 
 
-class Crossing(NamedTuple):
+class EdgeCrossing(NamedTuple):
     """Where trials find the edges (n,) of points.
 
     value      damping of the edge [N s/m]; its stiffness [N/m] where `tip`; nan where there is none
@@ -177,9 +177,9 @@ class Crossing(NamedTuple):
     inward: Floats
     frequency: Floats
 
-    def only(self, some: Flags) -> Crossing:
+    def only(self, some: Flags) -> EdgeCrossing:
         """Some of the edges."""
-        return Crossing(self.value[some], self.tip[some], self.inward[some], self.frequency[some])
+        return EdgeCrossing(self.value[some], self.tip[some], self.inward[some], self.frequency[some])
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class SimulatedEdges:
     """
 
     centre: Floats
-    at: Crossing
+    at: EdgeCrossing
     slopes: Floats
 
     def values(self, vector: Floats) -> Floats:
@@ -288,7 +288,7 @@ def _slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialP
     same edge on both sides."""
     slopes = []
     for i in range(len(x)):
-        ends, places = list[Crossing](), []
+        ends, places = list[EdgeCrossing](), []
         for side in (-1.0, 1.0):
             moved = x.copy()
             step = MOVED if parameters.positive[i] else MOVED * max(abs(float(x[i])), 0.1)
@@ -301,13 +301,13 @@ def _slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialP
     return np.column_stack(slopes)
 
 
-def _simulated(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> Crossing:
+def _simulated(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> EdgeCrossing:
     """What the trials find at the points and at the walls that were tried, each disturbed in its own way."""
     chart = parameters.edge(x)
     _, K1, _, B1 = chart.box
     tip = chart.first[int(np.argmax(chart.first[:, 0]))] if len(chart) else np.array([K1, B1])
     place = StableExtent(float(tip[0]), max(float(tip[1]), 0.05 * B1), B1, True)
-    found = Crossing(
+    found = EdgeCrossing(
         np.full(len(points), np.nan), points.kind == TIP, np.ones(len(points)), np.full(len(points), np.nan)
     )
     for how, group in plan.groups().items():
@@ -317,7 +317,7 @@ def _simulated(points: BoundaryPoints, parameters: BoundaryParameters, plan: Tri
     return found
 
 
-def _crossings(points: BoundaryPoints, trial: StabilityTrial, place: StableExtent) -> Crossing:
+def _crossings(points: BoundaryPoints, trial: StabilityTrial, place: StableExtent) -> EdgeCrossing:
     """What one trial finds at points: along damping, or along stiffness for a tip; a wall that was tried is taken
     to the nearest edge along damping, and along stiffness where no damping is stable."""
     ends = dict[tuple[str, float], tuple[float, float]]()
@@ -341,4 +341,4 @@ def _crossings(points: BoundaryPoints, trial: StabilityTrial, place: StableExten
         ends = {(TIP, edge.damping): (edge.stiffness, edge.frequency) for edge in tips}
         for i in np.flatnonzero(tip):
             value[i], frequency[i] = ends.get((TIP, float(points.damping[i])), nothing)
-    return Crossing(value, tip, inward, frequency)
+    return EdgeCrossing(value, tip, inward, frequency)

@@ -16,7 +16,7 @@ from zwidth.arrays import Complexes, Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, plural
 from zwidth.identify.identification import Check, Estimate, Identification, refused
-from zwidth.identify.impedance.local_spectra import LocalSpectra, local_spectra, merged, segment_length
+from zwidth.identify.impedance.local_spectra import LocalSpectra, local_spectra, merged_sums, sums_segment_length
 from zwidth.identify.impedance.spectra import (
     FEWEST_LINES,
     FORCE,
@@ -32,7 +32,7 @@ from zwidth.identify.impedance.spectra import (
     wall_states,
 )
 from zwidth.identify.records.record import Columns, Record
-from zwidth.identify.records.sampling import Sampling, check_periods, check_sampling
+from zwidth.identify.records.sampling import SampleTimes, check_periods, check_sampling
 from zwidth.identify.response.sweep_blocks import LEAST_SHARED, shared_power
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.raw_sweep import encoder_step
@@ -104,7 +104,7 @@ def identify_impedance(
     point = device.at() if point is None else point
     wall = _wall(device, stiffness, damping)
     report = progress or (lambda stage, done, of: None)
-    samplings, checks = list[Sampling](), list[Check]()
+    samplings, checks = list[SampleTimes](), list[Check]()
     for record in records:
         sampling, check = check_sampling(record)
         checks.append(check)
@@ -128,7 +128,7 @@ def identify_impedance(
     for name in _states(records, wall):
         report(f"spectra, {STATES[name]}", 0, 0)
         longest = max(longest_stretch(*one, name) for one in zip(records, samplings, strict=True))
-        state, check = _state(name, records, samplings, segment_length(longest, segment), point, wall)
+        state, check = _state(name, records, samplings, sums_segment_length(longest, segment), point, wall)
         checks.append(check)
         if state is not None:
             states.append(state)
@@ -189,7 +189,7 @@ def _names(record: Record) -> tuple[str, str]:
     return next(n for n in FORCES if n in record), next(n for n in POSITIONS if n in record)
 
 
-def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
+def _check_signals(record: Record, sampling: SampleTimes) -> list[Check]:
     """Whether force and position move, the position by more than some of its steps, the force without limit."""
     force, position = _names(record)
     low, high = {force: np.inf, position: np.inf}, {force: -np.inf, position: -np.inf}
@@ -226,7 +226,7 @@ def _check_signals(record: Record, sampling: Sampling) -> list[Check]:
 def _state(
     name: str,
     records: Sequence[Record],
-    samplings: Sequence[Sampling],
+    samplings: Sequence[SampleTimes],
     length: int,
     point: OperatingPoint,
     wall: tuple[float, float] | None,
@@ -234,7 +234,7 @@ def _state(
     """The spectra of one state of the wall, and whether force and motion are coherent in it."""
 
     def spectra_of(part: tuple[float, float]) -> LocalSpectra:
-        return merged(
+        return merged_sums(
             [
                 local_spectra(
                     stretches_of(record, sampling, _names(record), name, part),
@@ -247,7 +247,7 @@ def _state(
         )
 
     first, second = spectra_of((0.0, FIRST_PART)), spectra_of((FIRST_PART, 1.0))
-    spectra = merged([first, second])
+    spectra = merged_sums([first, second])
     if spectra.segments < FEWEST_SEGMENTS:
         text = (
             f"{STATES[name]}: {plural(spectra.segments, 'segment')} of {length} samples; record longer, or give "

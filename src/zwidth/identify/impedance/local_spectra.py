@@ -119,7 +119,7 @@ def correlations() -> Floats:
     return np.array(shared) / shared[0]
 
 
-def neighbours() -> float:
+def neighbouring_lines() -> float:
     """How many windows count as one independent one, in sums over many."""
     return float(2.0 * np.sum(correlations()) - 1.0)
 
@@ -173,7 +173,7 @@ def _kept(values: Complexes, turn: Complexes) -> Complexes:
     return np.asarray((windows @ turn).reshape(-1, TERMS, KEPT))
 
 
-def segment_length(samples: int, segment: int | None = None) -> int:
+def sums_segment_length(samples: int, segment: int | None = None) -> int:
     """The length of segments for a run of so many samples, a third of it or less, or what is given.
 
     The longer they are, the better a response that turns is followed; a segment is known better than it seems, as
@@ -187,7 +187,7 @@ def segment_length(samples: int, segment: int | None = None) -> int:
     return min(int(prev_fast_len(third, real=True)), LONGEST)
 
 
-def merged(several: Sequence[LocalSpectra]) -> LocalSpectra:
+def merged_sums(several: Sequence[LocalSpectra]) -> LocalSpectra:
     """Sums of records together, of the same period and length."""
     gram = sum((one.gram for one in several), np.zeros_like(several[0].gram))
     return replace(several[0], gram=gram, segments=sum(one.segments for one in several))

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Complexes, Flags, Floats
-from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbours
+from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbouring_lines
 from zwidth.identify.records.record import Piece, Record
-from zwidth.identify.records.sampling import Sampling, joined
+from zwidth.identify.records.sampling import SampleTimes, joined
 
 FORCE, POSITION = "force", "position"
 LEVEL: Final = 0.95
@@ -146,7 +146,7 @@ def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, 
     size = np.abs(impedance.value)
     k = int(np.argmin(impedance.high)) if lowest else int(np.argmax(impedance.low))
     rivals = impedance.low <= impedance.high[k] if lowest else impedance.high >= impedance.low[k]
-    count = max(float(np.sum(rivals)) / neighbours(), 1.0)
+    count = max(float(np.sum(rivals)) / neighbouring_lines(), 1.0)
     level = 1.0 - (1.0 - LEVEL) * min(count, 2.0) / count
     some = impedance.only(rivals)
     raised, plain = some.half_width(level), some.half_width()
@@ -158,7 +158,7 @@ def extreme(impedance: MeasuredImpedance, *, lowest: bool) -> tuple[int, float, 
 
 
 def stretches_of(
-    record: Record, sampling: Sampling, names: tuple[str, str], state: str, part: tuple[float, float]
+    record: Record, sampling: SampleTimes, names: tuple[str, str], state: str, part: tuple[float, float]
 ) -> Iterator[Piece]:
     """Pieces of a record without gaps, under the channel names of the spectra.
 
@@ -178,7 +178,7 @@ def stretches_of(
             yield {FORCE: piece[names[0]][some], POSITION: piece[names[1]][some], "sample": piece["sample"][some]}
 
 
-def longest_stretch(record: Record, sampling: Sampling, state: str) -> int:
+def longest_stretch(record: Record, sampling: SampleTimes, state: str) -> int:
     """Samples of the longest stretch of a state of the wall without a gap."""
     if "wall" not in record:
         return sampling.longest
@@ -291,11 +291,11 @@ def low_frequency_fit(impedance: MeasuredImpedance) -> tuple[Floats, Floats] | N
         size = np.linalg.norm(rows, axis=0)
         both, *_ = np.linalg.lstsq(rows / size, right, rcond=None)
         solved, shift = (both / size[:, None])[:KEPT_POWERS].T
-        freedom = max((2 * count - rows.shape[1]) / neighbours(), 1.0)
-        remains = float(np.sum((rows / size @ both[:, 0] - right[:, 0]) ** 2)) / neighbours() / freedom
+        freedom = max((2 * count - rows.shape[1]) / neighbouring_lines(), 1.0)
+        remains = float(np.sum((rows / size @ both[:, 0] - right[:, 0]) ** 2)) / neighbouring_lines() / freedom
         if remains > 1.0 + 3.0 * np.sqrt(2.0 / freedom):
             break
-        variance = np.diag(np.linalg.inv((rows / size).T @ (rows / size))) / size**2 * neighbours()
+        variance = np.diag(np.linalg.inv((rows / size).T @ (rows / size))) / size**2 * neighbouring_lines()
         deviation = np.sqrt(variance[:KEPT_POWERS] * max(remains, 1.0))
         fits.append((float(impedance.frequency[count - 1]), solved, deviation, np.abs(shift)))
         count = max(count + 1, int(1.2 * count))

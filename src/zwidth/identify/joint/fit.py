@@ -94,7 +94,7 @@ class Windows:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class JointNumbers:
     """What the motion hangs on.
 
     values   (10,) m, b forward and backward, F forward and backward, k, the force's delay [s], and the drift of
@@ -107,7 +107,7 @@ class Numbers:
     free: tuple[int, ...]
     tied: tuple[tuple[int, int], ...] = ()
 
-    def with_free(self, some: Floats) -> Numbers:
+    def with_free(self, some: Floats) -> JointNumbers:
         """With other values of the free numbers."""
         values = self.values.copy()
         values[list(self.free)] = some
@@ -170,7 +170,7 @@ class JointFit:
     """
 
     windows: Windows
-    numbers: Numbers
+    numbers: JointNumbers
     starts: Floats
     covariance: Floats
     working: Floats
@@ -218,7 +218,7 @@ class JointFit:
 class _Search:
     """Levenberg and Marquardt over the free numbers and the windows' starts."""
 
-    def __init__(self, windows: Windows, numbers: Numbers, starts: Floats, blocks: int) -> None:
+    def __init__(self, windows: Windows, numbers: JointNumbers, starts: Floats, blocks: int) -> None:
         self.windows, self.numbers, self.starts = windows, numbers, starts
         self.cut = windows.cut(max(-(-blocks // len(windows.first)), 1)) if blocks else windows
         self.of_window = np.searchsorted(windows.first, self.cut.first, side="right") - 1
@@ -277,7 +277,7 @@ class _Search:
                 return blocks, left, True
         return *self.linearised(), False
 
-    def _best_step(self, step: Floats, along: Floats) -> tuple[Numbers, Floats, float]:
+    def _best_step(self, step: Floats, along: Floats) -> tuple[JointNumbers, Floats, float]:
         """The numbers a step further; each window's start as far along its step as predicts it best."""
         numbers = self._moved(step)
         guesses = [self.starts + share * along for share in SHARES]
@@ -294,7 +294,7 @@ class _Search:
         span = samples * float(np.mean(self.windows.period))
         return 1e-3 * samples * np.array([1.0, span**2])
 
-    def _moved(self, step: Floats) -> Numbers:
+    def _moved(self, step: Floats) -> JointNumbers:
         """The numbers a step further, within bounds that keep the motion from running away."""
         values = self.numbers.with_free(self.numbers.free_values + step).values
         values[MASS] = max(values[MASS], 0.1 * self.numbers.values[MASS])
@@ -329,7 +329,7 @@ def scales(windows: Windows) -> Floats:
     return np.array([f / a, f / v, f / v, f, f, f / x, T, f, f, f, x, v])
 
 
-def assembled(blocks: Blocks, count: int) -> Floats:
+def assembled_windows(blocks: Blocks, count: int) -> Floats:
     """Normal matrix of the free numbers and the starts of all windows."""
     p = blocks.gram.shape[-1] - 2
     whole = np.zeros((p + 2 * count, p + 2 * count))
@@ -384,7 +384,7 @@ class Arrow:
         return x / own, (rest - back @ x) / size
 
 
-def squares_of(windows: Windows, numbers: Numbers, starts: Floats) -> Floats:
+def squares_of(windows: Windows, numbers: JointNumbers, starts: Floats) -> Floats:
     """Sum of squares (W,) of what the numbers leave in each window; inf where the prediction runs away."""
     edges = np.cumsum(windows.length) - windows.length
     with np.errstate(over="ignore", invalid="ignore"):
@@ -406,14 +406,16 @@ def explained(windows: Windows, squares: Floats) -> float:
     return 1.0 - float(np.sum(squares)) / max(total, 1e-300)
 
 
-def approach(windows: Windows, numbers: Numbers, starts: Floats, most: int) -> tuple[Numbers, Floats, Floats]:
+def approach(
+    windows: Windows, numbers: JointNumbers, starts: Floats, most: int
+) -> tuple[JointNumbers, Floats, Floats]:
     """A few steps of the search, for a better guess: numbers, starts (W, 2), and sums of squares (W,)."""
     search = _Search(windows, numbers, starts, 0)
     search.run(most)
     return search.numbers, search.starts, squares_of(windows, search.numbers, search.starts)
 
 
-def fit_joint(windows: Windows, numbers: Numbers, starts: Floats, *, blocks: int = BLOCKS) -> JointFit:
+def fit_joint(windows: Windows, numbers: JointNumbers, starts: Floats, *, blocks: int = BLOCKS) -> JointFit:
     """The free numbers that predict the motion in the windows best, from a guess close to them."""
     search = _Search(windows, numbers, starts, blocks)
     sums, left, converged = search.run()
@@ -432,7 +434,7 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     jackknife, has the power -1 in its place, too wide with the degrees of freedom of `JointFit.combination`.
     Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
     """
-    whole = assembled(blocks, count)
+    whole = assembled_windows(blocks, count)
     size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     inverse, lost = _inverse(whole / np.outer(size, size))
     G = len(blocks.window)

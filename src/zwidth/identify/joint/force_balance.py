@@ -27,10 +27,20 @@ import numpy as np
 from zwidth.arrays import Flags, Floats
 from zwidth.device.faults import comma_list, plural
 from zwidth.identify.identification import Check
-from zwidth.identify.joint.fit import COUNT, LEVEL, MASS, ONE, STIFFNESS, Numbers, Windows, explained, squares_of
+from zwidth.identify.joint.fit import (
+    COUNT,
+    LEVEL,
+    MASS,
+    ONE,
+    STIFFNESS,
+    JointNumbers,
+    Windows,
+    explained,
+    squares_of,
+)
 from zwidth.identify.joint.joint import Joint
-from zwidth.identify.joint.record import Motion
-from zwidth.identify.joint.start import MOVING, PARTLY, SHORTEST, balance_rows, search_guess, weighting
+from zwidth.identify.joint.record import JointMotion
+from zwidth.identify.joint.start import MOVING, PARTLY, SHORTEST, force_balance_rows, search_guess, weighting
 from zwidth.identify.records.record import Record
 
 BY_CHANCE: Final = 5e-4  # probability that noise alone passes for a mass: a larger one tells masses that are none
@@ -45,7 +55,7 @@ TINY: Final = 1e-9  # share of the largest column below which one is rounding
 class ForceBalance:
     """The force by the motion.
 
-    values      (10,) numbers as `fit.Numbers` has them, 0 where the balance has none
+    values      (10,) numbers as `fit.JointNumbers` has them, 0 where the balance has none
     covariance  (10, 10) of their errors
     freedom     degrees of freedom of its variance
     critical    standard errors from which a mass is told from 0
@@ -119,7 +129,7 @@ def _balanced(
     if size > np.max(windows.length):
         return None
     weight, slope, _ = weighting(size)
-    A, at, T = balance_rows(windows, size, resolution, moving)
+    A, at, T = force_balance_rows(windows, size, resolution, moving)
     forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
     held = forces[np.clip(at - late, 0, len(forces) - 1)]
     force, rate = held @ weight, (held @ slope) / T
@@ -197,7 +207,9 @@ GUESSES: Final = 3  # that are followed
 MOST: Final = 6  # windows that are looked at of each part
 
 
-def reason_of_misfit(windows: Windows, motion: Motion, numbers: Numbers, records: Sequence[Record]) -> str:
+def reason_of_misfit(
+    windows: Windows, motion: JointMotion, numbers: JointNumbers, records: Sequence[Record]
+) -> str:
     """What was seen where no mass with friction explains the motion, and what may cause it; "" where nothing was.
 
     A sign is called turned only where the force falls with the acceleration beyond its noise, and the motion is
@@ -241,7 +253,7 @@ def reason_of_misfit(windows: Windows, motion: Motion, numbers: Numbers, records
     return ""
 
 
-def _turned(windows: Windows, reversed_: Windows, motion: Motion, numbers: Numbers) -> bool:
+def _turned(windows: Windows, reversed_: Windows, motion: JointMotion, numbers: JointNumbers) -> bool:
     """Whether the force of the whole record falls with the acceleration, and explains the motion with its sign
     turned."""
     if not force_balance(windows, motion.resolution).against_mass:
@@ -263,7 +275,7 @@ def _differences(seen: Mapping[str, ForceBalance]) -> str:
     )
 
 
-def _explained(windows: Windows, motion: Motion, numbers: Numbers) -> float:
+def _explained(windows: Windows, motion: JointMotion, numbers: JointNumbers) -> float:
     """Share of the motion in windows that is explained by the numbers that explain it best."""
     found, starts = search_guess(windows, numbers, motion.resolution, motion.deviation, GUESSES)
     return explained(windows, squares_of(windows, found, starts))
@@ -276,7 +288,7 @@ def _some(which: Flags) -> Flags:
     return np.isin(np.arange(len(which)), kept)
 
 
-def groups_of(windows: Windows, motion: Motion, records: Sequence[Record]) -> dict[str, Flags]:
+def groups_of(windows: Windows, motion: JointMotion, records: Sequence[Record]) -> dict[str, Flags]:
     """Windows of each record, or of parts of a single one, by their names."""
     record_of_run = {one.run: one.record for one in motion.sections}
     owner = np.array([record_of_run[int(run)] for run in windows.run])
@@ -303,9 +315,9 @@ FLAT: Final = 0.02  # share of a force's samples at its largest or smallest valu
 FEW_LEVELS: Final = 50  # values of a force that is meant to have flat tops, as square waves have
 
 
-def checks_of(motion: Motion, windows: Windows, joint: Joint) -> list[Check]:
+def checks_of(motion: JointMotion, windows: Windows, joint: Joint) -> list[Check]:
     """All checks of what was recorded, in an order in which each assumes those before it."""
-    checks = [check_motion(motion, joint), check_units(motion, joint)]
+    checks = [check_joint_motion(motion, joint), check_units(motion, joint)]
     if not checks[0].passed:
         return checks
     if motion.force_name:
@@ -318,7 +330,7 @@ def checks_of(motion: Motion, windows: Windows, joint: Joint) -> list[Check]:
     return checks
 
 
-def check_motion(motion: Motion, joint: Joint) -> Check:
+def check_joint_motion(motion: JointMotion, joint: Joint) -> Check:
     """That the joint moves, by more than ten steps of its encoder."""
     travel, unit = float(np.ptp(motion.positions)), joint.unit("position")
     if travel == 0.0:
@@ -335,7 +347,7 @@ def check_motion(motion: Motion, joint: Joint) -> Check:
     return Check("motion", True, f"{seen}, {counts:.3g} {what}" if isfinite(counts) else seen)
 
 
-def check_units(motion: Motion, joint: Joint) -> Check:
+def check_units(motion: JointMotion, joint: Joint) -> Check:
     """That travel, encoder steps and forces are of the size that the device's own numbers give."""
     travel, unit = float(np.ptp(motion.positions)), joint.unit("position")
     faults, seen = list[str](), list[str]()
@@ -378,7 +390,7 @@ def _slip(ratio: float, *, angular: bool) -> str:
     return ""
 
 
-def check_force(motion: Motion, joint: Joint) -> Check:
+def check_force(motion: JointMotion, joint: Joint) -> Check:
     """That the force changes: under a constant one only ratios of friction and mass can be told."""
     forces, unit = motion.forces, joint.unit("force")
     if not motion.driven:
@@ -399,7 +411,7 @@ def check_force(motion: Motion, joint: Joint) -> Check:
     return Check("force", True, f"{motion.force_name} from {low:.4g} to {high:.4g} {unit}")
 
 
-def check_dependence(balance: ForceBalance, motion: Motion) -> list[Check]:
+def check_dependence(balance: ForceBalance, motion: JointMotion) -> list[Check]:
     """That the force depends on the motion beyond its own noise; [] where it does."""
     if balance.depends is None:
         reason = (
@@ -445,14 +457,14 @@ def travels(windows: Windows, resolution: float) -> tuple[float, float]:
     return forward, backward
 
 
-def directions(windows: Windows, motion: Motion) -> tuple[bool, bool]:
+def directions(windows: Windows, motion: JointMotion) -> tuple[bool, bool]:
     """Whether the joint slides forward, and backward, by enough to tell friction there."""
     forward, backward = travels(windows, motion.resolution)
     least = max(ONE_WAY * (forward + backward), FEWEST_COUNTS * motion.resolution)
     return forward >= least or forward > backward, backward >= least or backward > forward
 
 
-def check_directions(windows: Windows, motion: Motion) -> Check:
+def check_directions(windows: Windows, motion: JointMotion) -> Check:
     """That the joint slides both ways: a constant force and friction are one otherwise."""
     both = directions(windows, motion)
     if all(both):
@@ -467,7 +479,7 @@ def check_directions(windows: Windows, motion: Motion) -> Check:
     )
 
 
-def check_standstill(motion: Motion) -> Check:
+def check_standstill(motion: JointMotion) -> Check:
     """How long the joint stands: its friction then hides force and mass."""
     shares = []
     for one in motion.sections:
@@ -483,7 +495,7 @@ def check_standstill(motion: Motion) -> Check:
     return Check("standstill", True, text)
 
 
-def check_saturation(motion: Motion, joint: Joint) -> list[Check]:
+def check_saturation(motion: JointMotion, joint: Joint) -> list[Check]:
     """Whether the force has flat tops, or lies beyond what the drive gives."""
     if not motion.driven:
         return []

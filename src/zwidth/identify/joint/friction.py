@@ -20,7 +20,7 @@ from zwidth.identify.joint.fit import DELAY, DRIFTS, MASS, ONE, STIFFNESS
 from zwidth.identify.joint.identification import POOR, FittedJoint, fitted_joint
 from zwidth.identify.joint.joint import COLUMNS as COLUMNS
 from zwidth.identify.joint.joint import Joint
-from zwidth.identify.joint.record import Motion
+from zwidth.identify.joint.record import JointMotion
 from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import check_mass_in_file
@@ -383,7 +383,7 @@ class Comparison:
     correlation: float
 
 
-def compare_with_command(motion: Motion) -> Comparison | None:
+def compare_with_command(motion: JointMotion) -> Comparison | None:
     """The comparison over all sections; None where only one of the two was recorded, or one does not change.
 
     The lag is where the correlation of the two is largest, between samples by a parabola through three of them.

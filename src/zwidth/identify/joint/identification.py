@@ -20,7 +20,7 @@ from zwidth.identify.joint.fit import (
     ONE,
     STIFFNESS,
     JointFit,
-    Numbers,
+    JointNumbers,
     Windows,
     approach,
     explained,
@@ -37,10 +37,10 @@ from zwidth.identify.joint.force_balance import (
     reason_of_misfit,
 )
 from zwidth.identify.joint.joint import Joint, joint_of
-from zwidth.identify.joint.record import Motion, read_motion, windows_of
+from zwidth.identify.joint.record import JointMotion, read_motion, windows_of
 from zwidth.identify.joint.start import first_starts, search_guess
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling, check_periods, check_sampling
+from zwidth.identify.records.sampling import SampleTimes, check_periods, check_sampling
 from zwidth.progress import Progress
 
 UNSEEN: Final = 3  # of so many windows one is kept for validation
@@ -67,8 +67,8 @@ class FittedJoint:
     """
 
     joint: Joint
-    motion: Motion
-    sampling: Sampling
+    motion: JointMotion
+    sampling: SampleTimes
     checks: tuple[Check, ...]
     fit: JointFit
     unseen: Windows
@@ -145,7 +145,7 @@ def fitted_joint(
         joint.force_column(record)  # columns are wrong before samples are
     report = progress or (lambda stage, done, of: None)
     steps = len(records) + 4
-    checks, samplings = list[Check](), list[Sampling]()
+    checks, samplings = list[Check](), list[SampleTimes]()
     for n, record in enumerate(records):
         report("reading records", n, steps)
         sampling, check = check_sampling(record)
@@ -211,7 +211,7 @@ def fitted_joint(
     return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
 
 
-def _balance_before(windows: Windows, motion: Motion, records: Sequence[Record]) -> ForceBalance:
+def _balance_before(windows: Windows, motion: JointMotion, records: Sequence[Record]) -> ForceBalance:
     """The balance of all windows, which depends where that of a part does: a sign that flips may hide it."""
     whole = force_balance(windows, motion.resolution)
     if whole.depends is not False:
@@ -221,14 +221,14 @@ def _balance_before(windows: Windows, motion: Motion, records: Sequence[Record])
     return replace(whole, depends=depends)
 
 
-def balance_of(fit: JointFit, motion: Motion) -> ForceBalance:
+def balance_of(fit: JointFit, motion: JointMotion) -> ForceBalance:
     """The balance in the windows that were fitted: a force that changes elsewhere alone tells nothing there."""
     values = fit.numbers.values
     spring = STIFFNESS in fit.numbers.free
     return force_balance(fit.windows, motion.resolution, delay=float(values[DELAY]), spring=spring)
 
 
-def _enough(motion: Motion, samplings: Sequence[Sampling]) -> list[Check]:
+def _enough(motion: JointMotion, samplings: Sequence[SampleTimes]) -> list[Check]:
     """That there are stretches without a gap that are long enough to be cut into windows."""
     if motion.sections:
         return []
@@ -237,7 +237,7 @@ def _enough(motion: Motion, samplings: Sequence[Sampling]) -> list[Check]:
     return [Check("gaps", False, reason)]
 
 
-def _limited(motion: Motion, joint: Joint) -> Motion:
+def _limited(motion: JointMotion, joint: Joint) -> JointMotion:
     """The motion with forces as the drive limits them, where they are commands."""
     if not np.isfinite(joint.limit) or motion.force_name not in ("current_A", joint.command):
         return motion
@@ -246,14 +246,14 @@ def _limited(motion: Motion, joint: Joint) -> Motion:
     return replace(motion, sections=tuple(sections))
 
 
-def _numbers(motion: Motion, forward: bool, backward: bool, mass: float, spring: bool) -> Numbers:
+def _numbers(motion: JointMotion, forward: bool, backward: bool, mass: float, spring: bool) -> JointNumbers:
     """Which numbers are fitted: those of a direction only where the joint slides so."""
     free: tuple[int, ...] = (MASS, DELAY) if motion.driven else ()
     free += (1, 3) if forward else ()
     free += (2, 4) if backward else ()
     free += (STIFFNESS, DRIFTS[0]) if spring else (DRIFTS[0],)
     tied = () if forward and backward else ((2, 1), (4, 3)) if forward else ((1, 2), (3, 4))
-    return Numbers(mass * ONE[MASS], tuple(sorted(free)), tied)
+    return JointNumbers(mass * ONE[MASS], tuple(sorted(free)), tied)
 
 
 def _unseen(windows: Windows) -> Flags:
@@ -261,7 +261,7 @@ def _unseen(windows: Windows) -> Flags:
     return np.asarray(np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1)
 
 
-def _mean_square(fit: JointFit, motion: Motion) -> float:
+def _mean_square(fit: JointFit, motion: JointMotion) -> float:
     """Usual square of what remains, at least that of the noise."""
     edges = np.cumsum(fit.windows.length) - fit.windows.length
     means = np.add.reduceat(fit.residuals**2, edges) / fit.windows.length
@@ -269,7 +269,7 @@ def _mean_square(fit: JointFit, motion: Motion) -> float:
 
 
 def _fit(
-    windows: Windows, motion: Motion, numbers: Numbers, spring: bool | None
+    windows: Windows, motion: JointMotion, numbers: JointNumbers, spring: bool | None
 ) -> tuple[JointFit, tuple[float, ...]]:
     """The fit, without windows that follow no such model, and with a spring where there is one."""
     seen = windows.chosen(~_unseen(windows))
@@ -335,7 +335,7 @@ def _no_minimum(fit: JointFit) -> Check:
     )
 
 
-def _check_model(fitted: FittedJoint, windows: Windows, numbers: Numbers, records: Sequence[Record]) -> Check:
+def _check_model(fitted: FittedJoint, windows: Windows, numbers: JointNumbers, records: Sequence[Record]) -> Check:
     """That one mass with friction predicts the windows that were not fitted; else why not."""
     count = len(windows.first)
     text = f"{100.0 * max(fitted.explained, 0.0):.4g} % of the motion in unseen windows is predicted"

@@ -11,7 +11,7 @@ import numpy as np
 from zwidth.device.address import table
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, dotted, fail, suggestion
-from zwidth.device.legs import Member, members
+from zwidth.device.legs import LegMember, members
 from zwidth.errors import DeviceError
 from zwidth.identify.records.record import Columns, Record
 
@@ -178,11 +178,11 @@ def _of_plant(device: Device, name: str | None) -> Joint:
     return Joint(f"{label} of the plant", False, step=step, limit=float(limit), paths=path, remarks=(remark,))
 
 
-def _path(member: Member, key: str, document: dict[str, Any]) -> str:
+def _path(member: LegMember, key: str, document: dict[str, Any]) -> str:
     return dotted(("mechanism", *member.path, key), document)
 
 
-def _link_paths(link: Member, document: dict[str, Any], ratio: float) -> dict[str, tuple[str, float]]:
+def _link_paths(link: LegMember, document: dict[str, Any], ratio: float) -> dict[str, tuple[str, float]]:
     """Keys of a joint's own damper and spring; numbers at the motor are larger there by the ratio's square."""
     along = link.entry.get("joint") == "prismatic"
     damping, stiffness = ("Ns_per_m", "N_per_m") if along else ("Nms_per_rad", "Nm_per_rad")
@@ -192,7 +192,7 @@ def _link_paths(link: Member, document: dict[str, Any], ratio: float) -> dict[st
     }
 
 
-def _at_motor(device: Device, index: int, drive: Member, links: dict[str, Member]) -> Joint:
+def _at_motor(device: Device, index: int, drive: LegMember, links: dict[str, LegMember]) -> Joint:
     assert device.mechanism is not None
     drives, entry = device.mechanism.drives, drive.entry
     name, link = entry["name"], links[entry["joint"]]
@@ -224,7 +224,7 @@ def _at_motor(device: Device, index: int, drive: Member, links: dict[str, Member
     )
 
 
-def _at_link(device: Device, link: Member, drives: dict[str, tuple[int, Member]]) -> Joint:
+def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMember]]) -> Joint:
     entry, document = link.entry, device.document
     name, kind = entry["name"], entry.get("joint")
     if kind not in ("revolute", "prismatic"):

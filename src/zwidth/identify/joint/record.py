@@ -13,7 +13,7 @@ from zwidth.arrays import Floats, Ints
 from zwidth.identify.joint.fit import Windows
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling
+from zwidth.identify.records.sampling import SampleTimes
 from zwidth.model.raw_sweep import encoder_step
 
 MOST: Final = 300_000  # samples that are fitted or validated on; of a longer record sections all over it
@@ -26,7 +26,7 @@ STANDING: Final = 3.0  # steps within which a window that stands moves
 
 
 @dataclass(frozen=True)
-class Section:
+class RecordSection:
     """Consecutive samples without a gap.
 
     time of the first [s];  period [s];  record, run  numbers of the record, and of the stretch over all records
@@ -43,7 +43,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Motion:
+class JointMotion:
     """What is fitted, from all records.
 
     sections    samples
@@ -54,7 +54,7 @@ class Motion:
     noise       standard deviation of the readings' noise, steps included [m or rad]
     """
 
-    sections: tuple[Section, ...]
+    sections: tuple[RecordSection, ...]
     driven: bool
     force_name: str
     reference: float
@@ -92,7 +92,7 @@ class Motion:
         return np.concatenate([one.force for one in self.sections])
 
 
-def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint: Joint) -> Motion:
+def read_motion(records: Sequence[Record], samplings: Sequence[SampleTimes], joint: Joint) -> JointMotion:
     """The motion in all records, each read once more; of more than 300 000 samples sections all over them.
 
     Raises DeviceError  for columns that are not the joint's
@@ -105,7 +105,7 @@ def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint:
         raise records[0].fault(
             f"and the other records differ in what drives the joint, {listed}; give records alike"
         )
-    sections, run = list[Section](), 0
+    sections, run = list[RecordSection](), 0
     for n, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
         name, factor = columns[n]
         beside = joint.command if name not in ("", joint.command) and joint.command in record else ""
@@ -123,14 +123,16 @@ def read_motion(records: Sequence[Record], samplings: Sequence[Sampling], joint:
         for (_, _, stretch), some in zip(planned, parts, strict=True):
             time, position, force, command = (np.concatenate(one) for one in zip(*some, strict=True))
             kept = command if beside else np.zeros(0)
-            sections.append(Section(float(time[0]), sampling.period, n, run + stretch, position, force, kept))
+            sections.append(
+                RecordSection(float(time[0]), sampling.period, n, run + stretch, position, force, kept)
+            )
         run += len(sampling.runs)
     name = columns[0][0]
     driven = bool(name) and any(np.any(one.force != 0.0) for one in sections)
     y = np.concatenate([one.position for one in sections])
     step = encoder_step([one.position for one in sections])
     reference = 0.5 * float(np.min(y) + np.max(y))
-    return Motion(tuple(sections), driven, name, reference, step, noise_of(sections))
+    return JointMotion(tuple(sections), driven, name, reference, step, noise_of(sections))
 
 
 def planned_sections(runs: Ints, total: int) -> list[tuple[int, int, int]]:
@@ -149,7 +151,7 @@ def planned_sections(runs: Ints, total: int) -> list[tuple[int, int, int]]:
     return planned
 
 
-def noise_of(sections: Sequence[Section]) -> float:
+def noise_of(sections: Sequence[RecordSection]) -> float:
     """Standard deviation of what the readings have beside smooth motion [m or rad], by their sixth differences.
 
     Those of motion at a fortieth of the sampling frequency are a millionth of it; the median passes over the
@@ -159,7 +161,7 @@ def noise_of(sections: Sequence[Section]) -> float:
     return float(np.median(np.abs(sixths)) / (0.6745 * np.sqrt(924.0))) if len(sixths) else 0.0
 
 
-def windows_of(motion: Motion) -> Windows:
+def windows_of(motion: JointMotion) -> Windows:
     """The motion cut into windows: as many as still bend enough, those without motion left out."""
     lengths = [len(one.position) - (BEFORE if motion.driven else 0) for one in motion.sections]
     total = sum(lengths)
@@ -182,7 +184,7 @@ def _bend(y: Floats) -> float:
     return float(np.max(np.abs(y - np.linspace(y[0], y[-1], len(y)))))
 
 
-def _cut(motion: Motion, length: int) -> Windows:
+def _cut(motion: JointMotion, length: int) -> Windows:
     first, lengths, period, time, run = list[int](), list[int](), list[float](), list[float](), list[int]()
     row, before = 0, BEFORE if motion.driven else 0
     for one in motion.sections:
@@ -209,6 +211,6 @@ def _cut(motion: Motion, length: int) -> Windows:
     )
 
 
-def _clock(motion: Motion) -> Floats:
+def _clock(motion: JointMotion) -> Floats:
     """Time of each sample (n,) as a share of that of all records, from -1/2 to 1/2."""
     return np.asarray((motion.time - np.min(motion.time)) / motion.duration - 0.5)

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
-from zwidth.identify.joint.fit import MASS, STIFFNESS, Numbers, Windows, approach, bounded, predict, scales
+from zwidth.identify.joint.fit import MASS, STIFFNESS, JointNumbers, Windows, approach, bounded, predict, scales
 
 SHORTEST: Final = 12  # samples of a weighting function
 MOVING: Final = 0.7  # share of it that must be motion
@@ -30,7 +30,7 @@ DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
 class Guess:
     """A first guess.
 
-    values     (10,) as `fit.Numbers` has them
+    values     (10,) as `fit.JointNumbers` has them
     explained  share of the weighted force that is explained
     error      standard error of the mass over the mass; inf where it is no positive number
     """
@@ -53,7 +53,7 @@ def weighted_balance(
     Returns  (s, 5) of m, b, F forward and backward, and k, and (s, D) of the force
     """
     weight = weighting(size)[0]
-    rows, at, _ = balance_rows(windows, size, step, moving)
+    rows, at, _ = force_balance_rows(windows, size, step, moving)
     # a force is held from its sample to the next: its mean about a sample is that of two
     forces = 0.5 * (windows.force + np.append(windows.force[:1], windows.force[:-1]))
     last = len(windows.position) - 1
@@ -61,7 +61,7 @@ def weighted_balance(
     return rows, np.stack(right, axis=1)
 
 
-def balance_rows(windows: Windows, size: int, step: float, moving: float) -> tuple[Floats, Ints, Floats]:
+def force_balance_rows(windows: Windows, size: int, step: float, moving: float) -> tuple[Floats, Ints, Floats]:
     """The motion's side of `weighted_balance`: its rows (s, 5), their samples (s, size), and periods (s,) [s]."""
     weight, slope, bend = weighting(size)
     reach = max(size // 8, 1)
@@ -164,8 +164,8 @@ def first_starts(windows: Windows, values: Floats, starts: Floats | None = None)
 
 
 def search_guess(
-    windows: Windows, numbers: Numbers, step: float, noise: float, most: int = MOST_GUESSES
-) -> tuple[Numbers, Floats]:
+    windows: Windows, numbers: JointNumbers, step: float, noise: float, most: int = MOST_GUESSES
+) -> tuple[JointNumbers, Floats]:
     """Numbers and starts close to those that predict the motion best.
 
     Short windows forgive a wrong guess, for the start of each is its own; the longer ones then begin where those
@@ -177,7 +177,7 @@ def search_guess(
     """
     short = windows.cut(PARTS[0])
     enough = (GOOD * noise) ** 2 * float(np.sum(windows.length))
-    best: tuple[Numbers, Floats, Floats] | None = None
+    best: tuple[JointNumbers, Floats, Floats] | None = None
     for one in islice(_guesses(windows, numbers, step), most):
         found = _followed(windows, short, approach(short, one, first_starts(short, one.values), 6))
         squares = float(np.sum(found[2]))
@@ -191,8 +191,8 @@ def search_guess(
 
 
 def _followed(
-    windows: Windows, short: Windows, begun: tuple[Numbers, Floats, Floats]
-) -> tuple[Numbers, Floats, Floats]:
+    windows: Windows, short: Windows, begun: tuple[JointNumbers, Floats, Floats]
+) -> tuple[JointNumbers, Floats, Floats]:
     """From short windows to the whole ones; windows that are badly predicted then begin anew."""
     numbers, starts, squares = begun
     before = short
@@ -210,7 +210,7 @@ def _followed(
     return numbers, starts, squares
 
 
-def _guesses(windows: Windows, numbers: Numbers, step: float) -> Iterator[Numbers]:
+def _guesses(windows: Windows, numbers: JointNumbers, step: float) -> Iterator[JointNumbers]:
     """First guesses: by segments of several lengths, the best first; then, for motion in short bursts, by segments
     that are partly motion, and by levels below which the joint may stand."""
     sizes = scales(windows)

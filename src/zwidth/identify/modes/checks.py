@@ -18,7 +18,7 @@ import numpy as np
 from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
-from zwidth.identify.modes.local_response import LocalResponse
+from zwidth.identify.modes.local_response import RecordResponse
 from zwidth.identify.modes.modal_fit import ModalFit
 from zwidth.identify.modes.model import SampledModel, sampled_response, without_hand
 from zwidth.identify.modes.overview import Spectra
@@ -96,7 +96,7 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
     return checks
 
 
-def excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
+def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
     """Which lines are excited, and whether they are enough."""
     power = spectra.power("force")
     excited = power > EXCITED * max(float(power.max(initial=0.0)), 1e-300)
@@ -288,7 +288,7 @@ SINE: Final = 0.05  # by which a sweep's crest factor may differ from the square
 
 
 def amplitude_check(
-    by_record: Sequence[LocalResponse], sources: Sequence[Source], levels: Sequence[Levels]
+    by_record: Sequence[RecordResponse], sources: Sequence[Source], levels: Sequence[Levels]
 ) -> tuple[Check, frozenset[int]]:
     """Compare the responses of records of unlike amplitude; a warning where there are none, or they differ.
 
@@ -327,7 +327,7 @@ def amplitude_check(
     return Check("amplitude", False, reason, warning=True), smaller
 
 
-def _friction(a: LocalResponse, b: LocalResponse, known: Flags, force_a: float, force_b: float) -> float:
+def _friction(a: RecordResponse, b: RecordResponse, known: Flags, force_a: float, force_b: float) -> float:
     """Coulomb friction [N] by which two sine sweeps of unlike force differ, by least squares.
 
     |1/P_a| - |1/P_b| along the direction of i z^d:   Im (1/P_a - 1/P_b) = 4 f_c/pi (1/X_a - 1/X_b),  X = |P| F
@@ -342,7 +342,7 @@ def _friction(a: LocalResponse, b: LocalResponse, known: Flags, force_a: float, 
 SEEN: Final = 25.0  # sum of squares, in the noise's variances, by which the hand must change the response
 
 
-def hand_check(data: LocalResponse, model: SampledModel, point: OperatingPoint) -> Check:
+def hand_check(data: RecordResponse, model: SampledModel, point: OperatingPoint) -> Check:
     """Whether the hand changes the response by more than the noise: what a hand as in the file does to it."""
     alone = sampled_response(without_hand(point), data.theta)
     held = model.response(model.vector(model.start), data.theta)

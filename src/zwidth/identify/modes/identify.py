@@ -22,9 +22,9 @@ from zwidth.identify.identification import Check, Identification, refused
 from zwidth.identify.modes.checks import (
     amplitude_check,
     coherence_check,
-    excitation_check,
     feedback_check,
     flip_check,
+    force_excitation_check,
     hand_check,
     level_checks,
     order_check,
@@ -34,14 +34,14 @@ from zwidth.identify.modes.checks import (
     slope_of,
 )
 from zwidth.identify.modes.local_response import (
-    Band,
     BandedRecord,
+    FrequencyBand,
     Lines,
-    LocalResponse,
     NoiseCurve,
+    RecordResponse,
     bands,
     explained_share,
-    local_response,
+    response_in_bands,
     transformed,
 )
 from zwidth.identify.modes.modal_fit import (
@@ -217,7 +217,7 @@ def _saw(
     spectra = survey.spectra
     value = spectra.response("force", "position", chosen, "reference" if closed else "")
     coherence = spectra.coherence("reference" if closed else "force", "position")
-    check, excited = excitation_check(spectra, sources[0].record.label)
+    check, excited = force_excitation_check(spectra, sources[0].record.label)
     checks.append(check)
     names = (sources[0].channels.force, sources[0].channels.position)
     loudest = sources[survey.loudest[0]].first()
@@ -272,7 +272,7 @@ def _fitted(
     for _ in range(MOST_ROUNDS):
         before = modal.poles
         seen_part, unseen_part = data.sums(data.where(before), None, data.where(before, unseen=True))
-        response = local_response(seen_part)
+        response = response_in_bands(seen_part)
         modal = fit_modes(response, data.period, modal)
         data.noise = response.noise
         if data.settled(before, modal.poles):
@@ -362,7 +362,7 @@ def _damping_remark(difference: float) -> str:
     )
 
 
-def _misfit_check(found: PhysicalFit, numbers: SampledModel, response: LocalResponse, period: float) -> Check:
+def _misfit_check(found: PhysicalFit, numbers: SampledModel, response: RecordResponse, period: float) -> Check:
     own = numbers.response(found.fit.values, 2.0 * np.pi * response.middle * period)
     off = np.abs(own - response.value) / response.deviation
     worst = float(response.middle[int(np.nanargmax(off))])
@@ -476,7 +476,7 @@ class FittedData:
         reference = None if stretch.reference is None else stretch.reference[part]
         return transformed(stretch.force[part], stretch.position[part], reference, self.period)
 
-    def where(self, poles: Complexes, singles: int = 0, unseen: bool = False) -> list[Band]:
+    def where(self, poles: Complexes, singles: int = 0, unseen: bool = False) -> list[FrequencyBand]:
         """Bands about these poles; the first `singles` lines, at most half of all, one by one.
 
         unseen  for the validation, whose lines lie farther apart
@@ -487,7 +487,10 @@ class FittedData:
         return bands(self.line, high, line, poles, self.period, min(singles * line, 0.5 * high))
 
     def sums(
-        self, where: Sequence[Band], only: tuple[int, int] | None = None, unseen_where: Sequence[Band] = ()
+        self,
+        where: Sequence[FrequencyBand],
+        only: tuple[int, int] | None = None,
+        unseen_where: Sequence[FrequencyBand] = (),
     ) -> tuple[BandedRecord, BandedRecord]:
         """The sums of what is fitted and of what is not.
 
@@ -516,7 +519,7 @@ class FittedData:
                 return None
             try:
                 for _ in range(2 if fit is None else 1):
-                    data = local_response(self.sums(where, loudest)[0])
+                    data = response_in_bands(self.sums(where, loudest)[0])
                     self.noise = data.noise
             except ValueError:
                 return None
@@ -534,7 +537,7 @@ class FittedData:
         moved = np.min(np.abs(after[:, None] - before), axis=1, initial=np.inf)
         return bool(np.all(moved < SETTLED * 2.0 * np.pi * self.line))
 
-    def by_record(self, pilot: ModalFit) -> list[LocalResponse]:
+    def by_record(self, pilot: ModalFit) -> list[RecordResponse]:
         """The response of each record by itself, where there are several."""
         if len(self.sources) < 2:
             return []
@@ -542,5 +545,5 @@ class FittedData:
         found = []
         for k in range(len(self.sources)):
             alone = replace(self, dropped=frozenset(range(len(self.sources))) - {k})
-            found.append(local_response(alone.sums(where)[0]))
+            found.append(response_in_bands(alone.sums(where)[0]))
         return found

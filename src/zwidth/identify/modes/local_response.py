@@ -53,7 +53,7 @@ BELOW: Final = 1e-4  # of the lowest band's frequency: down to there the slope g
 
 
 @dataclass(frozen=True)
-class Band:
+class FrequencyBand:
     """Frequencies from `low` to `high` [Hz]; `single` where lines are kept one by one, about poles.
 
     poles   near the band, whose transients are projected out of single lines [1/s]
@@ -74,7 +74,7 @@ class Band:
 
 def bands(
     low: float, high: float, line: float, poles: Complexes, period: float, singles: float = 0.0
-) -> list[Band]:
+) -> list[FrequencyBand]:
     """Bands that cover low to high [Hz], each narrow beside its distance to the nearest pole.
 
     line     distance of two lines of the longest stretch [Hz]
@@ -92,7 +92,10 @@ def bands(
 
     edges = np.arange(low, min(max(singles, LOWEST * line), 0.5 * high), BLOCK * line)
     ends = edges + BLOCK * line
-    found = [Band(float(a), float(b), True, about(a, b), singles > 0.0) for a, b in zip(edges, ends, strict=True)]
+    found = [
+        FrequencyBand(float(a), float(b), True, about(a, b), singles > 0.0)
+        for a, b in zip(edges, ends, strict=True)
+    ]
     f = found[-1].high if found else low
     while f < high - 0.5 * least:
         most = min(max(WIDEST * f, least), max(OF_NYQUIST * nyquist, least))
@@ -105,7 +108,7 @@ def bands(
             i = min(single, key=lambda i: abs(folded[i] - f))
             end = min(folded[i] + least / NEAR, high)
             if end > f:
-                found.append(Band(f, end, True, about(f, end)))
+                found.append(FrequencyBand(f, end, True, about(f, end)))
                 f = end
                 continue
         step = most
@@ -115,7 +118,7 @@ def bands(
             if step <= max(NEAR * distance, least):
                 break
             step = max(0.8 * step, least)
-        found.append(Band(f, min(f + step, high), False, about(f, min(f + step, high), 2.0 * step)))
+        found.append(FrequencyBand(f, min(f + step, high), False, about(f, min(f + step, high), 2.0 * step)))
         f += step
     return found
 
@@ -164,7 +167,7 @@ class BandedRecord:
     """
 
     def __init__(
-        self, where: Sequence[Band], period: float, reference: bool, noise: NoiseCurve | None = None
+        self, where: Sequence[FrequencyBand], period: float, reference: bool, noise: NoiseCurve | None = None
     ) -> None:
         self.where, self.period, self.reference = tuple(where), period, reference
         self.noise = noise or NoiseCurve(np.ones(1), np.ones(1), period)
@@ -180,7 +183,7 @@ class BandedRecord:
             elif e - a >= FEWEST:
                 self._add_band(b, band, lines, int(a), int(e))
 
-    def _add_band(self, b: int, band: Band, lines: Lines, a: int, e: int) -> None:
+    def _add_band(self, b: int, band: FrequencyBand, lines: Lines, a: int, e: int) -> None:
         f = lines.frequency[a:e]
         U, Y, R = (part[a:e] for part in (lines.force, lines.position, lines.reference))
         weight = 1.0 / np.sqrt(self.noise(f) / self.noise(band.middle))
@@ -207,7 +210,7 @@ class BandedRecord:
         sums.regressors[b] += X.conj().T @ X
         sums.crossed[b] += X.conj().T @ y
 
-    def _add_single(self, b: int, band: Band, lines: Lines, a: int, e: int) -> None:
+    def _add_single(self, b: int, band: FrequencyBand, lines: Lines, a: int, e: int) -> None:
         """Lines one by one, less what a transient of the pole can be."""
         if e - a < SMOOTH + 5 + 4 * len(band.poles) or (self.reference and not band.search):
             return  # feedback would bias single lines: they serve to look for the poles alone
@@ -229,7 +232,7 @@ class BandedRecord:
         self.sums.power[b] += left * float(self.noise(band.middle))
         self.sums.lines[b] += max(len(y) - known.shape[1], 0)
 
-    def _ringing(self, band: Band, frequency: Floats) -> Complexes:
+    def _ringing(self, band: FrequencyBand, frequency: Floats) -> Complexes:
         """What transients of the poles near a band are at its lines, four columns (n, 4 p) for each pole: of the
         pole and of its conjugate, and of their squares, as they are not known exactly; two of a real one."""
         z = np.exp(2j * np.pi * frequency * self.period)
@@ -335,7 +338,7 @@ def transformed(force: Floats, position: Floats, reference: Floats | None, perio
 
 
 @dataclass(frozen=True)
-class LocalResponse:
+class RecordResponse:
     """What bands of a record say of P, as a linear map of P's values whose rows have errors of unit variance.
 
     theta      (n,) angles 2 pi f T at which P is wanted: five of each band, and the single lines
@@ -379,7 +382,7 @@ class LocalResponse:
         return np.flatnonzero(np.sum(np.abs(self.banded) ** 2, axis=2).ravel())
 
 
-def local_response(record: BandedRecord) -> LocalResponse:
+def response_in_bands(record: BandedRecord) -> RecordResponse:
     """The map of the sums in `record`.
 
     The noise of a band is what the five numbers leave of its lines, averaged over a few bands about it.
@@ -434,7 +437,7 @@ def local_response(record: BandedRecord) -> LocalResponse:
         theta.append(2.0 * np.pi * record.period * f)
         start += len(f)
     target = np.concatenate(targets)
-    return LocalResponse(
+    return RecordResponse(
         np.concatenate(theta),
         np.concatenate([target.real, target.imag]),
         np.array(banded),

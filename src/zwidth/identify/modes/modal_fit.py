@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats
-from zwidth.identify.modes.local_response import LocalResponse
+from zwidth.identify.modes.local_response import RecordResponse
 from zwidth.identify.profile_likelihood import Fit, fit_least_squares
 from zwidth.loop.controller import split_delay
 from zwidth.loop.hold import held_row
@@ -127,7 +127,7 @@ class ModalFit:
 
 
 def fit_modes(
-    data: LocalResponse, period: float, near: ModalFit | None = None, most: int = MOST_MODES
+    data: RecordResponse, period: float, near: ModalFit | None = None, most: int = MOST_MODES
 ) -> ModalFit:
     """The modes that a response shows: each further one where it explains the most, as long as the information
     criterion falls by more than ten. The device is taken for a free one at first; in the end for a braked one, or
@@ -172,7 +172,7 @@ def fit_modes(
     return min([best, *others], key=lambda fit: fit.criterion)
 
 
-def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
+def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
     """The modes nearest to those of a loop's plant, fitted to a response."""
     plant, T = loop.plant, loop.period
     n = plant.size
@@ -198,7 +198,7 @@ def modes_of(data: LocalResponse, loop: Loop) -> ModalFit:
     return min((_refined(data, fit) for fit in fits), key=lambda fit: fit.criterion)
 
 
-def _pruned(data: LocalResponse, fit: ModalFit) -> ModalFit:
+def _pruned(data: RecordResponse, fit: ModalFit) -> ModalFit:
     """The modes without those that the information criterion does not miss."""
     while fit.count > 1:
         shorter = list[ModalFit]()
@@ -213,18 +213,18 @@ def _pruned(data: LocalResponse, fit: ModalFit) -> ModalFit:
     return fit
 
 
-def _on_base(data: LocalResponse, fit: ModalFit, base: str) -> ModalFit:
+def _on_base(data: RecordResponse, fit: ModalFit, base: str) -> ModalFit:
     """The same modes on another base."""
     modes = fit.vector[fit._before :]
     vector = np.r_[fit.vector[0], _first_brake(base, data, fit.period), modes]
     return _solved(data, base, fit.period, vector, fit.damping, fit.coupled)
 
 
-def _first_brake(base: str, data: LocalResponse, period: float) -> list[float]:
+def _first_brake(base: str, data: RecordResponse, period: float) -> list[float]:
     return [float(np.log(data.theta.min() / period))] if base == "free, braked" else []
 
 
-def _with_mode(data: LocalResponse, fit: ModalFit) -> list[ModalFit]:
+def _with_mode(data: RecordResponse, fit: ModalFit) -> list[ModalFit]:
     """One more mode, where it lowers the sum of squares most, below half the sampling rate and above, which
     sampling makes look much alike."""
     columns = data.apply(fit.columns(fit.vector, data.theta))
@@ -249,7 +249,7 @@ def _with_mode(data: LocalResponse, fit: ModalFit) -> list[ModalFit]:
 
 
 def _solved(
-    data: LocalResponse,
+    data: RecordResponse,
     base: str,
     period: float,
     vector: Floats,
@@ -265,7 +265,7 @@ def _solved(
     return ModalFit(base, damping, period, vector, residues, chi_squared, len(data.target), coupled)
 
 
-def _residuals(data: LocalResponse, fit: ModalFit) -> Callable[[Floats], Floats]:
+def _residuals(data: RecordResponse, fit: ModalFit) -> Callable[[Floats], Floats]:
     """What is left when the residues are chosen best, as a function of poles and delay (variable projection;
     Golub and Pereyra 1973)."""
     rows_of = _RowsOfColumns(data, fit)
@@ -278,7 +278,7 @@ def _residuals(data: LocalResponse, fit: ModalFit) -> Callable[[Floats], Floats]
     return left
 
 
-def _limits(fit: ModalFit, data: LocalResponse) -> tuple[Floats, Floats]:
+def _limits(fit: ModalFit, data: RecordResponse) -> tuple[Floats, Floats]:
     T = fit.period
     slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
     braked = fit.base == "free, braked"
@@ -289,7 +289,7 @@ def _limits(fit: ModalFit, data: LocalResponse) -> tuple[Floats, Floats]:
     return np.array(low), np.array(high)
 
 
-def _refined(data: LocalResponse, fit: ModalFit) -> ModalFit:
+def _refined(data: RecordResponse, fit: ModalFit) -> ModalFit:
     from scipy.optimize import least_squares
 
     low, high = _limits(fit, data)
@@ -306,7 +306,7 @@ def _refined(data: LocalResponse, fit: ModalFit) -> ModalFit:
     return _solved(data, fit.base, fit.period, np.asarray(solved.x), fit.damping, fit.coupled)
 
 
-def modal_intervals(data: LocalResponse, fit: ModalFit, *, profiled: bool = True) -> tuple[Fit, Floats]:
+def modal_intervals(data: RecordResponse, fit: ModalFit, *, profiled: bool = True) -> tuple[Fit, Floats]:
     """Intervals of delay, frequencies and ratios by the profile likelihood, and standard deviations of the
     residues by the curvature.
 
@@ -337,12 +337,12 @@ def modal_intervals(data: LocalResponse, fit: ModalFit, *, profiled: bool = True
     return found, found.scale * np.sqrt(np.maximum(np.diag(inverse)[len(start) :], 0.0))
 
 
-def _damped(data: LocalResponse, fit: ModalFit, damping: Damping) -> ModalFit:
+def _damped(data: RecordResponse, fit: ModalFit, damping: Damping) -> ModalFit:
     """The same modes with another damping, not coupled."""
     return _solved(data, fit.base, fit.period, fit.vector, damping)
 
 
-def with_either_damping(data: LocalResponse, fit: ModalFit) -> tuple[ModalFit, ModalFit]:
+def with_either_damping(data: RecordResponse, fit: ModalFit) -> tuple[ModalFit, ModalFit]:
     """The same modes with dampers, and with loss factors: the criteria of both tell which explains the response
     better. Modes that stood for what the other damping does not explain fall away."""
     another: Damping = "hysteretic" if fit.damping == "viscous" else "viscous"
@@ -418,7 +418,7 @@ class _RowsOfColumns:
     A search changes one pole at a time: the columns of the others are kept.
     """
 
-    def __init__(self, data: LocalResponse, fit: ModalFit) -> None:
+    def __init__(self, data: RecordResponse, fit: ModalFit) -> None:
         self.data, self.fit = data, fit
         self.kept = dict[tuple[_Column, float], Floats]()
         self.aliased = dict[float, tuple[Floats, Complexes]]()

@@ -69,7 +69,7 @@ def survey_of(sources: Sequence[Source], segment: int | None, progress: Progress
             own = averaged_spectra([columns], source.sampling.period, length, differences)
             if own.segments:
                 first_spectra = first_spectra if first_spectra.segments else own
-                total = merged([total, own])
+                total = merged_spectra([total, own])
                 agreement.append((f"stretch {i + 1} of {source.record.label}", _times_as_far(first_spectra, own)))
             done += len(stretch.force)
             if progress is not None:
@@ -343,7 +343,7 @@ def averaged_spectra(
     return Spectra(frequency[usable], matrix, names, period, length, sums.count, order)
 
 
-def merged(several: Sequence[Spectra]) -> Spectra:
+def merged_spectra(several: Sequence[Spectra]) -> Spectra:
     """Spectra of records together, of the same channels, period and length."""
     first, count = several[0], sum(one.segments for one in several)
     total = sum((one.matrix * one.segments for one in several), np.zeros_like(first.matrix))

@@ -18,7 +18,7 @@ from zwidth.arrays import Floats
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.identify.identification import Estimate
-from zwidth.identify.modes.local_response import LocalResponse
+from zwidth.identify.modes.local_response import RecordResponse
 from zwidth.identify.modes.modal_fit import FOLDED, ModalFit
 from zwidth.identify.modes.model import DELAYS, LAG, SampledModel
 from zwidth.identify.profile_likelihood import Fit, fit_least_squares
@@ -70,7 +70,7 @@ class PhysicalFit:
         return float(np.sqrt(self.chi_squared / max(self.rows - len(self.values), 1)))
 
 
-def fit_model(data: LocalResponse, model: SampledModel, modal: ModalFit, period: float) -> PhysicalFit:
+def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period: float) -> PhysicalFit:
     """The numbers that explain the response best, each with its interval by the profile likelihood.
 
     From the file's numbers first, and from others where these may not lead there (`_Search`). Where a response
@@ -123,7 +123,7 @@ class _Search:
     period  of the loop [s]
     """
 
-    data: LocalResponse
+    data: RecordResponse
     model: SampledModel
     modal: ModalFit
     period: float

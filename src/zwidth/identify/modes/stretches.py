@@ -11,7 +11,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling, joined
+from zwidth.identify.records.sampling import SampleTimes, joined
 from zwidth.loop.operating_point import OperatingPoint
 
 BLOCK: Final = 1 << 20  # samples that are transformed at once
@@ -75,7 +75,7 @@ class Source:
     """A record's stretches, again and again: from memory where they are few, else from the file."""
 
     record: Record
-    sampling: Sampling
+    sampling: SampleTimes
     channels: Channels
     kept: list[Stretch] | None = field(default=None, repr=False)
 

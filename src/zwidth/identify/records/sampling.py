@@ -28,7 +28,7 @@ MORE_DIGITS: Final = "write it with more digits, as seconds from the beginning o
 
 
 @dataclass(frozen=True)
-class Sampling:
+class SampleTimes:
     """A record's time stamps, column time_s.
 
     period   mean step where no sample is missing [s]
@@ -83,7 +83,7 @@ def joined(stretches: Iterable[Piece]) -> Iterator[tuple[Piece, bool]]:
             after = int(numbers[-1]) + 1
 
 
-def check_sampling(record: Record, period: float | None = None) -> tuple[Sampling | None, Check]:
+def check_sampling(record: Record, period: float | None = None) -> tuple[SampleTimes | None, Check]:
     """The sampling of a record with a column time_s, and the check that it is regular.
 
     period   of the computer that is to have written the record [s]; None: any
@@ -142,7 +142,7 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[Samplin
         )
     count, mean = max(sums[0], 1.0), sums[1] / max(sums[0], 1.0)
     jitter = usual * float(np.sqrt(max(sums[2] / count - mean**2, 0.0)))
-    sampling = Sampling(usual * float(1.0 + mean), jitter, row, missing, edges.reshape(-1, 2))
+    sampling = SampleTimes(usual * float(1.0 + mean), jitter, row, missing, edges.reshape(-1, 2))
     if period is not None and abs(sampling.period / period - 1.0) > SAME_PERIOD:
         return failed(
             f"the rows of {record.label} come every {sampling.period:.6g} s, the device's computer samples every "
@@ -175,7 +175,7 @@ def _usual_step(time: Floats) -> float:
     return float(np.mean(alike)) if middle > 0.0 else middle
 
 
-def _sentence(sampling: Sampling) -> str:
+def _sentence(sampling: SampleTimes) -> str:
     gaps = len(sampling.runs) - 1
     lost = f", {plural(sampling.missing, 'sample')} missing in {plural(gaps, 'gap')}" if sampling.missing else ""
     jitter = (
@@ -202,7 +202,7 @@ TURNING_SLIPS: Final = {
 }
 
 
-def check_periods(records: Sequence[Record], samplings: Sequence[Sampling], period: float) -> list[Check]:
+def check_periods(records: Sequence[Record], samplings: Sequence[SampleTimes], period: float) -> list[Check]:
     """Faults of records that another computer than the device's may have written; [] where all have its period.
 
     period  of the device's computer [s]

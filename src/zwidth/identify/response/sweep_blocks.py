@@ -13,7 +13,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.identify.records.record import Record
-from zwidth.identify.records.sampling import Sampling
+from zwidth.identify.records.sampling import SampleTimes
 from zwidth.model.raw_sweep import encoder_step
 
 FIRST: Final = 2**20  # samples from which the encoder's step is read
@@ -33,7 +33,7 @@ class SweepBlocks:
     behind: int
 
     @classmethod
-    def longest(cls, record: Record, sampling: Sampling, force: str, position: str) -> SweepBlocks:
+    def longest(cls, record: Record, sampling: SampleTimes, force: str, position: str) -> SweepBlocks:
         """The longest stretch of a record."""
         runs = sampling.runs.tolist()
         first, behind = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))

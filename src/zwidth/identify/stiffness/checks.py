@@ -15,9 +15,9 @@ from zwidth.identify.identification import Check
 from zwidth.identify.stiffness.spring_fit import (
     Resolution,
     Strokes,
-    joined,
+    joined_strokes,
     resolution_of,
-    smoothed,
+    smoothed_torque,
     strokes_of,
     without_spikes,
 )
@@ -41,7 +41,7 @@ UNITS: Final = {
 
 
 @dataclass(frozen=True)
-class Run:
+class StrokeRun:
     """One record of one drive, at the motor's shaft.
 
     label          for messages
@@ -67,7 +67,7 @@ class Run:
 
 
 def check_runs(
-    runs: Sequence[Run], known_step: float, known_stiffness: float | None
+    runs: Sequence[StrokeRun], known_step: float, known_stiffness: float | None
 ) -> tuple[list[Check], Resolution, bool]:
     """The checks, the resolution of the angle, and whether the spring was bent both ways.
 
@@ -92,7 +92,7 @@ def check_runs(
     checks.append(_signs(runs))
     if not checks[-1].passed:
         return checks, resolution, False
-    strokes = joined(
+    strokes = joined_strokes(
         [strokes_of(run.torque[run.kept], run.angle[run.kept], resolution, i) for i, run in enumerate(runs)]
     )
     checks.append(_strokes(strokes))
@@ -109,7 +109,7 @@ def _coarsest(found: Sequence[Resolution]) -> Resolution:
     return Resolution(max(one.step for one in found), max(one.noise for one in found))
 
 
-def _rows(runs: Sequence[Run]) -> Check:
+def _rows(runs: Sequence[StrokeRun]) -> Check:
     short = [run for run in runs if len(run.angle) < FEWEST_ROWS]
     total = sum(len(run.angle) * run.together for run in runs)
     if short:
@@ -124,7 +124,7 @@ def _rows(runs: Sequence[Run]) -> Check:
     return Check("length", True, f"{total} readings in {plural(len(runs), 'record')}{means}")
 
 
-def _constant(runs: Sequence[Run]) -> Check | None:
+def _constant(runs: Sequence[StrokeRun]) -> Check | None:
     for run in runs:
         for name, values in (("torque_Nm", run.torque), ("angle_rad", run.angle)):
             if np.ptp(values) == 0.0:
@@ -136,7 +136,7 @@ def _constant(runs: Sequence[Run]) -> Check | None:
     return None
 
 
-def _missing(runs: Sequence[Run]) -> Check:
+def _missing(runs: Sequence[StrokeRun]) -> Check:
     left_out = sum(run.left_out for run in runs)
     spikes = sum(int(np.count_nonzero(~run.kept)) for run in runs)
     total = sum(len(run.angle) for run in runs)
@@ -152,7 +152,7 @@ def _missing(runs: Sequence[Run]) -> Check:
     return Check("readings", True, "; ".join(parts) or "all rows are numbers, without spikes")
 
 
-def _units(runs: Sequence[Run]) -> Check:
+def _units(runs: Sequence[StrokeRun]) -> Check:
     span = max(float(np.ptp(run.angle[run.kept])) for run in runs)
     if span > WIDEST:
         return Check(
@@ -164,7 +164,7 @@ def _units(runs: Sequence[Run]) -> Check:
     return Check("units", True, f"the angle runs over {span:.4g} rad")
 
 
-def _motion(runs: Sequence[Run], resolution: Resolution) -> Check:
+def _motion(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
     span = min(float(np.ptp(run.angle[run.kept])) for run in runs)
     if resolution.step and span < FEWEST_COUNTS * resolution.step:
         return Check(
@@ -188,7 +188,7 @@ def _motion(runs: Sequence[Run], resolution: Resolution) -> Check:
     return Check("motion", True, f"{counts}, with noise of {resolution.noise:.3g} rad")
 
 
-def _signs(runs: Sequence[Run]) -> Check:
+def _signs(runs: Sequence[StrokeRun]) -> Check:
     slopes = [float(np.polyfit(run.angle[run.kept], run.torque[run.kept], 1)[0]) for run in runs]
     falling = [run.label for run, slope in zip(runs, slopes, strict=True) if slope <= 0.0]
     if not falling:
@@ -234,7 +234,7 @@ def _hysteresis(strokes: Strokes) -> Check:
     return Check("hysteresis", True, f"the loop is {max(2.0 * solved[1], 0.0):.3g} N m wide")
 
 
-def _ends(runs: Sequence[Run], resolution: Resolution) -> Check:
+def _ends(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
     """Neither column may stand still at its end while the other one goes on."""
     for run in runs:
         pairs = (("angle_rad", run.angle, run.torque), ("torque_Nm", run.torque, run.angle))
@@ -260,7 +260,9 @@ def _held_share(values: Floats, others: Floats, end: float, margin: float) -> fl
     little. Only before the other column's own turning point, since behind it friction holds the shaft."""
     at_end = values >= end - margin
     if resolution_of(others).noise > NOISY * float(np.ptp(others)):
-        others = smoothed(others, len(others) // SHORTEST_HOLD)  # the largest of many noisy readings is no rise
+        others = smoothed_torque(
+            others, len(others) // SHORTEST_HOLD
+        )  # the largest of many noisy readings is no rise
     most, span = 0.0, float(np.ptp(others))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(np.int8), [0]])))
     for first, behind in edges.reshape(-1, 2):

@@ -20,8 +20,15 @@ from zwidth.device.faults import comma_list, dotted, fail, plural, quote, sugges
 from zwidth.device.legs import members, written
 from zwidth.identify.identification import Estimate, Identification, refused
 from zwidth.identify.records.record import Columns, Record, averaged_rows
-from zwidth.identify.stiffness.checks import Run, check_runs
-from zwidth.identify.stiffness.spring_fit import Resolution, SpringFit, Strokes, fit_spring, joined, strokes_of
+from zwidth.identify.stiffness.checks import StrokeRun, check_runs
+from zwidth.identify.stiffness.spring_fit import (
+    Resolution,
+    SpringFit,
+    Strokes,
+    fit_spring,
+    joined_strokes,
+    strokes_of,
+)
 from zwidth.progress import Progress
 
 COLUMNS: Final = Columns(("torque_Nm", "angle_rad"), text=("joint",))
@@ -54,9 +61,11 @@ def identify_stiffness(
     return parts[0] if len(parts) == 1 else _together(parts)
 
 
-def _runs_by_drive(device: Device, records: Sequence[Record], joint: str | None) -> list[tuple[Drive, list[Run]]]:
+def _runs_by_drive(
+    device: Device, records: Sequence[Record], joint: str | None
+) -> list[tuple[Drive, list[StrokeRun]]]:
     """The runs of each drive, in the order in which the drives appear."""
-    runs: dict[str, tuple[Drive, list[Run]]] = {}
+    runs: dict[str, tuple[Drive, list[StrokeRun]]] = {}
     for record in records:
         rows = averaged_rows(record)
         torque, angle = rows.columns["torque_Nm"], rows.columns["angle_rad"]
@@ -72,7 +81,7 @@ def _runs_by_drive(device: Device, records: Sequence[Record], joint: str | None)
             drive = drive_named(device, name)
             mine = slice(None) if "joint" not in record else rows.columns["joint"] == name
             label = record.label if len(names) == 1 else f"{record.label}, joint {name}"
-            run = Run(label, torque[mine], angle[mine], rows.together, rows.left_out)
+            run = StrokeRun(label, torque[mine], angle[mine], rows.together, rows.left_out)
             runs.setdefault(drive.path, (drive, []))[1].append(run)
     if not runs:
         raise records[0].fault("has no rows; record torque and angle")
@@ -87,7 +96,7 @@ class _Scale:
     angle: float
 
 
-def _identify_drive(device: Device, drive: Drive, runs: list[Run], side: str, prefix: str) -> Identification:
+def _identify_drive(device: Device, drive: Drive, runs: list[StrokeRun], side: str, prefix: str) -> Identification:
     """The spring of one drive."""
     scale = _Scale(1.0, 1.0)
     if side == "link":
@@ -122,13 +131,13 @@ def _identify_drive(device: Device, drive: Drive, runs: list[Run], side: str, pr
     )
 
 
-def _strokes(runs: Sequence[Run], resolution: Resolution) -> Strokes:
+def _strokes(runs: Sequence[StrokeRun], resolution: Resolution) -> Strokes:
     """The strokes of all runs."""
     parts, first = list[Strokes](), 0
     for number, run in enumerate(runs):
         parts.append(strokes_of(run.torque[run.kept], run.angle[run.kept], resolution, number, first))
         first += parts[-1].count
-    return joined(parts)
+    return joined_strokes(parts)
 
 
 def _split(strokes: Strokes) -> tuple[Strokes, Strokes]:

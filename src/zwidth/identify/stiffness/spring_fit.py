@@ -470,17 +470,17 @@ def _moving(torque: Floats, angle: Floats, stuck: float) -> Ints:
     width = max(len(torque) // SMOOTHED, 1) | 1
     free = angle - angle[0] > stuck
     first = int(np.argmax(free)) if free.any() else len(angle)
-    return np.arange(first, int(np.argmax(smoothed(torque, width))) + 1 - width // 2)
+    return np.arange(first, int(np.argmax(smoothed_torque(torque, width))) + 1 - width // 2)
 
 
-def smoothed(values: Floats, width: int) -> Floats:
+def smoothed_torque(values: Floats, width: int) -> Floats:
     """Moving average of values (n,) over so many, an odd number, those at the ends repeated."""
     width = max(width, 1) | 1
     padded = np.pad(values, width // 2, mode="edge")
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
-def joined(strokes: list[Strokes]) -> Strokes:
+def joined_strokes(strokes: list[Strokes]) -> Strokes:
     """Strokes of several records as one."""
     names = [field.name for field in fields(Strokes)]
     return Strokes(*(np.concatenate([getattr(one, name) for one in strokes]) for name in names))

@@ -32,7 +32,7 @@ Contents = tuple[dict[str, Any], Mapping[str, Any]]  # a head, and its arrays
 STATUS: Final = {NO_ANSWER: "no answer", BAD_INPUT: "bad input"}
 
 
-class Answers:
+class PageAnswers:
     """Answers of one process. Each request is answered by one frame, a failure by its sentences.
 
     folder   where files that the page sends are kept
@@ -87,9 +87,9 @@ class Answers:
             case OpenRequest():
                 return layers.opened_device(opened, request.state)
             case ViewRequest():
-                return layers.view(opened, request.state, request.layers, request.nearest)
+                return layers.page_view(opened, request.state, request.layers, request.nearest)
             case MoreRequest():
-                return layers.view(opened, request.state, request.layers)
+                return layers.page_view(opened, request.state, request.layers)
             case MapRequest():
                 return studies.workspace(opened, request, self.progress)
             case SensitivityRequest():

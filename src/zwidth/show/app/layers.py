@@ -121,7 +121,7 @@ def opened_device(opened: OpenedDevices, state: State) -> Contents:
     }, {}
 
 
-def view(opened: OpenedDevices, state: State, layers: Sequence[str], nearest: bool = False) -> Contents:
+def page_view(opened: OpenedDevices, state: State, layers: Sequence[str], nearest: bool = False) -> Contents:
     """The layers that the page shows of one state. A layer that has no answer says why; the others stand.
 
     Without a chart there is no view, but of a device whose file leaves out numbers that a chart needs: that one's
@@ -199,7 +199,7 @@ def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
         }
     period = point.controller.sampling_period
     numbers["sampling_period"] = float(period)
-    return numbers, rings(chart.regions) | edge(chart.boundary)
+    return numbers, rings(chart.regions) | edge_arrays(chart.boundary)
 
 
 def rings(outlines: Iterable[Floats]) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def rings(outlines: Iterable[Floats]) -> dict[str, Any]:
     return _joined("rings", list(outlines), 2)
 
 
-def edge(arcs: Iterable[BoundaryArc]) -> dict[str, Any]:
+def edge_arrays(arcs: Iterable[BoundaryArc]) -> dict[str, Any]:
     """The arcs of an edge one after another, rows (K, B, f), and where each ends."""
     return _joined("arcs", [np.column_stack([a.stiffness, a.damping, a.frequency]) for a in arcs], 3)
 

@@ -44,7 +44,7 @@ class Wall(Asked):
     damping: Number
 
 
-class Hand(Asked):
+class HandRequest(Asked):
     """Who holds the handle, in numbers: an arm of mass, spring and damper to where he wants it, and his grasp.
 
     grasp_stiffness  None: rigid
@@ -74,7 +74,7 @@ class State(Asked):
     assembly: Name | None = None
     model: Literal["full", "two-mass", "motor-mass", "rigid"] | None = None
     operator: Name | None = None
-    hand: Hand | None = None
+    hand: HandRequest | None = None
     wall: Wall | None = None
 
 

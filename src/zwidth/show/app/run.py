@@ -37,7 +37,7 @@ def serve(
     def announce() -> None:
         say(*announcement(settings))
         if browser:
-            webbrowser.open(address_of(settings))
+            webbrowser.open(page_address(settings))
 
     server.on_start = announce
     # The server ends its connections and then raises what ended it; here that is what the user was told to type.
@@ -95,7 +95,7 @@ def listen(host: str, port: int) -> socket.socket:
     )
 
 
-def address_of(settings: Settings) -> str:
+def page_address(settings: Settings) -> str:
     """The page's address for this computer's browser."""
     host = "127.0.0.1" if settings.host in ("0.0.0.0", "::") else settings.host
     host = f"[{host}]" if ":" in host else host
@@ -105,7 +105,7 @@ def address_of(settings: Settings) -> str:
 
 def announcement(settings: Settings) -> list[str]:
     """What the terminal says when the server has started."""
-    lines = [f"zwidth: the workbench is at {address_of(settings)} (ctrl-C ends it)"]
+    lines = [f"zwidth: the workbench is at {page_address(settings)} (ctrl-C ends it)"]
     if settings.host not in LOOPBACK:
         lines += [
             "zwidth: other computers can connect with this token; what is sent is not encrypted",

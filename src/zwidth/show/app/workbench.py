@@ -12,7 +12,7 @@ from zwidth.device.device import Device
 from zwidth.model.argument_checks import require
 from zwidth.show.app.opened import changes
 from zwidth.show.app.request import State
-from zwidth.show.app.run import address_of, listen, make_server, start_of_device
+from zwidth.show.app.run import listen, make_server, page_address, start_of_device
 from zwidth.show.app.server import Settings
 
 HEIGHT: Final = 760  # css px of the page in a notebook
@@ -43,7 +43,7 @@ class Workbench:
         self._device = device
         self._socket = listen("127.0.0.1", port)
         settings = Settings("127.0.0.1", self._socket.getsockname()[1], "", start_of_device(device), framed=True)
-        self.address = address_of(settings)
+        self.address = page_address(settings)
         self._server = make_server(settings)
         self._thread = threading.Thread(target=self._server.run, args=([self._socket],), daemon=True)
         self._thread.start()

@@ -187,7 +187,7 @@ class SparePool:
             await spare.end()
 
 
-def work() -> None:
+def compute_answers() -> None:
     """Main function of a process: read requests from its input, write progress and answers to its output."""
     import warnings
 
@@ -203,13 +203,13 @@ def work() -> None:
 
     try:
         with ended_with_its_starter():
-            from zwidth.show.app.answers import Answers
+            from zwidth.show.app.answers import PageAnswers
 
             os.chdir(sys.argv[2])  # a device file's label is its bare name, see `opened`
             folder = Path(sys.argv[2])
 
-            def new_answers() -> Answers:
-                return Answers(folder, lambda frame: send(PROGRESS, frame))
+            def new_answers() -> PageAnswers:
+                return PageAnswers(folder, lambda frame: send(PROGRESS, frame))
 
             answers = new_answers()
             answers.warm_up()

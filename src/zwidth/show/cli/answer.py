@@ -70,7 +70,7 @@ def two_columns(rows: Sequence[Row]) -> Any:
     return grid
 
 
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
+def answer_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
     """Rows of cells below headings."""
     from rich import box
     from rich.table import Table

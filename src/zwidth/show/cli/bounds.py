@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount, number, typed
@@ -78,7 +78,7 @@ class BoundsCommand(Command):
             "largest",
             "not met",
         ]
-        yield table(headings, [_row(result, bound, unmet) for bound in speaking])
+        yield answer_table(headings, [_row(result, bound, unmet) for bound in speaking])
         if unmet:
             yield "not met here:"
             yield two_columns([(f"{n}", sentence) for n, sentence in enumerate(unmet, start=1)])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli import wall_law
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite, refuse_empty
 from zwidth.show.output import DATA
@@ -71,7 +71,7 @@ class CheckCommand(Command):
         if law := list(wall_law.rows(wall_law.circumstances(case))):
             yield two_columns(law)
         frequency = "nearest edge at" if case.point.charted_by_response else "its frequency"
-        yield table(["stiffness", "damping", "verdict", "spectral radius", frequency], rows)
+        yield answer_table(["stiffness", "damping", "verdict", "spectral radius", frequency], rows)
         if any(point.get("unheld_positions") for point in points[:SHOWN]):
             yield "with K = 0 the device stays wherever it is left: the root z = 1 of that position is set aside"
         if len(points) > SHOWN:

@@ -104,7 +104,7 @@ def identify_friction_of_a_step() -> None:
     """Friction of a short record: a mass that a square wave moves to and fro."""
     import numpy as np
 
-    from zwidth.identify.joint.fit import Numbers, Windows, predict
+    from zwidth.identify.joint.fit import JointNumbers, Windows, predict
 
     force, one = np.repeat([1.0, -1.0], 20), np.array([40])
     windows = Windows(
@@ -112,7 +112,7 @@ def identify_friction_of_a_step() -> None:
     )
     predict(
         windows,
-        Numbers(np.array([0.1, 0.2, 0.2, 0.3, 0.3, 4.0, 0.001, 0.1, 0.0, 0.0]), ()).values,
+        JointNumbers(np.array([0.1, 0.2, 0.2, 0.3, 0.3, 4.0, 0.001, 0.1, 0.0, 0.0]), ()).values,
         np.zeros((1, 2)),
     )
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from zwidth.show.cli.answer import Answer, deliver, table
+from zwidth.show.cli.answer import Answer, answer_table, deliver
 from zwidth.show.cli.options import as_json, example
 
 
@@ -24,7 +24,8 @@ def devices(as_json: bool) -> int:
 
     def pages() -> list[Any]:
         return [
-            table([what[:-1], *keys[1:]], [tuple(one.values()) for one in document[what]]) for what in document
+            answer_table([what[:-1], *keys[1:]], [tuple(one.values()) for one in document[what]])
+            for what in document
         ]
 
     return deliver(Answer(document, pages), as_json)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Numbers, refuse_empty
@@ -207,7 +207,7 @@ class ExperimentCommand(Command):
             raise BadInput(f"{file}: cannot be written: {error.strerror}; name another file") from None
 
     def document(self, case: CommandLine, result: Experiment) -> dict[str, Any]:
-        return result.document() | {"warning": warning(result), "explanation": explanation(result)}
+        return result.document() | {"warning": experiment_warning(result), "explanation": explanation(result)}
 
     def write(
         self, case: CommandLine, result: Experiment, document: dict[str, Any], reason: str | None
@@ -222,8 +222,8 @@ class ExperimentCommand(Command):
         if document["warning"]:
             yield f"warning: {document['warning']}"
         headings, rows = point_rows(result)
-        yield table(headings, rows)
-        yield two_columns(list(sentences(result)))
+        yield answer_table(headings, rows)
+        yield two_columns(list(experiment_sentences(result)))
 
 
 def _plan(case: CommandLine) -> Plan:
@@ -302,7 +302,7 @@ def point_rows(experiment: Experiment) -> tuple[list[str], list[list[str]]]:
     return ["edge", "stiffness", "damping", *spread, "exact, linear", "beyond it", "at", *marks], rows
 
 
-def warning(experiment: Experiment) -> str | None:
+def experiment_warning(experiment: Experiment) -> str | None:
     """That edges lie beyond tips, with the pair farthest apart; None where none does."""
     from zwidth.study.boundary.measured_boundary import edges_beyond_tips
 
@@ -319,7 +319,7 @@ def warning(experiment: Experiment) -> str | None:
     )
 
 
-def sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
+def experiment_sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
     """Rows below the points: labels and values."""
     best = experiment.stiffest
     if best is not None and best.edge == "tip":

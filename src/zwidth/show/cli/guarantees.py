@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount
@@ -81,7 +81,7 @@ class GuaranteesCommand(Command):
             (one.name, "none" if one.region.reason == withheld is not None else _largest(one.region), one.meaning)
             for one in result.guarantees
         ]
-        yield table(["guarantee", "largest stiffness", "what it means"], rows)
+        yield answer_table(["guarantee", "largest stiffness", "what it means"], rows)
         yield from (premise.reason for premise in result.premises if premise.holds is None)
         coupled = result.couplings
         if coupled is None:
@@ -89,7 +89,9 @@ class GuaranteesCommand(Command):
         if coupled.reason is not None:
             yield f"couplings: {coupled.reason}"
             return
-        yield table(["coupling", "stiffest"], [(name, _largest(one)) for name, one in coupled.regions.items()])
+        yield answer_table(
+            ["coupling", "stiffest"], [(name, _largest(one)) for name, one in coupled.regions.items()]
+        )
         if coupled.limit is not None:
             yield _limit(coupled.limit)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
 
-from zwidth.show.cli.answer import heading, table
+from zwidth.show.cli.answer import answer_table, heading
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import (
@@ -136,14 +136,16 @@ class IdentifyCommand(Command):
         return result.reason
 
     def pages(self, case: CommandLine, result: Identification, document: Mapping[str, Any]) -> Iterator[Any]:
-        yield table(
+        yield answer_table(
             ["check", "", "seen"],
             [(check.what, "ok" if check.passed else "note" if check.warning else "no", check.reason)
              for check in result.checks],
         )  # fmt: skip
         if result.reason is not None:
             return
-        yield table(["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.listed])
+        yield answer_table(
+            ["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.listed]
+        )
         share = result.validation
         explained = f"{100.0 * share:.6g} % of the variance explained, " if share == share else ""
         yield f"validation: {explained}{result.validated_on}"
@@ -216,10 +218,10 @@ _write = click.Option(
 
 
 def _row(estimate: Estimate) -> tuple[str, ...]:
-    from zwidth.identify.identification import interval, value_text
+    from zwidth.identify.identification import estimate_text, interval
 
     path = (estimate.path or estimate.within).removeprefix("mechanism.")
-    return estimate.name, value_text(estimate), interval(estimate), estimate.unit or "1", path
+    return estimate.name, estimate_text(estimate), interval(estimate), estimate.unit or "1", path
 
 
 class StiffnessCommand(IdentifyCommand):

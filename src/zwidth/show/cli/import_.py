@@ -14,7 +14,7 @@ import click
 
 from zwidth.device.faults import plural
 from zwidth.errors import DeviceError
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
@@ -131,7 +131,7 @@ class ImportCommand(Command):
         yield f"{printable(result.document['name'])}: {', '.join(parts)}"
         rows = [(one["severity"], one["where"], one["what"]) for one in document["findings"]]
         if rows:
-            yield table(["", "where", "finding"], rows)
+            yield answer_table(["", "where", "finding"], rows)
         yield f"to see it:\n  zwidth show {printable(shlex.quote(document['file']))}"
 
     def write(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.errors import NoAnswerError
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import BoundedNumber, wall_options
 from zwidth.show.cli.errors import BadInput
@@ -123,7 +123,7 @@ class LimitCyclesCommand(Command):
     def pages(self, case: CommandLine, result: LimitCyclePrediction, document: Mapping[str, Any]) -> Iterator[Any]:
         yield two_columns(list(_circumstances(case, result)))
         if result.cycles:
-            yield table(_headings(result), list(_rows(result)))
+            yield answer_table(_headings(result), list(_rows(result)))
         else:
             yield result.none_found
         yield from _remarks(result)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from zwidth.show.cli.answer import heading, table
+from zwidth.show.cli.answer import answer_table, heading
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Finite
@@ -120,11 +120,11 @@ class LoadCommand(Command):
 
         free = result.unpushed.stiffness_max
         charted = ["largest stiffness", "change", "at damping", "oscillates at"]
-        yield table(
+        yield answer_table(
             ["push", *charted, "hand neglected", "fixed surface"],
             [_chart_row(step, free) for step in result.steps],
         )
-        yield table(
+        yield answer_table(
             ["push", "wall", "hand across", "sideways growth", "doubles in", "one-sided below F/K"],
             [_balance_row(step) for step in result.steps],
         )

@@ -15,7 +15,7 @@ import click
 
 from zwidth.errors import NoAnswerError
 from zwidth.show.circumstances import computer_text
-from zwidth.show.cli.answer import Row, table, two_columns
+from zwidth.show.cli.answer import Row, answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import (
     LARGEST_FORCE,
@@ -141,7 +141,7 @@ def surface_of(options: Mapping[str, Any], device: Device) -> Surface | None:
     return surface
 
 
-def wall_of(options: Mapping[str, Any]) -> SurfaceRendering | None:
+def moved_wall(options: Mapping[str, Any]) -> SurfaceRendering | None:
     """What the computer renders at the surface. Raises BadInput for an environment that cannot be."""
     from zwidth.contact.mechanism.simulate_mechanism import SurfaceEnvironment, SurfaceWall
 
@@ -331,7 +331,7 @@ class MoveCommand(Command):
             kind = "[plant]" if device.given_plant is not None else "[response]"
             raise BadInput(f"{name}: has a {kind} and no [mechanism] to move; `zwidth simulate` takes a [plant]")
         direction = device.direction(case.question.direction)
-        surface, wall = surface_of(case.options, device), wall_of(case.options)
+        surface, wall = surface_of(case.options, device), moved_wall(case.options)
         point = case.point
         try:
             _check_memory(case)
@@ -398,7 +398,7 @@ def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str,
     yield computer_text(case.device.controller)
     yield _status(document)
     yield two_columns([*_circumstances(case, motion), *_results(motion, document)])
-    yield table(HEADINGS, list(_energies(document["energy_book_J"])))
+    yield answer_table(HEADINGS, list(_energies(document["energy_book_J"])))
     yield from _remarks(case, motion, document)
 
 

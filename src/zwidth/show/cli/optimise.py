@@ -12,7 +12,7 @@ import click
 
 from zwidth.device.faults import comma_list
 from zwidth.show.circumstances import omission_text
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback, refuse_empty
@@ -95,14 +95,14 @@ class OptimiseCommand(Command):
         return ""
 
     def pages(self, case: CommandLine, result: Optimisation, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.show.report.optimisation import sentences
+        from zwidth.show.report.optimisation import optimisation_sentences
 
-        said = [printable(typed(sentence)) for sentence in sentences(result)]
+        said = [printable(typed(sentence)) for sentence in optimisation_sentences(result)]
         yield f"{printable(document['name'])}: {said[0]}"
         if document["left_out"]:
             yield omission_text(document["left_out"])
         if len(result.front):
-            yield table(*front_table(result))
+            yield answer_table(*front_table(result))
         yield from said[1:]
 
     def write(

@@ -13,7 +13,7 @@ from zwidth.device.text_file import read_text
 from zwidth.errors import FileError, NoAnswerError
 from zwidth.loop.motion_names import listed_names
 from zwidth.show.circumstances import member_text, operator_text, value_text
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import refuse_empty
@@ -165,7 +165,7 @@ class RobustCommand(Command):
             [str(index), *(printable(value_text(result.members[index][p])) for p in paths), typed(percent(share))]
             for index, share in list(shares.items())[:BINDING_ROWS]
         ]
-        yield table(["limiting member", *paths, "share of the edge"], rows)
+        yield answer_table(["limiting member", *paths, "share of the edge"], rows)
         if len(shares) > BINDING_ROWS:
             yield f"... and {len(shares) - BINDING_ROWS} more; --json lists all"
 

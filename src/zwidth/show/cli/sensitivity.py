@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount, as_written, signed, typed
@@ -114,7 +114,9 @@ class SensitivityCommand(Command):
         yield f"largest stiffness {stiffest}{PLACES[result.kind]}"
         known = [number for number in result.numbers if number.logarithmic == number.logarithmic]
         shown = [number for number in known if number.logarithmic != 0.0][: case["top"]]
-        yield table(["number", "value", "sensitivity", "+1 % gives"], [_row(result, number) for number in shown])
+        yield answer_table(
+            ["number", "value", "sensitivity", "+1 % gives"], [_row(result, number) for number in shown]
+        )
         yield from _remarks(result, len(known) - len(shown))
 
     def draw(self, case: CommandLine, result: Found) -> Figure:
@@ -137,7 +139,7 @@ def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
     shown = goal.reached[:top]
     if shown:
         yield f"for a largest stiffness of {wanted} one of these numbers would have to be"
-        yield table(["number", "value", "would have to be", "factor"], [_goal_row(one) for one in shown])
+        yield answer_table(["number", "value", "would have to be", "factor"], [_goal_row(one) for one in shown])
     else:
         yield f"no number alone gives a largest stiffness of {wanted}"
     more = len(goal.reached) - len(shown)

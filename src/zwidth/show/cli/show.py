@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.output import DATA, json_value
 from zwidth.show.units import NONE, amount, percent, speaking_of_moments, typed
@@ -78,7 +78,7 @@ class ShowCommand(Command):
                 yield from _mechanism_pages(case.device.mechanism, result, values)
         yield from _missing(case.device)
         if values["sources"]:
-            yield table(["numbers", "source"], list(values["sources"].items()))
+            yield answer_table(["numbers", "source"], list(values["sources"].items()))
 
 
 def _mechanism_pages(mechanism: Mechanism, result: Description, values: Mapping[str, Any]) -> Iterator[Any]:
@@ -104,7 +104,7 @@ def _beam_table(beams: Sequence[BeamDescription]) -> Any:
         how = beam.method.replace("-", " ") + (f", {beam.modes}" if beam.method != "lumped" else "")
         masses = amount(beam.mass, "kg"), amount(beam.carried_mass, "kg") if beam.carried_mass else NONE
         rows.append((beam.link, how, *masses, amount(beam.first_frequency, "Hz")))
-    return table(["beam", "modelled by", "mass", "carries", "first alone, clamped"], rows)
+    return answer_table(["beam", "modelled by", "mass", "carries", "first alone, clamped"], rows)
 
 
 def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -134,7 +134,7 @@ def _joint_table(mechanism: Mechanism, joints: Mapping[str, Any]) -> Any:
             amount(one, unit) if slides else amount(one) for one, unit in zip(numbers, units[name], strict=True)
         ]
         rows.append((name, ", ".join(shown)))
-    return table(["joint", "coordinate" if slides else "angle [rad]"], rows)
+    return answer_table(["joint", "coordinate" if slides else "angle [rad]"], rows)
 
 
 def _missing(device: Device) -> Iterator[Any]:
@@ -143,7 +143,7 @@ def _missing(device: Device) -> Iterator[Any]:
 
     unknown = unknown_numbers(device.document)
     if unknown:
-        yield table(["missing", "of", ""], [(one.group, one.names, one.needed_for) for one in unknown])
+        yield answer_table(["missing", "of", ""], [(one.group, one.names, one.needed_for) for one in unknown])
 
 
 def _dexterity_units(mechanism: Mechanism, result: Description) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.show.cli.answer import ROUNDING, Row, table, two_columns
+from zwidth.show.cli.answer import ROUNDING, Row, answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import (
     LARGEST_SEED,
@@ -245,7 +245,7 @@ def simulation_page(simulation: ContactSimulation, sound: Mapping[str, Any] | No
     written."""
     yield _verdict(simulation)
     yield two_columns([*_circumstances(simulation), *_results(simulation)])
-    yield table(HEADINGS, list(energy_rows(simulation.ledger, float(simulation.energy[-1]))))
+    yield answer_table(HEADINGS, list(energy_rows(simulation.ledger, float(simulation.energy[-1]))))
     yield from _remarks(simulation)
     if sound is not None:
         yield from _sound(sound)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.circumstances import load_text, omission_text
-from zwidth.show.cli.answer import table, two_columns
+from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
@@ -188,7 +188,7 @@ class SweepCommand(Command):
             designs = [
                 [axis_value_text(v) for v in sampling.values(n)] + _design_texts(result, n) for n in range(count)
             ]
-            yield table(headings, designs)
+            yield answer_table(headings, designs)
         else:
             for n, one in enumerate(columns):
                 yield f"\n{one.title} ({one.name})"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.circumstances import omission_text
-from zwidth.show.cli.answer import table
+from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
@@ -145,23 +145,23 @@ class ToleranceCommand(Command):
         rows = [
             [one.key, tolerance_text(one), ", ".join(tie.key for tie in one.ties)] for one in question.tolerances
         ]
-        yield table(["tolerance", "distribution", "goes with it"], rows)
+        yield answer_table(["tolerance", "distribution", "goes with it"], rows)
         yield from cut_sentences(question.tolerances)
         yield from outcome_sentences(result)
         if result.reason is not None:
             return
         yield wall_sentence(result)
         yield from _quantile_tables(result)
-        yield table(
+        yield answer_table(
             ["rendered by", "stiffest wall of the drawn devices", "more cautious"], list(band_rows(result))
         )
         with_indices = [one for one in result.indices if one.indices]
         if with_indices:
             headings = ["part in the spread of", *(one.name for one in with_indices)]
-            yield table(headings, list(index_rows(with_indices)))
+            yield answer_table(headings, list(index_rows(with_indices)))
         yield from no_index_sentences(result)
         if result.tightened:
-            yield table(["half of", "renders the wall", "gain"], list(narrower_rows(result)))
+            yield answer_table(["half of", "renders the wall", "gain"], list(narrower_rows(result)))
         yield advice_sentence(result)
 
     def write(
@@ -195,7 +195,7 @@ def _quantile_tables(result: ToleranceStudy) -> Iterator[Any]:
     shares = [f"{100.0 * share:.6g} %" for share in result.question.quantiles]
     rows = [_quantile_row(one, result.question.samples) for one in result.quantiles if one.quantiles]
     if rows:
-        yield table(["less than this have", *shares], rows)
+        yield answer_table(["less than this have", *shares], rows)
 
 
 def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:

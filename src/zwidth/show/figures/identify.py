@@ -232,7 +232,7 @@ STATE_STYLES = (("on", BLUE, "wall on"), ("off", VERMILION, "wall off"))
 FLOOR = 1e-3  # share of the magnitude below which the band's lower end is not drawn
 
 
-def draw_impedance(ax: Axes, identification: Identification) -> None:
+def draw_identified_impedance(ax: Axes, identification: Identification) -> None:
     """Magnitudes over frequency, both axes logarithmic: measured with bands, predicted in black."""
     if not identification.curves:
         draw_empty(ax, identification.reason or "nothing was measured")
@@ -338,7 +338,7 @@ def draw_response(ax: Axes, identification: Identification) -> None:
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE)
 
 
-def draw_stiffness(ax: Axes, result: Identification) -> None:
+def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
     """Averages of the strokes as marks, hollow where they were not fitted, and the fitted spring as a line."""
     curves = {name: np.asarray(values) for name, values in result.curves.items()}
     drives = list(dict.fromkeys(curves["drive"].tolist()))
@@ -380,9 +380,9 @@ DRAWINGS: Final[dict[str, Callable[[Axes, Any], None]]] = {
     "arm": draw_arm,
     "boundary": draw_boundary,
     "friction": draw_friction,
-    "impedance": draw_impedance,
+    "impedance": draw_identified_impedance,
     "mass": draw_friction,  # one fit finds both
     "modes": draw_modes,
     "response": draw_response,
-    "stiffness": draw_stiffness,
+    "stiffness": draw_identified_stiffness,
 }

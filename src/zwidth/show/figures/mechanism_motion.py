@@ -83,7 +83,7 @@ def draw_mechanism_motion(axes: Sequence[Axes], motion: MechanismMotion) -> None
     """
     overall, close, depth, force, energy = axes
     _draw_overall(overall, motion)
-    draw_close_up(close, motion)
+    draw_motion_close_up(close, motion)
     draw = draw_envelope if len(motion.time) > LONGEST_LINE else draw_line
     _draw_contact(depth, force, motion, draw)
     _draw_energies(energy, motion, draw)
@@ -114,7 +114,7 @@ def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
     legend_above(ax, columns=4)
 
 
-def draw_close_up(ax: Axes, motion: MechanismMotion) -> None:
+def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
     """The path alone, with where the computer sees the handle; or why there is none."""
     strokes = _strokes(motion.mechanism, motion.start)
     flat = projection_axes(np.vstack([np.zeros((1, 3)), *strokes, motion.position]))

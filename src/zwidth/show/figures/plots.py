@@ -264,9 +264,9 @@ def _common_area(ax: Axes, result: Any) -> None:
 
 def _mechanism_motion(ax: Axes, motion: Any) -> None:
     """The handle's path at the surface; `zwidth move --output` draws all panels."""
-    from zwidth.show.figures.mechanism_motion import draw_close_up
+    from zwidth.show.figures.mechanism_motion import draw_motion_close_up
 
-    draw_close_up(ax, motion)
+    draw_motion_close_up(ax, motion)
 
 
 def _identification(ax: Axes, result: Any) -> None:

@@ -39,7 +39,7 @@ def optimisation_page(found: Optimisation) -> str:
             found=found,
             problem=found.problem,
             word=found.word,
-            said=sentences(found),
+            said=optimisation_sentences(found),
             before_and_after=_before_and_after(found),
             demands=_demands(found),
             front=_front(found),
@@ -142,7 +142,7 @@ WITHOUT: Final = {FAILED: "failed", OUT_OF_TIME: "ran out of time"}
 SMALL: Final = 5e-4  # share of a value that is said to be no change
 
 
-def sentences(found: Optimisation) -> list[str]:
+def optimisation_sentences(found: Optimisation) -> list[str]:
     """Sentences on the front: how it was found, what the chosen design gains, what it is conditional on, and
     what a finer grid and simulation say. Where no design keeps the demands, why not."""
     tried = plural(len(found.shares), "design")

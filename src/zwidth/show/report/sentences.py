@@ -23,7 +23,7 @@ from zwidth.show.circumstances import load_text
 from zwidth.show.figures.stability import tenfold_time
 from zwidth.show.report.facts import Facts
 from zwidth.show.units import MINUS, SPACE, as_written, number, percent, point, quantity, speaks_of_moments, way
-from zwidth.study.model_validity import Fit, Interval, Validity
+from zwidth.study.model_validity import Interval, ModelFit, Validity
 from zwidth.study.sensitivity.what_if import LEAST_GAIN, REMEDIES, Variant, find_variant, limiting_change
 
 # Gains of the actuator and the sensor are scales of the description, not parts to be changed.
@@ -451,7 +451,7 @@ def which_model(facts: Facts) -> str:
     return f"{text}. Simpler models that agree with it {within}: {'; '.join([*good, *nowhere])}."
 
 
-def _where(fit: Fit, validity: Validity) -> str:
+def _where(fit: ModelFit, validity: Validity) -> str:
     """The ranges in which a model agrees: "everywhere", "below 17.60 Hz (17.37 % of that)", ..."""
     if fit.everywhere:
         return "everywhere"

@@ -49,13 +49,13 @@ def over_the_workspace(dataset: xr.Dataset, name: str, device: Device | None = N
     if name == "isotropy" and device is not None and device.mechanism is not None:
         from zwidth.model.posture import solve_posture
 
-        posture = solve_posture(device.mechanism, positions(dataset), dataset.attrs["assembly"])
+        posture = solve_posture(device.mechanism, plane_positions(dataset), dataset.attrs["assembly"])
         freedoms = len(device.mechanism.drives.names)
         summary["isotropy_index"] = global_isotropy_index(posture.jacobian, status, freedoms)
     return summary
 
 
-def positions(dataset: xr.Dataset) -> Floats:
+def plane_positions(dataset: xr.Dataset) -> Floats:
     """Handle positions (ny, nx, 3) of a map's cells in the base frame [m]."""
     axes = np.asarray(dataset.attrs["plane_axes"], dtype=np.float64).reshape(2, 3)
     through = np.asarray(dataset.attrs["plane_through_m"], dtype=np.float64)

@@ -250,7 +250,7 @@ def study_over(
     require("device", device, Device)
     if plane is not None:
         require("plane", plane, PlaneGrid, f"write plane_of(device, {plane!r})" if isinstance(plane, str) else "")
-    names, measures_by_name = measures_of(measures, user_measures)
+    names, measures_by_name = measures_in_file(measures, user_measures)
     given = {
         "position": None if isinstance(position, Mapping) else position,
         "direction": direction,
@@ -291,7 +291,7 @@ def study_over(
     return replace(study, at=position) if isinstance(position, Mapping) else study
 
 
-def measures_of(
+def measures_in_file(
     measures: str | Measure | Sequence[str | Measure], user_measures: Mapping[str, Measure] | None
 ) -> tuple[list[str], dict[str, Measure]]:
     """The names of the measures, and the user's own `Measure`s by name, from both arguments."""

@@ -24,15 +24,15 @@ from zwidth.study.designs.study import Study
 from zwidth.study.designs.study_file import read_study, study_over
 from zwidth.study.designs.sweep_data import (
     ColumnSummary,
-    as_dataset,
     check_listing,
     note_sentences,
     summaries,
+    sweep_dataset,
     sweep_document,
     sweep_table,
 )
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
-from zwidth.study.jobs.executor import Executor, run
+from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.plane_grid import PlaneGrid
@@ -88,8 +88,8 @@ class Sweep(Result):
         return parts | dict(settings(sampling.axes, values))
 
     def dataset(self) -> xr.Dataset:
-        """The values over the axes, with units and the study; see `sweep_data.as_dataset`."""
-        return as_dataset(self)
+        """The values over the axes, with units and the study; see `sweep_data.sweep_dataset`."""
+        return sweep_dataset(self)
 
     def document(self) -> dict[str, Any]:
         """The designs with their values and status by key, lists of one entry for each design."""
@@ -172,7 +172,7 @@ def sweep(
                    MeasureError  for measures that do not exist for this device
                    TooLarge      where the designs would not fit into memory
                    TypeError     for arguments of another kind
-                   what `executor.run` and `Store` raise
+                   what `executor.run_job` and `Store` raise
     """
     study = study_over(
         device,
@@ -232,7 +232,7 @@ def run_study(
     Raises  DeviceError   with all faults of the study's file and the device's
             MeasureError  for measures that do not exist for this device
             TooLarge      where the designs would not fit into memory, and there is no store
-            what `executor.run` and `Store` raise
+            what `executor.run_job` and `Store` raise
     """
     if not isinstance(study, Study | str | os.PathLike):
         hint = "write sweep(device, {path: values}, measures)" if isinstance(study, Device) else ""
@@ -264,8 +264,8 @@ def compute_designs(
     cluster: str | None = None,
     executor: Executor | None = None,
 ) -> Sweep:
-    """Compute the designs of a study as its job; see `executor.run` for the rest."""
-    cells = run(
+    """Compute the designs of a study as its job; see `executor.run_job` for the rest."""
+    cells = run_job(
         job,
         store,
         progress,

@@ -53,7 +53,7 @@ def check_listing(job: SweepJob, documents: bool = False) -> None:
     )
 
 
-def as_dataset(sweep: Sweep) -> xr.Dataset:
+def sweep_dataset(sweep: Sweep) -> xr.Dataset:
     """A study's values over its axes.
 
     A grid has a dimension for each axis, called by its key; other samplings have one, `design`. For each column

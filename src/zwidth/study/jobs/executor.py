@@ -59,7 +59,7 @@ class RecoveredWarning(UserWarning):
     """A process that computed was lost, and its cells were computed again."""
 
 
-def run(
+def run_job(
     job: Job,
     store: Store | None = None,
     progress: Progress | None = None,

@@ -27,7 +27,7 @@ from zwidth._version import __version__
 from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.errors import StoreError
 from zwidth.progress import Progress
-from zwidth.study.jobs.executor import SMALL, Executor, open_executor, run
+from zwidth.study.jobs.executor import SMALL, Executor, open_executor, run_job
 from zwidth.study.jobs.job import CellValues, Job
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import FILE as LOCK
@@ -45,7 +45,7 @@ class JobSeries:
 
     folder    that keeps what is done; None: nothing is
     progress  is called with a job's stage, the number of its cells done, and of all its cells
-    workers, cluster, time_limit  as for `executor.run`
+    workers, cluster, time_limit  as for `executor.run_job`
     Raises    StoreError  for a folder that holds something else
 
         with JobSeries("kept", workers=2) as series:
@@ -133,7 +133,7 @@ class JobSeries:
 
         done, of  cells of the jobs of this stage before it, and of all of them, for the progress; left out: it is
                   the only one
-        Raises    what `executor.run` and `Store` raise
+        Raises    what `executor.run_job` and `Store` raise
         """
         whole = job.count if of is None else of
 
@@ -154,7 +154,7 @@ class JobSeries:
         executor = self._executor_in_time()
         slots = 1 if executor is None else executor.slots
         batch = -(-job.count // (BATCHES * slots))
-        cells = run(
+        cells = run_job(
             job,
             store,
             told,

@@ -75,7 +75,7 @@ class EvaluationJob:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class DesignJudgement:
     """What k designs are worth.
 
     values     (k, c)  of each column; nan where there is none
@@ -89,13 +89,13 @@ class Judgement:
     absent: Floats
     cells: Floats
 
-    def __getitem__(self, index: Any) -> Judgement:
-        return Judgement(self.values[index], self.status[index], self.absent[index], self.cells[index])
+    def __getitem__(self, index: Any) -> DesignJudgement:
+        return DesignJudgement(self.values[index], self.status[index], self.absent[index], self.cells[index])
 
-    def followed_by(self, other: Judgement) -> Judgement:
+    def followed_by(self, other: DesignJudgement) -> DesignJudgement:
         """These designs and then others."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Judgement(*(np.concatenate(pair) for pair in pairs))
+        return DesignJudgement(*(np.concatenate(pair) for pair in pairs))
 
     def costs(self, problem: Problem) -> Floats:
         """Each objective (k, m) with the sign that makes less better; nan where it has no value. Infinite ones are
@@ -193,7 +193,7 @@ class Judge:
                 produced.setdefault(name, []).append([float(own[key]), *drawn[:, n].tolist()])
         return produced
 
-    def judge(self, found: CellValues) -> Judgement:
+    def judge(self, found: CellValues) -> DesignJudgement:
         """The columns of k designs from the cells of their job, over all operators and produced devices."""
         cells, status = self._cells(found)
         k, columns = cells.shape[:2]
@@ -202,7 +202,7 @@ class Judge:
             for i in range(k):
                 values[i, c], kinds[i, c] = self._reduce(column, cells[i, c], status[i, c])
         absent = (status != OK).mean(axis=(2, 3))
-        return Judgement(values, kinds, absent, cells.reshape(k, columns, -1))
+        return DesignJudgement(values, kinds, absent, cells.reshape(k, columns, -1))
 
     def judge_produced(self, found: CellValues) -> Floats:
         """The columns (devices, k, c) of k designs as they are, and then as each of them is produced."""

@@ -27,7 +27,7 @@ from zwidth.result import Result
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.task import Task, task_of
-from zwidth.study.optimisation.evaluation import Judgement, margins
+from zwidth.study.optimisation.evaluation import DesignJudgement, margins
 from zwidth.study.optimisation.problem import Demand, Problem
 from zwidth.study.optimisation.search import pieces, value_at, values_at
 
@@ -90,13 +90,13 @@ class Optimisation(Result):
 
     problem: Problem
     shares: Floats
-    judgement: Judgement
+    judgement: DesignJudgement
     front: Ints
-    baseline: Judgement | None
+    baseline: DesignJudgement | None
     searched: int
     polished: int
     notes: Mapping[str, tuple[Note, ...]]
-    finer: Judgement | None = None
+    finer: DesignJudgement | None = None
     bars: Bars | None = None
     contacts: tuple[Contact, ...] = ()
 
@@ -493,7 +493,7 @@ def _points(task: Task) -> int:
     )
 
 
-def simulate_contact(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) -> Contact:
+def simulate_front_contact(problem: Problem, design: dict[str, Any], cells: Sequence[Any]) -> Contact:
     """Simulate a wall of a design where the first objective is worst.
 
     The wall is the study's wanted one, or, where it names none, one of 90 % of the largest stiffness there, at

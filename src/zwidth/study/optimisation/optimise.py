@@ -30,7 +30,7 @@ from zwidth.study.designs.study import Study
 from zwidth.study.jobs.job import CellValues, merge_notes
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.series import JobSeries
-from zwidth.study.optimisation.evaluation import LARGEST, EvaluationJob, Judge, Judgement
+from zwidth.study.optimisation.evaluation import LARGEST, DesignJudgement, EvaluationJob, Judge
 from zwidth.study.optimisation.optimisation import (
     PRODUCED,
     Bars,
@@ -39,7 +39,7 @@ from zwidth.study.optimisation.optimisation import (
     bars_of,
     finer_problem,
     ranges,
-    simulate_contact,
+    simulate_front_contact,
     spread_out,
     undominated,
 )
@@ -124,7 +124,7 @@ class _Archive:
     notes      column -> why designs have no value in it
     """
 
-    judgement: Judgement
+    judgement: DesignJudgement
 
     def __init__(self, problem: Problem, series: JobSeries) -> None:
         self.problem, self.series, self.progress = problem, series, series.progress
@@ -159,7 +159,7 @@ class _Archive:
         absent = self.judgement.absent[:, [one.column for one in self.problem.objectives]]
         return bool((absent == 1.0).all(axis=0).any())
 
-    def judge(self, shares: Floats, stage: str, of: int) -> Judgement:
+    def judge(self, shares: Floats, stage: str, of: int) -> DesignJudgement:
         """Judge designs and keep those that are new."""
         places, new = [], list[int]()
         for n, row in enumerate(shares):
@@ -184,7 +184,7 @@ class _Archive:
         self._jobs += 1
         return self.series.compute(f"{self._jobs:05d}", job, stage, done, of)
 
-    def baseline(self) -> Judgement | None:
+    def baseline(self) -> DesignJudgement | None:
         """The device as it is; None where it has not all of the numbers that vary."""
         own = own_values(self.problem)
         if any(value is None for value in own):
@@ -211,7 +211,7 @@ class _Archive:
                 chosen.append(row)
         return np.array(chosen, dtype=np.int64)
 
-    def result(self, best: Ints, baseline: Judgement | None, searched: int, polished: int) -> Optimisation:
+    def result(self, best: Ints, baseline: DesignJudgement | None, searched: int, polished: int) -> Optimisation:
         """The front's designs and how they were found."""
         notes = {name: merge_notes(each) for name, each in self.notes.items()}
         found = Optimisation(self.problem, self.shares, self.judgement, best, baseline, searched, polished, notes)
@@ -226,7 +226,7 @@ class _Archive:
         cells = self._compute(job, "judging the front as it is produced", 0, len(best))
         return bars_of(self.problem, judging.judge_produced(cells))
 
-    def _finer(self, best: Ints) -> Judgement | None:
+    def _finer(self, best: Ints) -> DesignJudgement | None:
         """The front on a finer grid of the task."""
         problem = finer_problem(self.problem)
         if problem is None or not len(best):
@@ -242,7 +242,7 @@ class _Archive:
         for place in range(count):
             self._tell("simulating walls of the front", place, count)
             cells = found.judgement.cells[found.front[place]]
-            contacts.append(simulate_contact(self.problem, found.settings(place), cells))
+            contacts.append(simulate_front_contact(self.problem, found.settings(place), cells))
         self._tell("simulating walls of the front", count, count)
         return tuple(contacts)
 

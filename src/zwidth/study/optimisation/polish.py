@@ -27,11 +27,11 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
-from zwidth.study.optimisation.evaluation import Judgement
+from zwidth.study.optimisation.evaluation import DesignJudgement
 from zwidth.study.optimisation.problem import Problem
 from zwidth.study.optimisation.search import continuous
 
-Judges: TypeAlias = Callable[[Floats], Judgement]
+Judges: TypeAlias = Callable[[Floats], DesignJudgement]
 
 STEP: Final = 1e-5  # of the bounds, by which designs are changed for derivatives
 REACH: Final = 0.1  # of the bounds: largest first step
@@ -75,8 +75,8 @@ class _Design:
     """
 
     shares: Floats
-    judgement: Judgement
-    joining: list[tuple[Floats, Judgement]]
+    judgement: DesignJudgement
+    joining: list[tuple[Floats, DesignJudgement]]
     bundle: list[_Linear] = field(default_factory=list)
     reach: float = REACH
     bend: float = 0.0
@@ -85,7 +85,7 @@ class _Design:
 
 
 def polish(
-    problem: Problem, shares: Floats, judgements: Judgement, weights: Floats, judge: Judges, budget: int
+    problem: Problem, shares: Floats, judgements: DesignJudgement, weights: Floats, judge: Judges, budget: int
 ) -> int:
     """Improve designs in all objectives together; what is tried is judged by `judge`, which keeps it.
 
@@ -127,7 +127,7 @@ def _extend_bundles(problem: Problem, designs: list[_Design], free: Ints, judge:
     joining = [(one, *new) for one in designs for new in one.joining]
     if not joining:
         return 0
-    judged = judge(np.concatenate([neighbours(shares, free) for _, shares, _ in joining]))
+    judged = judge(np.concatenate([neighbouring_designs(shares, free) for _, shares, _ in joining]))
     around = 2 * len(free)
     for n, (one, shares, own) in enumerate(joining):
         beside = judged[n * around : (n + 1) * around]
@@ -159,7 +159,7 @@ def _probes(one: _Design, free: Ints) -> Floats:
     return np.array(rows)
 
 
-def neighbours(shares: Floats, free: Ints) -> Floats:
+def neighbouring_designs(shares: Floats, free: Ints) -> Floats:
     """Designs (2 f, v) from which the derivatives by f variables are taken: a step down and one up of each, or two
     steps to the inside at a bound."""
     rows = np.repeat(shares[None], 2 * len(free), axis=0)
@@ -180,7 +180,7 @@ def gradients(shares: Floats, free: Ints, here: Floats, around: Floats) -> Float
     """Derivatives (..., f) of values by the shares of f variables.
 
     here    (...)       values of the design
-    around  (2 f, ...)  values of its `neighbours`
+    around  (2 f, ...)  values of its `neighbouring_designs`
 
     >>> x, free = np.array([0.0, 0.5]), np.array([0, 1])
     >>> f = lambda rows: rows[:, 0] ** 2 + 3.0 * rows[:, 0] + rows[:, 1] ** 2
@@ -231,9 +231,9 @@ def _pieces(
     problem: Problem,
     column: int,
     shares: Floats,
-    own: Judgement,
+    own: DesignJudgement,
     free: Ints,
-    around: Judgement,
+    around: DesignJudgement,
     sign: float,
 ) -> tuple[Floats, Floats]:
     """Values (p,) of a column with their derivatives (p, f), less being better: at every point where the column
@@ -254,7 +254,7 @@ def _trials(shares: Floats, free: Ints, step: Floats) -> Floats:
     return rows
 
 
-def _move(problem: Problem, one: _Design, tried: Floats, judged: Judgement, weights: Floats) -> None:
+def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement, weights: Floats) -> None:
     """Go to the best of the designs tried, if it is better; and choose what is tried next."""
     own = one.judgement.costs(problem)
     gains = ((own - judged.costs(problem)) / weights).min(axis=1)

@@ -26,7 +26,7 @@ import numpy as np
 import shapely
 
 from zwidth.arrays import Floats, Ints
-from zwidth.chart.measured.boundary import coarse_angles, real_root
+from zwidth.chart.measured.boundary import coarse_angles, measured_real_root
 from zwidth.chart.measured.loop import MeasuredLoop
 from zwidth.chart.robust.chart import RobustChart
 from zwidth.chart.robust.instability import softenings, unstable_walls
@@ -234,7 +234,7 @@ def curve_of_walls(loop: MeasuredLoop, box: tuple[float, float, float, float]) -
     K, B, _ = loop.walls(theta)
     pieces = [np.column_stack([K, B])]
     for kind in (-1, -2):
-        h, w = real_root(loop, kind)
+        h, w = measured_real_root(loop, kind)
         if not np.isfinite(h):
             continue
         if w == 0.0:

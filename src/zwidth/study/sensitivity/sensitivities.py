@@ -217,7 +217,7 @@ def moved_places(steps: KeyPath, multiple: float) -> Iterator[tuple[KeyPath, flo
 def property_numbers(document: dict[str, Any]) -> Iterator[tuple[str, KeyPath, float]]:
     """Dotted path, steps and value of each number that is a property of the device; of a symmetric matrix those on
     and above the diagonal."""
-    for steps, value in address.numbers(document):
+    for steps, value in address.number_paths(document):
         if not _no_property(steps) and not below_diagonal(steps):
             yield dotted(steps, document), steps, float(value)
     if not {"delay_samples", "delay_s"} & document.get("loop", {}).keys():
@@ -233,7 +233,7 @@ def _no_property(steps: KeyPath) -> str:
 
 def _left_out(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Dotted path of each number that is not a property of the linear device, and why."""
-    for steps, _ in address.numbers(document):
+    for steps, _ in address.number_paths(document):
         if reason := _no_property(steps):
             yield dotted(steps, document), reason
 
@@ -288,7 +288,7 @@ def measured_sensitivities(
         numbers.append(_sensitivity(device, response, port, operator, steps, value, chart.stiffness_max_nominal))
         if progress is not None:
             progress("numbers", len(numbers), len(varied))
-    for steps, _ in address.numbers(device.document):
+    for steps, _ in address.number_paths(device.document):
         if steps[0] == "response":
             left_out[dotted(steps, device.document)] = OF_MEASUREMENT
     order = sorted(numbers, key=lambda one: (np.isnan(one.logarithmic), -abs(np.nan_to_num(one.logarithmic))))
@@ -298,7 +298,7 @@ def measured_sensitivities(
 def _numbers(device: Device) -> Iterator[tuple[tuple[Any, ...], float]]:
     """Steps and value of the numbers of the computer and the operator; the delay also where none is given."""
     given = False
-    for steps, value in address.numbers(device.document):
+    for steps, value in address.number_paths(device.document):
         if steps[0] in ("loop", "operator") and steps[1] not in ("encoder", "saturation"):
             given |= steps in DELAYS
             yield steps, float(value)

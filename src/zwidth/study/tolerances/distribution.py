@@ -126,7 +126,7 @@ class Distribution:
 
 
 @dataclass(frozen=True)
-class Limits:
+class NumberLimits:
     """What values a number of the device file may have at all.
 
     least, most          inf where there is no limit
@@ -149,7 +149,7 @@ class Limits:
         return nextafter(self.most, -inf) if self.without_most else self.most
 
 
-def normal(middle: float, deviation: float, limits: Limits, cut: float = CUT) -> Distribution:
+def normal(middle: float, deviation: float, limits: NumberLimits, cut: float = CUT) -> Distribution:
     """A normal distribution, cut off at so many standard deviations and at the limits of the number.
 
     >>> normal(1.0, 0.5, Limits(0.0, without_least=True)).high
@@ -159,7 +159,7 @@ def normal(middle: float, deviation: float, limits: Limits, cut: float = CUT) ->
     return Distribution("normal", middle, max(low, limits.lowest), min(high, limits.highest), deviation)
 
 
-def lognormal(middle: float, spread: float, limits: Limits, cut: float = CUT) -> Distribution:
+def lognormal(middle: float, spread: float, limits: NumberLimits, cut: float = CUT) -> Distribution:
     """A lognormal distribution of a positive number, by its median and the standard deviation of the logarithm."""
     low, high = middle * exp(-cut * spread), middle * exp(cut * spread)
     return Distribution("lognormal", middle, max(low, limits.lowest), min(high, limits.highest), spread)

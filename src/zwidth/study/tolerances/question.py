@@ -31,7 +31,7 @@ from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
 from zwidth.study.designs.study import Study, check_study
-from zwidth.study.designs.study_file import measures_of, plain_value, read_document, study_of
+from zwidth.study.designs.study_file import measures_in_file, plain_value, read_document, study_of
 from zwidth.study.tolerances.distribution import Tolerance
 from zwidth.study.tolerances.intervals import draws_needed
 from zwidth.study.tolerances.tolerance_tables import tolerances_of
@@ -263,7 +263,7 @@ def question_over(
             TypeError    for arguments of another kind
     """
     require("device", device, Device)
-    names, by_name = measures_of(measures, user_measures)
+    names, by_name = measures_in_file(measures, user_measures)
     angles = circumstances.get("at") if isinstance(circumstances.get("at"), Mapping) else None
     given = {
         key: plain_value(value)

@@ -38,7 +38,7 @@ from zwidth.study.tolerances.distribution import (
     CUT,
     SPAN_OF_95,
     Distribution,
-    Limits,
+    NumberLimits,
     Tolerance,
     lognormal,
     normal,
@@ -215,7 +215,7 @@ def _width_key(table: dict[str, Any]) -> str:
 
 
 def _with_tails(
-    table: dict[str, Any], kind: str, key: str, value: float, limits: Limits, faults: TableFaults
+    table: dict[str, Any], kind: str, key: str, value: float, limits: NumberLimits, faults: TableFaults
 ) -> Distribution | None:
     """A normal or lognormal distribution, cut off where the number would not be valid."""
     cut = float(table.get("cut_at_deviations", CUT))
@@ -264,7 +264,7 @@ def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: T
     return Distribution("triangular" if kind == "triangular" else "uniform", middle, low, high)
 
 
-def _allowed(limits: Limits) -> str:
+def _allowed(limits: NumberLimits) -> str:
     """What values are allowed, in words."""
     words = []
     if limits.least > -inf:
@@ -274,14 +274,14 @@ def _allowed(limits: Limits) -> str:
     return f"it must be {' and '.join(words)}"
 
 
-def _limits(steps: KeyPath) -> Limits:
+def _limits(steps: KeyPath) -> NumberLimits:
     """The widest limits that the schema sets for the number at a path."""
     numbers = [kind for kind in schema.subschemas(steps) if kind.get("type") == "number"]
     if not numbers:
-        return Limits()
+        return NumberLimits()
     least = min(_limit(kind, -inf, ("gt", "exclusiveMinimum"), ("ge", "minimum")) for kind in numbers)
     most = max(_limit(kind, inf, ("lt", "exclusiveMaximum"), ("le", "maximum"), -1) for kind in numbers)
-    return Limits(least[0], most[0], least[1] > 0, most[1] < 0)
+    return NumberLimits(least[0], most[0], least[1] > 0, most[1] < 0)
 
 
 def _limit(

@@ -34,7 +34,12 @@ from zwidth.device.device import Device
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import NO_VALUE, OK, UNDECIDED
 from zwidth.model.posture import Posture
-from zwidth.study.wall_tables.edge_chords import EdgeChords, common_interval, edges_of_points, stable_intervals
+from zwidth.study.wall_tables.edge_chords import (
+    LoopEdgeChords,
+    common_interval,
+    edges_of_points,
+    stable_damping_intervals,
+)
 from zwidth.study.wall_tables.grid import CellGrid, Sectors, lattice
 
 POSTURES: Final = 3  # of the lattice, along each axis of a cell
@@ -151,7 +156,7 @@ class _Slot:
             edges = self._edges(samples)
             top = self._top(edges)
             bands = self._bands(top)
-            intervals = stable_intervals(edges, bands)
+            intervals = stable_damping_intervals(edges, bands)
             limits = Limits(intervals, np.tile(coarse, len(question.devices)), question.narrowing)
             if limits.narrowed_share <= FINE or not question.grid.dimensions:
                 break
@@ -167,32 +172,34 @@ class _Slot:
             raise _Failed(NO_VALUE, NOTHING_COMMON)
         return top / (1.0 + question.margin), ranges
 
-    def _lattice(self, halvings: int) -> tuple[Samples, Flags]:
+    def _lattice(self, halvings: int) -> tuple[CellSamples, Flags]:
         """Samples of the lattice, its spacing halved so often, and which of them belong to that of every second
         point."""
         d = self.question.grid.dimensions
         if d == 0:
-            return Samples(np.empty((1, 0)), np.zeros(1, dtype=np.int64), np.empty((1, 0))), np.ones(
+            return CellSamples(np.empty((1, 0)), np.zeros(1, dtype=np.int64), np.empty((1, 0))), np.ones(
                 1, dtype=np.bool_
             )
         of_postures = ((POSTURES - 1) << halvings) + 1
         of_directions = ((DIRECTIONS[d][0 if self.question.sectors.parts == 1 else 1] - 1) << halvings) + 1
         return self.sampler.lattice(of_postures, of_directions)
 
-    def _edges(self, samples: Samples) -> EdgeChords:
+    def _edges(self, samples: CellSamples) -> LoopEdgeChords:
         """The edges at n samples with each hand, hand after hand. Raises _Failed where a posture cannot be had, or
         an edge is undecided."""
         question, grid = self.question, self.question.grid
         if grid.dimensions == 0:
-            edges = EdgeChords.joined([edges_of_points(one.at(model=question.model)) for one in question.devices])
+            edges = LoopEdgeChords.joined(
+                [edges_of_points(one.at(model=question.model)) for one in question.devices]
+            )
         else:
             parts = [edges_of_points(point) for point in self._points(samples)]
-            edges = EdgeChords.joined(parts)
+            edges = LoopEdgeChords.joined(parts)
         if not edges.known.all():
             raise _Failed(UNDECIDED, UNTOLD)
         return edges
 
-    def _points(self, samples: Samples) -> list[OperatingPoint]:
+    def _points(self, samples: CellSamples) -> list[OperatingPoint]:
         """The loops at n samples, with each hand. Raises _Failed where a posture cannot be had."""
         question, grid = self.question, self.question.grid
         directions = self.sampler.along(samples) @ grid.axes
@@ -206,13 +213,13 @@ class _Slot:
             points.append(point)
         return points
 
-    def _top(self, edges: EdgeChords) -> float:
+    def _top(self, edges: LoopEdgeChords) -> float:
         """Largest stiffness up to which every band has a range of damping that is stable in all samples."""
         largest = edges.largest_stiffness
         levels = largest * np.arange(SEARCHED + 1) / SEARCHED
         if largest > 0.0:
             bands = np.column_stack([np.maximum(levels[:-1], NOTHING * largest), levels[1:]])
-            found = stable_intervals(edges, bands)
+            found = stable_damping_intervals(edges, bands)
             empty = [np.isnan(common_interval(found[:, j])[0]) for j in range(SEARCHED)]
             count = empty.index(True) if True in empty else SEARCHED
             if count:
@@ -232,7 +239,7 @@ class _Slot:
         step = STEP
         for _ in range(TURNS):
             tried = self.sampler.around_each(tightest.near(step), step, EACH)
-            intervals = stable_intervals(self._edges(tried), bands)
+            intervals = stable_damping_intervals(self._edges(tried), bands)
             limits.tighten(intervals)
             tightest.take(tried, intervals, limits.centre)
             step *= SHRINK
@@ -244,8 +251,8 @@ class _Slot:
             near = tightest.near(NEARBY)
             chosen = near[random.integers(len(near), size=half)]
             beside = self.sampler.beside(chosen, NEARBY * random.random((half, 1)))
-            tried = Samples.joined([self.sampler.anywhere(half), beside])
-            intervals = stable_intervals(self._edges(tried), bands)
+            tried = CellSamples.joined([self.sampler.anywhere(half), beside])
+            intervals = stable_damping_intervals(self._edges(tried), bands)
             quiet = 0 if limits.meet(intervals) else quiet + 1
             tightest.take(tried, intervals, limits.centre)
             if quiet >= QUIET:
@@ -258,12 +265,12 @@ class _Slot:
             unstable = self._unstable(tightest, limits, bands)
             if not len(unstable):
                 return
-            intervals = stable_intervals(self._edges(unstable), bands)
+            intervals = stable_damping_intervals(self._edges(unstable), bands)
             limits.meet(intervals)
             tightest.take(unstable, intervals, limits.centre)
         raise _Failed(UNDECIDED, DIFFERENT)
 
-    def _unstable(self, tightest: Tightest, limits: Limits, bands: Floats) -> Samples:
+    def _unstable(self, tightest: Tightest, limits: Limits, bands: Floats) -> CellSamples:
         """Samples at which a corner of a band is unstable: of each corner the one with the largest root that
         WALKERS walk to, from the tightest samples of its limit and from random ones."""
         ranges = limits.ranges
@@ -271,7 +278,7 @@ class _Slot:
         for j in np.flatnonzero(ranges[:, 0] < ranges[:, 1]).tolist():
             for side in (0, 1):
                 for stiffness in bands[j].tolist():
-                    own = Samples.joined([tightest.of_limit(side, j), self.sampler.anywhere(STRANGERS)])
+                    own = CellSamples.joined([tightest.of_limit(side, j), self.sampler.anywhere(STRANGERS)])
                     starts.append(own)
                     K.append(stiffness)
                     B.append(float(ranges[j, side]))
@@ -279,7 +286,7 @@ class _Slot:
             return tightest.samples[np.empty(0, dtype=np.int64)]
         counts = np.array([len(own) for own in starts])
         of = np.repeat(np.arange(len(starts)), counts)
-        samples, stiffness, damping = Samples.joined(starts), np.array(K), np.array(B)
+        samples, stiffness, damping = CellSamples.joined(starts), np.array(K), np.array(B)
         radius = self._radii(samples, stiffness[of], damping[of])
         order = np.lexsort((-radius, of))  # of each corner the largest first
         first = np.cumsum(counts) - counts
@@ -295,7 +302,7 @@ class _Slot:
         best = np.arange(len(starts)) * WALKERS + radius.reshape(-1, WALKERS).argmax(axis=1)
         return samples[best[radius[best] > 1.0 + ROUNDING]]
 
-    def _radii(self, samples: Samples, K: Floats, B: Floats) -> Floats:
+    def _radii(self, samples: CellSamples, K: Floats, B: Floats) -> Floats:
         """Largest root (n,) of a wall at each sample, the largest over the hands; 0 where kernels do not know it:
         there the limits are those of the edges."""
         radii = [np.nan_to_num(radii_at_points(point, K, B), nan=0.0) for point in self._points(samples)]
@@ -327,14 +334,14 @@ class Tightest:
     damping  (groups, 2 bands)  lowest damping there, and the highest times -1; -inf where there is none
     """
 
-    def __init__(self, sampler: Sampler, samples: Samples, intervals: Floats, centre: Floats) -> None:
+    def __init__(self, sampler: Sampler, samples: CellSamples, intervals: Floats, centre: Floats) -> None:
         self.sampler = sampler
         self.damping = np.full((sampler.groups, 2 * intervals.shape[1]), -np.inf)
         self.samples = samples[np.zeros(self.damping.size, dtype=np.int64)]
         self.spread = np.zeros(self.damping.shape[1])
         self.take(samples, intervals, centre)
 
-    def take(self, samples: Samples, intervals: Floats, centre: Floats) -> None:
+    def take(self, samples: CellSamples, intervals: Floats, centre: Floats) -> None:
         """Keep those of n further samples that are tighter.
 
         intervals  (h n, bands, GAPS, 2)  of the samples with each of h hands
@@ -356,7 +363,7 @@ class Tightest:
                         self.damping[g, k] = tightness[worst]
                         self.samples.put(g * len(self.spread) + k, samples, worst)
 
-    def near(self, step: float) -> Samples:
+    def near(self, step: float) -> CellSamples:
         """The samples from which a step, a share of the cell, may lead to the tightest of all: those that are less
         apart from it than REACH times that share of what the limit differs by within the cell."""
         known = np.isfinite(self.damping)
@@ -365,7 +372,7 @@ class Tightest:
         places = np.column_stack([self.samples.posture, self.samples.sector, self.samples.direction])[rows]
         return self.samples[rows[np.sort(np.unique(places, axis=0, return_index=True)[1])]]
 
-    def of_limit(self, side: int, band: int) -> Samples:
+    def of_limit(self, side: int, band: int) -> CellSamples:
         """The samples of a limit, of each group that has one; side 0: its lowest damping, 1: its highest."""
         bands = self.damping.shape[1] // 2
         k = side * bands + band
@@ -450,7 +457,7 @@ BORDER: Final = 0.3
 
 
 @dataclass(frozen=True)
-class Samples:
+class CellSamples:
     """Places of n samples.
 
     posture    (n, d)      shares of the cell from 0 to 1
@@ -462,27 +469,27 @@ class Samples:
     sector: Ints
     direction: Floats
 
-    def __getitem__(self, rows: Ints) -> Samples:
-        return Samples(self.posture[rows], self.sector[rows], self.direction[rows])
+    def __getitem__(self, rows: Ints) -> CellSamples:
+        return CellSamples(self.posture[rows], self.sector[rows], self.direction[rows])
 
     def __len__(self) -> int:
         return len(self.sector)
 
-    def put(self, row: int, other: Samples, its: int) -> None:
+    def put(self, row: int, other: CellSamples, its: int) -> None:
         """Replace one of these samples by one of others."""
         self.posture[row], self.sector[row] = other.posture[its], other.sector[its]
         self.direction[row] = other.direction[its]
 
-    def where(self, chosen: Flags, other: Samples) -> Samples:
+    def where(self, chosen: Flags, other: CellSamples) -> CellSamples:
         """These samples where `chosen` (n,), and others elsewhere."""
-        return Samples(
+        return CellSamples(
             np.where(chosen[:, None], self.posture, other.posture),
             np.where(chosen, self.sector, other.sector),
             np.where(chosen[:, None], self.direction, other.direction),
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[Samples]) -> Samples:
+    def joined(cls, parts: Sequence[CellSamples]) -> CellSamples:
         """The samples of several, one after the other."""
         return cls(
             np.concatenate([part.posture for part in parts]),
@@ -510,13 +517,13 @@ class Sampler:
         d = self.sectors.dimensions
         return d << d
 
-    def group(self, samples: Samples) -> Ints:
+    def group(self, samples: CellSamples) -> Ints:
         """Group (n,) of each sample: the corner of the cell that is nearest, and the face of its direction."""
         d = self.sectors.dimensions
         corner = (samples.posture > 0.5) @ (2 ** np.arange(d))
         return np.asarray(corner * d + samples.sector // self.sectors.parts ** (d - 1), dtype=np.int64)
 
-    def lattice(self, of_postures: int, of_directions: int) -> tuple[Samples, Flags]:
+    def lattice(self, of_postures: int, of_directions: int) -> tuple[CellSamples, Flags]:
         """Samples of a lattice of so many points along each axis of the cell, and of each sector; and which of
         them belong to that of every second point."""
         d = self.sectors.dimensions
@@ -531,17 +538,17 @@ class Sampler:
             (np.round(points * (side - 1)).astype(int) % 2 == 0).all(axis=1)
             for points, side in ((postures, of_postures), (directions, of_directions))
         ]
-        return Samples(postures[p], s, directions[u]), even[0][p] & even[1][u]
+        return CellSamples(postures[p], s, directions[u]), even[0][p] & even[1][u]
 
-    def anywhere(self, count: int) -> Samples:
+    def anywhere(self, count: int) -> CellSamples:
         """Random samples; a BORDER of their coordinates lies on the border of the cell."""
         d = self.sectors.dimensions
         sectors = np.array(self.own)[self.random.integers(len(self.own), size=count)]
         posture = self.random.random((count, d))
         posture = np.where(self.random.random((count, d)) < BORDER, np.round(posture), posture)
-        return Samples(posture, sectors, self.random.random((count, d - 1)))
+        return CellSamples(posture, sectors, self.random.random((count, d - 1)))
 
-    def beside(self, samples: Samples, size: float | Floats) -> Samples:
+    def beside(self, samples: CellSamples, size: float | Floats) -> CellSamples:
         """Random samples about so far (n, 1) from these: as a share of the cell, and of a face of directions.
 
         Where all directions are asked for, a sample goes on from one sector to the next. A single sector ends at
@@ -551,21 +558,21 @@ class Sampler:
         posture = np.clip(posture, 0.0, 1.0)
         if len(self.own) < self.sectors.count or self.sectors.count == 1:
             direction = samples.direction + size * self.random.standard_normal(samples.direction.shape)
-            return Samples(posture, samples.sector, np.clip(direction, 0.0, 1.0))
+            return CellSamples(posture, samples.sector, np.clip(direction, 0.0, 1.0))
         along = self.along(samples)
         # a face is 2 wide
         along = along + 2.0 * size * self.random.standard_normal(along.shape)
-        return Samples(posture, *self.sectors.places(along))
+        return CellSamples(posture, *self.sectors.places(along))
 
-    def around_each(self, samples: Samples, size: float, each: int) -> Samples:
+    def around_each(self, samples: CellSamples, size: float, each: int) -> CellSamples:
         """Samples beside each of these, `each` >= 2 times n: another posture; another direction; then both. Tight
         ones often lie in a corner of their cell, which few steps in both keep."""
         beside = [self.beside(samples, size) for _ in range(each)]
-        beside[0] = Samples(beside[0].posture, samples.sector, samples.direction)
-        beside[1] = Samples(samples.posture, beside[1].sector, beside[1].direction)
-        return Samples.joined(beside)
+        beside[0] = CellSamples(beside[0].posture, samples.sector, samples.direction)
+        beside[1] = CellSamples(samples.posture, beside[1].sector, beside[1].direction)
+        return CellSamples.joined(beside)
 
-    def along(self, samples: Samples) -> Floats:
+    def along(self, samples: CellSamples) -> Floats:
         """Vectors (n, d) along the directions of samples, not of unit length."""
         out = np.empty((len(samples), self.sectors.dimensions))
         for sector in np.unique(samples.sector):

@@ -44,7 +44,7 @@ STRAIGHT: Final = 1e-12  # of a ring's extent: along chords that change less the
 
 
 @dataclass(frozen=True)
-class EdgeChords:
+class LoopEdgeChords:
     """The edges of N stable sets, each as closed rings of chords; the order of the chords does not matter.
 
     chords   (m, 6)    K [N/m] and B [N s/m] of both ends, and how far the edge may lie beside the chord in K and B
@@ -60,7 +60,7 @@ class EdgeChords:
         return len(self.known)
 
     @classmethod
-    def joined(cls, parts: list[EdgeChords]) -> EdgeChords:
+    def joined(cls, parts: list[LoopEdgeChords]) -> LoopEdgeChords:
         """The loops of several, one after the other."""
         if len(parts) == 1:
             return parts[0]
@@ -80,7 +80,7 @@ class EdgeChords:
         return float(np.maximum.reduceat(self.chords[:, [K0, K1]].max(axis=1), self.offsets[:-1]).min())
 
 
-def edges_of_points(point: OperatingPoint) -> EdgeChords:
+def edges_of_points(point: OperatingPoint) -> LoopEdgeChords:
     """The edges of the stable sets at all points, flat.
 
     Points whose modes compiled code cannot treat, and charts in doubt, are charted alone.
@@ -106,8 +106,8 @@ def edges_of_points(point: OperatingPoint) -> EdgeChords:
             except (ChartError, UnmovedError, np.linalg.LinAlgError):
                 known[n], each[n] = False, np.empty((0, 6))
         offsets = np.concatenate([[0], np.cumsum([len(one) for one in each])]).astype(np.int64)
-        parts.append(EdgeChords(np.concatenate(each), offsets, known))
-    return EdgeChords.joined(parts)
+        parts.append(LoopEdgeChords(np.concatenate(each), offsets, known))
+    return LoopEdgeChords.joined(parts)
 
 
 def _charted_alone(point: OperatingPoint) -> Floats:
@@ -227,7 +227,7 @@ GAPS: Final = 4  # stable intervals kept of a band, the longest
 PROBES: Final = (0.4871, 0.3413)
 
 
-def stable_intervals(edges: EdgeChords, bands: Floats) -> Floats:
+def stable_damping_intervals(edges: LoopEdgeChords, bands: Floats) -> Floats:
     """The longest intervals of damping, stable with every stiffness of a band, for each loop and band.
 
     bands    (b, 2)  lowest and highest stiffness of each [N/m]

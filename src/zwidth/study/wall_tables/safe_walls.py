@@ -21,7 +21,7 @@ from zwidth.errors import Advice, WorkspaceError
 from zwidth.measures.definition import OK, STATUS, Note
 from zwidth.model.argument_checks import describe_value, require, wrong_type
 from zwidth.progress import Progress
-from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.executor import run_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import Store, store_for
@@ -77,7 +77,7 @@ def safe_walls(
                                 one that renders moments, a measured response
                 WorkspaceError      as `grid.cells_of` does
                 DeviceError     for hands that cannot be read, and as `Device.at` does
-                what `OperatingPoint.loop`, `executor.run` and `Store` raise
+                what `OperatingPoint.loop`, `executor.run_job` and `Store` raise
     """
     job = safe_walls_job(
         device,
@@ -159,7 +159,9 @@ def compute_table(
     """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
     if span is not None and not (isinstance(span, Real) and isfinite(span) and span > 0.0):
         raise WorkspaceError(f"the span of damping must be positive, got {describe_value(span)}")
-    cells = run(job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit)
+    cells = run_job(
+        job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit
+    )
     asked = job.cell_question
     return table_of_cells(device, hand_names(asked), asked, cells, span)
 

@@ -45,8 +45,8 @@ from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture_batch import shells
 from zwidth.processors import Processor
 from zwidth.progress import Progress
-from zwidth.study.designs.column import measure_list, over_the_workspace, positions, unit_attributes
-from zwidth.study.jobs.executor import Executor, run
+from zwidth.study.designs.column import measure_list, over_the_workspace, plane_positions, unit_attributes
+from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells, CellValues
 from zwidth.study.jobs.journal import fingerprint
 from zwidth.study.jobs.store import Store, store_for
@@ -118,7 +118,7 @@ class MapJob:
 
     @property
     def batch(self) -> int | None:
-        """Cells per batch; None: `executor.run` chooses, where a measure is evaluated cell by cell."""
+        """Cells per batch; None: `executor.run_job` chooses, where a measure is evaluated cell by cell."""
         if any(measure.each for measure in self.requested_measures):
             return None
         return max(FEWEST, -(-self.count // BATCHES))
@@ -205,11 +205,11 @@ def workspace_map(
                    ValueError    for an unknown measure, or two of one name
                    MeasureError  for a measure that does not exist for this device
                    DeviceError   as `Device.at` does
-                   what `executor.run` and `Store` raise
+                   what `executor.run_job` and `Store` raise
     """
     job = map_job(device, measures, plane, direction, assembly, model, wall, user_measures=user_measures)
     kept = store_for(job, store)
-    cells = run(
+    cells = run_job(
         job,
         kept,
         progress,
@@ -221,7 +221,7 @@ def workspace_map(
         cluster=cluster,
         executor=executor,
     )
-    return as_dataset(job, cells)
+    return map_dataset(job, cells)
 
 
 def map_job(
@@ -267,7 +267,7 @@ def map_job(
     return MapJob(device, requested_measures, plane, direction, assembly, model, wanted)
 
 
-def as_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
+def map_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     """A map's cells with axes, units and circumstances. Raises WorkspaceError where the handle reaches none."""
     import xarray as xr
 
@@ -418,7 +418,7 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
 
 def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
     """Whether the reached cells are exactly those that lie in all shells."""
-    at, status = positions(dataset), dataset[f"{name}_status"].values
+    at, status = plane_positions(dataset), dataset[f"{name}_status"].values
     inside = np.ones(status.shape, dtype=np.bool_)
     unsure = status == SINGULAR
     for *centre, least, most in table:
@@ -501,7 +501,7 @@ def map_table(dataset: xr.Dataset) -> dict[str, Any]:
     x, y = np.meshgrid(dataset["x_m"].values, dataset["y_m"].values)
     table: dict[str, Any] = {"x_m": x.ravel(), "y_m": y.ravel()}
     if dataset.attrs["plane"] != "xy":
-        table |= _components("position", positions(dataset), "_m")
+        table |= _components("position", plane_positions(dataset), "_m")
     for name in measures_of(dataset):
         table[str(dataset[name].attrs["key"])] = dataset[name].values.ravel()
         table[f"{name}_status"] = NAMES[dataset[f"{name}_status"].values.ravel()]
