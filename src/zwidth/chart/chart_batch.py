@@ -11,15 +11,7 @@ from numpy.typing import NDArray
 from zwidth.arrays import Floats
 from zwidth.chart.chart_numbers import read_edge
 from zwidth.chart.decay_search import search_fastest
-from zwidth.chart.edge_memory import (
-    AREA,
-    DOUBTFUL,
-    FOUND,
-    LARGEST_DAMPING,
-    MOST_SAMPLES,
-    EdgeMemory,
-    edge_memory,
-)
+from zwidth.chart.edge_memory import AREA, DOUBTFUL, FOUND, LARGEST_DAMPING, MOST_SAMPLES, EdgeMemory, edge_memory
 from zwidth.chart.edge_samples import degree_of, fill_loop
 from zwidth.chart.peak_search import search_peak
 from zwidth.chart.wall_samples import MOST_DEGREE

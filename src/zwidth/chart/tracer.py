@@ -15,11 +15,7 @@ from numpy.typing import NDArray
 from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.arcs import END_MARGIN, Arc, ArcPoints
 from zwidth.chart.area import arc_integral, area_memory, end_value
-from zwidth.chart.circle_sampling import (
-    MOST_SAMPLES,
-    feature_memory,
-    samples_of_loop,
-)
+from zwidth.chart.circle_sampling import MOST_SAMPLES, feature_memory, samples_of_loop
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, trace, wall_at, walls, zero_between
 from zwidth.chart.edge_samples import LONGEST
 from zwidth.chart.hurwitz import all_roots_inside, edges_on_line, work_array

@@ -18,15 +18,7 @@ import numpy as np
 from zwidth.arrays import Bytes, Floats
 from zwidth.chart.hurwitz import ROUNDING, edges_stable_set
 from zwidth.compiled import compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import (
-    FORCE,
-    SECTIONS,
-    SPLIT,
-    VELOCITY,
-    WHOLE_DELAY,
-    WINDOW,
-    CircleFactors,
-)
+from zwidth.loop.circle_factors import FORCE, SECTIONS, SPLIT, VELOCITY, WHOLE_DELAY, WINDOW, CircleFactors
 
 EDGE, HIDDEN, NO_EDGE, UNKNOWN = 1, 0, -1, 2
 LANES: Final = 128  # samples that are computed together

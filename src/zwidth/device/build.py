@@ -23,12 +23,7 @@ from zwidth.device.schema.loop import (
     LocalSection,
     LoopSection,
 )
-from zwidth.device.schema.mechanism import (
-    DampingSection,
-    DriveFrictionSection,
-    DriveSection,
-    FrictionSection,
-)
+from zwidth.device.schema.mechanism import DampingSection, DriveFrictionSection, DriveSection, FrictionSection
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection, ResponseSection
 from zwidth.device.schema.velocity import (

@@ -18,14 +18,7 @@ from zwidth.loop.coupled_hold import SampledForm, exact_rows, form_rows, rows_er
 from zwidth.loop.hold import held_row, lagged_row, modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
-from zwidth.model.modes import (
-    REPEATED,
-    UNOBSERVED,
-    UNOBSERVED_UNDAMPED,
-    RealModes,
-    real_modes,
-    repeat_tolerance,
-)
+from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes, repeat_tolerance
 from zwidth.model.plant import Plant
 from zwidth.model.plant_modes import fill_modes
 from zwidth.model.rendered_modes import PolePairs

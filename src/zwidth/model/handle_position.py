@@ -25,13 +25,7 @@ from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.closure import equations
 from zwidth.model.continuation import ASSEMBLY_TOLERANCE, OK, SINGULAR_CONDITION, assemble_batch, set_goal
-from zwidth.model.forward_kinematics import (
-    fill_handle_axes,
-    link_point,
-    move_joints,
-    place_links,
-    working_memory,
-)
+from zwidth.model.forward_kinematics import fill_handle_axes, link_point, move_joints, place_links, working_memory
 from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, REVOLUTE, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.posture_batch import solve_batch

@@ -10,12 +10,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled
 from zwidth.errors import BeyondLimit, OutOfReach, PostureError, Singular
-from zwidth.model.continuation import (
-    BEYOND_LIMIT,
-    OUT_OF_REACH,
-    follow,
-    joint_beyond_limit,
-)
+from zwidth.model.continuation import BEYOND_LIMIT, OUT_OF_REACH, follow, joint_beyond_limit
 from zwidth.model.forward_kinematics import working_memory
 from zwidth.model.handle_position import goal_difference
 from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Mechanism

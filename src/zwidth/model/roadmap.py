@@ -16,14 +16,7 @@ import numpy as np
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.model.closure import (
-    apply_step,
-    closure_step,
-    equations,
-    newton_step,
-    orientations,
-    passive_rates,
-)
+from zwidth.model.closure import apply_step, closure_step, equations, newton_step, orientations, passive_rates
 from zwidth.model.continuation import (
     CONTRACTION,
     LARGEST_TURN,

@@ -10,15 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.device.robot_files.robot import (
-    BASE,
-    UNMOVED,
-    Place,
-    Robot,
-    RobotBody,
-    RobotJoint,
-    joint_motion,
-)
+from zwidth.device.robot_files.robot import BASE, UNMOVED, Place, Robot, RobotBody, RobotJoint, joint_motion
 from zwidth.model.rotations import roll_pitch_yaw_of
 
 LONGEST_NAME: Final = 64

@@ -20,15 +20,7 @@ from zwidth.errors import DeviceError
 from zwidth.identify.boundary.fit import BoundaryFit, fit_boundary, log_likelihood, search_ranges
 from zwidth.identify.boundary.model import BoundaryModel, Scatter
 from zwidth.identify.boundary.parameters import BoundaryParameters
-from zwidth.identify.boundary.points import (
-    EDGE,
-    LOWER,
-    STABLE,
-    TIP,
-    UNSTABLE,
-    UPPER,
-    BoundaryPoints,
-)
+from zwidth.identify.boundary.points import EDGE, LOWER, STABLE, TIP, UNSTABLE, UPPER, BoundaryPoints
 from zwidth.identify.identification import Check
 from zwidth.identify.records.record import Record
 

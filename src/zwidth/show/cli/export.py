@@ -15,13 +15,7 @@ from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
-from zwidth.show.cli.resumable import (
-    check_workers,
-    open_store,
-    report_kept_work,
-    resume_option,
-    worker_options,
-)
+from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
 from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import amount
 

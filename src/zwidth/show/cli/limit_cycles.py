@@ -23,11 +23,7 @@ if TYPE_CHECKING:
 
     from zwidth.contact.friction_quantisation_plane import DevicePlane
     from zwidth.contact.harmonic_balance import LimitCycle
-    from zwidth.contact.wall_limit_cycles import (
-        LimitCycleAnswer,
-        LimitCyclePrediction,
-        SimulatedVibration,
-    )
+    from zwidth.contact.wall_limit_cycles import LimitCycleAnswer, LimitCyclePrediction, SimulatedVibration
 
 FRICTION_KEYS: Final = ("friction.coulomb_N", "mechanism.drives.*.coulomb_Nm")  # of a [plant], of a [mechanism]
 ENCODER_KEYS: Final = ("loop.encoder.resolution_m", "mechanism.drives.*.encoder_counts_per_rev")

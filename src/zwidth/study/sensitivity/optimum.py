@@ -24,12 +24,7 @@ from zwidth.arrays import Floats, Ints
 from zwidth.chart.area import Peak
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.curve import wall_at
-from zwidth.chart.loop_polynomials import (
-    LoopPolynomials,
-    fill_loop_polynomials,
-    most_degree,
-    polynomial_memory,
-)
+from zwidth.chart.loop_polynomials import LoopPolynomials, fill_loop_polynomials, most_degree, polynomial_memory
 from zwidth.chart.real_root_lines import end_of_curve
 from zwidth.chart.tracer import Tracer, tracer_of
 from zwidth.compiled import compiled, compiled_lean
