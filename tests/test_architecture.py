@@ -13,7 +13,7 @@ import pytest
 
 from tests.structure.imports import circles, import_graph
 from tests.structure.modules import modules_of
-from zwidth.device.new_file import KINDS
+from zwidth.device.read import KINDS
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "src" / "zwidth"
@@ -194,7 +194,7 @@ def test_modules_stay_short():
 
 # Kinds of `zwidth new`, one of which a bundled device is called by too: what declares and wants them.
 SAYS_KINDS = {
-    "src/zwidth/device/new_file.py": ("KINDS", "new_device"),
+    "src/zwidth/device/read.py": ("KINDS", "new_device"),
     "src/zwidth/show/cli/compile_group.py": ("DEVICES",),
 }
 

@@ -11,7 +11,7 @@ import pytest
 from tests.cli.command_runner import document_of, refusal_lines, run_command
 from tests.undrawn_figures import leave_undrawn
 from zwidth.device import new_device
-from zwidth.device.new_file import KINDS
+from zwidth.device.read import KINDS
 
 
 @pytest.fixture(autouse=True)

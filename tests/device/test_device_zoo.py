@@ -161,7 +161,7 @@ def test_an_axis_of_any_length_is_made_a_unit_vector():
     ],
 )
 def test_ways_of_damping(section, kind, numbers):
-    damping = importlib.import_module("zwidth.model.damping")
+    damping = importlib.import_module("zwidth.model.modes")
     device = from_document(with_changes(ARM_FILE, mechanism__damping=section))
     assert device.damping == getattr(damping, kind)(*numbers)
 

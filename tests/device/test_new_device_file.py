@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from zwidth.device import bundled_names, from_document, implausible, new_device
-from zwidth.device.new_file import KINDS
+from zwidth.device.read import KINDS
 
 OPTIONAL = re.compile(r"^#(?=[a-z\[])", re.MULTILINE)
 UNIT = re.compile(r"\w+?_(kg_m2|kg|m|s|N|rad|samples|Nm|N_per_m|Ns_per_m|Nm_per_rad|Nm_per_A) =")

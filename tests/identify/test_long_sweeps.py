@@ -9,7 +9,7 @@ from tests.identify.modes_bench import columns, readings
 from zwidth.device.load import load
 from zwidth.identify import SweepBlocks, identify
 from zwidth.identify.records.record import ArrayRecord
-from zwidth.identify.response.sweep_blocks import SweepRange
+from zwidth.identify.response.identify import SweepRange
 from zwidth.model import sweep_response_of_blocks
 
 PERIOD = 2e-3

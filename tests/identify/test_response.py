@@ -7,7 +7,7 @@ from tests.identify.modes_bench import columns, readings, two_mass_device
 from zwidth.chart import measured_chart
 from zwidth.device import from_document
 from zwidth.identify import Columns, SweepBlocks, identify, record_of
-from zwidth.identify.response.sweep_blocks import shared_excitation
+from zwidth.identify.response.identify import shared_excitation
 from zwidth.loop import Controller
 from zwidth.model import Response
 

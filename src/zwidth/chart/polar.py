@@ -18,7 +18,7 @@ from zwidth.chart.point_chart import numbers_of_points
 from zwidth.errors import ChartError, DirectionError, LoadError, ModelError, UnmovedError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_text import check_several_directions
+from zwidth.loop.posed_device import check_several_directions
 from zwidth.model.argument_checks import check_choice, require
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant

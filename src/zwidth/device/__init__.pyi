@@ -1,7 +1,7 @@
 from .device import Device as Device
 from .load import from_document as from_document
-from .new_file import new_device as new_device
 from .read import bundled as bundled
+from .read import new_device as new_device
 from .robot_files.import_file import import_file as import_file
 
 # Inner names, for tests and neighbouring packages: they may change with any release.

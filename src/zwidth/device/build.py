@@ -36,16 +36,16 @@ from zwidth.device.schema.velocity import (
 from zwidth.loop.controller import NOT_KNOWN, Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, LinearMethod, VelocityMethod
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.model.damping import add_dampers
 from zwidth.model.design_axes import stack_numbers
 from zwidth.model.mechanism import DriveNonlinearity
+from zwidth.model.modes import add_dampers
 from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
 from zwidth.model.operator import Operator
 from zwidth.model.plant import LaggedDamper, Plant
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:
-    from zwidth.model.damping import Damping
+    from zwidth.model.modes import Damping
 
 
 def controller(loop: LoopSection) -> Controller:
@@ -174,7 +174,7 @@ def response(section: ResponseSection, label: str, period: float) -> Response:
 
 def damping(section: DampingSection | None) -> Damping:
     """The way of damping; a plant brings its own."""
-    from zwidth.model.damping import GivenDamping, ModalDamping, ProportionalDamping
+    from zwidth.model.modes import GivenDamping, ModalDamping, ProportionalDamping
 
     if section is None or section.given:
         return GivenDamping()

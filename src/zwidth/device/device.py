@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from zwidth.measures.definition import Measure, MeasureValues
     from zwidth.measures.description import Description
     from zwidth.model.arm import Arm
-    from zwidth.model.damping import Damping
     from zwidth.model.load import Load
+    from zwidth.model.modes import Damping
     from zwidth.model.operator import Operator
     from zwidth.model.posture import Posture
     from zwidth.model.reduction import Encoders, Model

@@ -1,10 +1,13 @@
 """From a name or a path to the document: the plain tables and lists that the file holds.
 
 Faults of TOML text as sentences: what the parser reports, and what was probably meant.
+
+Device files to start from: one for each kind of device, complete, with a comment on every number.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import tomllib
@@ -16,6 +19,7 @@ from typing import Any, Final
 from zwidth.device.faults import comma_list, fail, nearest
 from zwidth.device.text_file import read_text, refuse_newer
 from zwidth.errors import FileError
+from zwidth.model.argument_checks import check_choice
 
 
 @dataclass(frozen=True)
@@ -187,3 +191,36 @@ def toml_fault(text: str, error: tomllib.TOMLDecodeError) -> str:
         name = ".".join(part.strip(" '\"") for part in twice[1].split(","))
         return f"line {number}: [{name}] is there twice; put its keys under one heading"
     return f"is not TOML: {message[:1].lower()}{message[1:]}"
+
+
+# Kind of device, in the field's words -> its file in `templates`.
+KINDS: Final = {
+    "paddle": "one-link.toml",
+    "serial-2r": "two-links.toml",
+    "five-bar": "two-arms.toml",
+    "delta": "three-legs.toml",
+    "stewart": "six-legs.toml",
+    "wrist": "three-axes.toml",
+    "plant": "masses.toml",
+}
+PLACEHOLDER: Final = '"NAME"'
+
+
+def new_device(name: str, kind: str) -> str:
+    """A device file of plausible numbers to start from, as text: each number has a comment that says what it is,
+    its unit and where one gets it; what may be left out is there as a comment.
+
+    name    the device's name
+    kind    "paddle", one link on a drive; "serial-2r", a planar arm of two links; "five-bar", a planar linkage of
+            two arms; "delta", a platform on three legs; "stewart", a platform on six sliding legs; "wrist", three
+            axes that meet; "plant", masses along the rendered direction
+    Raises  ValueError  for another kind, and for a name that is not one line of text
+
+    >>> new_device("My paddle", "paddle").splitlines()[2].split("#")[0].strip()
+    'name = "My paddle"'
+    """
+    check_choice("kind", kind, KINDS)
+    if not name.strip() or not name.isprintable():
+        raise ValueError(f"name must be a line of text, got {name!r}")
+    text = (files("zwidth.device") / "templates" / KINDS[kind]).read_text(encoding="utf-8")
+    return text.replace(PLACEHOLDER, json.dumps(name, ensure_ascii=False), 1)

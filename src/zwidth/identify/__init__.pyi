@@ -24,4 +24,4 @@ from .boundary.points import read_boundary_points as read_boundary_points
 from .profile_likelihood import fit_least_squares as fit_least_squares
 from .records.record import Columns as Columns
 from .records.sampling import check_sampling as check_sampling
-from .response.sweep_blocks import SweepBlocks as SweepBlocks
+from .response.identify import SweepBlocks as SweepBlocks

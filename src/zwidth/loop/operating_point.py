@@ -19,8 +19,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.linear_omissions import linear_omissions, load_omissions
 from zwidth.loop.loop import Loop, has_inertia_share, with_inertia_of
 from zwidth.loop.multi_loop import MultiLoop
-from zwidth.loop.point_text import check_several_directions, point_text
-from zwidth.loop.posed_device import NO_MODEL, PosedDevice
+from zwidth.loop.posed_device import NO_MODEL, PosedDevice, check_several_directions, point_text
 from zwidth.model.arm import attach_arm
 from zwidth.model.loaded_plant import LoadedPlants, counting_all, linearise, set_apart
 from zwidth.model.multi_plant import MultiPlant, reduce_directions

@@ -1,8 +1,8 @@
-from .damping import GivenDamping as GivenDamping
-from .damping import ModalDamping as ModalDamping
-from .damping import ProportionalDamping as ProportionalDamping
 from .effective_mass import effective_parameters as effective_parameters
 from .mechanism import Mechanism as Mechanism
+from .modes import GivenDamping as GivenDamping
+from .modes import ModalDamping as ModalDamping
+from .modes import ProportionalDamping as ProportionalDamping
 from .modes import natural_frequencies as natural_frequencies
 from .multi_plant import MultiPlant as MultiPlant
 from .multi_plant import reduce_directions as reduce_directions
@@ -34,7 +34,6 @@ from .bias import bias_batch as bias_batch
 from .continuation import NO_EQUILIBRIUM as NO_EQUILIBRIUM
 from .continuation import OK as OK
 from .continuation import OUT_OF_REACH as OUT_OF_REACH
-from .damping import modal_matrix as modal_matrix
 from .flexible_body import FlexibleBody as FlexibleBody
 from .flexible_body import clamped_frequencies as clamped_frequencies
 from .flexible_body import highest_frequency as highest_frequency
@@ -54,6 +53,7 @@ from .mechanism import Closures as Closures
 from .mechanism import DriveNonlinearity as DriveNonlinearity
 from .mechanism import Links as Links
 from .mechanism_arrays import pack as pack
+from .modes import modal_matrix as modal_matrix
 from .modes import undamped_modes as undamped_modes
 from .motions import Motions as Motions
 from .multi_plant import decompose as decompose

@@ -24,10 +24,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.model.damping import Damping
 from zwidth.model.equilibrium import Equilibrium, command_change
 from zwidth.model.mechanism import Mechanism, nonlinear_of_drives
-from zwidth.model.modes import clusters, repeat_tolerance, undamped_modes
+from zwidth.model.modes import Damping, clusters, repeat_tolerance, undamped_modes
 from zwidth.model.plant import Plant, SampledForce
 from zwidth.model.posture import Posture
 from zwidth.model.reduction import Encoders, reduce_mechanism

@@ -15,13 +15,12 @@ import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
-from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.design_axes import design_shape
 from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_mass import lever_arms, screw
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, per_design
-from zwidth.model.modes import REPEATED, RIGID
+from zwidth.model.modes import REPEATED, RIGID, Damping, ModalDamping, ProportionalDamping
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture
 from zwidth.model.ratio_table import at_postures

@@ -22,7 +22,11 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats, Ints
 from zwidth.errors import DirectionError, ModelError
 from zwidth.model.argument_checks import require
-from zwidth.model.damping import (
+from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
+from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
+from zwidth.model.mechanism import Drives, Mechanism, nonlinear_of_drives
+from zwidth.model.mechanism_arrays import pack
+from zwidth.model.modes import (
     Damping,
     GivenDamping,
     ModalDamping,
@@ -30,13 +34,9 @@ from zwidth.model.damping import (
     add_dampers,
     modal_matrix,
     project_dampers,
+    undamped_modes,
     winding_dampers,
 )
-from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
-from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
-from zwidth.model.mechanism import Drives, Mechanism, nonlinear_of_drives
-from zwidth.model.mechanism_arrays import pack
-from zwidth.model.modes import undamped_modes
 from zwidth.model.motions import Motions
 from zwidth.model.nonlinear import Friction, Nonlinear, project_onto_motions
 from zwidth.model.plant import LaggedDamper, Plant

@@ -35,9 +35,8 @@ from zwidth.model.argument_checks import require
 from zwidth.model.beam_bodies import carried_body
 from zwidth.model.beam_section import beam_properties, typical_material
 from zwidth.model.beam_section import tube as tube_section
-from zwidth.model.damping import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.mechanism import Mechanism
-from zwidth.model.modes import undamped_modes
+from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping, undamped_modes
 from zwidth.model.plant import Plant
 from zwidth.result import Result
 

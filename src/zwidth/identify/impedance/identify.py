@@ -33,7 +33,7 @@ from zwidth.identify.impedance.spectra import (
 )
 from zwidth.identify.records.record import Columns, Record
 from zwidth.identify.records.sampling import SampleTimes, check_periods, check_sampling
-from zwidth.identify.response.sweep_blocks import LEAST_SHARED, shared_power
+from zwidth.identify.response.identify import LEAST_SHARED, shared_power
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.raw_sweep import encoder_step
 from zwidth.progress import Progress

@@ -193,7 +193,7 @@ def _stiffest(chart: Chart) -> str:
 
 def no_measured_wall(chart: MeasuredChart) -> str:
     """Why a chart by a frequency response has no largest stiffness."""
-    from zwidth.chart.measured.hidden_walls import hidden_walls
+    from zwidth.chart.measured.chart import hidden_walls
 
     if chart.open:
         return OPEN_EDGE if chart.measured_up_to_share < 1.0 else OPEN_WHOLE_EDGE

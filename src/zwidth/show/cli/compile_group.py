@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from zwidth.compile_events import listening
-from zwidth.device.new_file import new_device
+from zwidth.device.read import new_device
 from zwidth.show.cli.first_use import GROUPS
 from zwidth.show.cli.group import invoke
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import click
 
-from zwidth.device.new_file import KINDS
+from zwidth.device.read import KINDS
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
@@ -63,7 +63,7 @@ class NewCommand(Command):
         return {"name": _name(case.question), "kind": case["kind"]}
 
     def compute(self, case: CommandLine) -> str:
-        from zwidth.device.new_file import new_device
+        from zwidth.device.read import new_device
 
         try:
             return new_device(_name(case.question), case["kind"])

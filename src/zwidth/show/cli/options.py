@@ -84,7 +84,7 @@ class Question:
     def refuse_unsupported(self, device: Device) -> None:
         """Raises BadInput for what directions computed together leave out."""
         from zwidth.errors import SeveralDirectionsError
-        from zwidth.loop.point_text import check_several_directions
+        from zwidth.loop.posed_device import check_several_directions
 
         instead = {
             "an operator": "use --operator none",
