@@ -91,7 +91,9 @@ class ArgumentError(ZwidthError, ValueError):
     missing   the argument that is to be given with it; None: none
 
     >>> str(ArgumentError("tremor", "needs an arm, and nobody holds the device", missing="operator"))
-    'tremor: needs an arm, and nobody holds the device; give operator'
+    'tremor needs an arm, and nobody holds the device; give operator'
+    >>> str(ArgumentError("environment", "'slime' is none; write slot"))
+    "environment: 'slime' is none; write slot"
     """
 
     def __init__(self, argument: str, *reasons: str, missing: str | None = None) -> None:
@@ -100,8 +102,13 @@ class ArgumentError(ZwidthError, ValueError):
 
     def __str__(self) -> str:
         advice = "" if self.missing is None else f"; give {self.missing}"
-        name = f"{self.argument}: " if self.argument else ""
-        return "\n".join(f"{name}{reason}{advice}" for reason in self.reasons)
+        return "\n".join(f"{_subject(self.argument, reason)}{reason}{advice}" for reason in self.reasons)
+
+
+def _subject(argument: str, reason: str) -> str:
+    """What stands before a reason: the argument as its subject where it begins with a verb, else with a colon."""
+    verbs = ("must ", "is ", "needs ", "does ", "lies ", "differ ")
+    return f"{argument}{' ' if reason.startswith(verbs) else ': '}" if argument else ""
 
 
 class FileError(ZwidthError, ValueError):

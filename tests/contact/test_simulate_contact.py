@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import FrozenInstanceError, replace
-from math import inf, isfinite, log, nan
+from math import inf, log, nan
 
 import numpy as np
 import pytest
@@ -180,7 +180,7 @@ def test_it_shows_itself_in_five_lines():
 # --- errors ---------------------------------------------------------------------------------------
 
 WRONG = [
-    ({}, "stiffness", "stiffness: is missing; a wall needs one [N/m]"),
+    ({}, "stiffness", "stiffness is missing; a wall needs one [N/m]"),
     ({"stiffness": nan}, "parameters", "stiffness of wall is missing: a number [N/m], any number"),
     ({"stiffness": 1.0, "no_pull": True}, "no_pull", "wall has no such parameter; it has stiffness, damping"),
     ({"stiffness": 1.0, "parameters": {"width": 1.0}}, "parameters", "wall has no parameter width"),
@@ -214,16 +214,15 @@ def test_every_fault_of_a_parameter_is_told():
 def test_a_place_out_of_the_workspace_is_named_with_its_position(argument):
     with pytest.raises(ArgumentError, match=rf"^{argument}: the .* lies 0\.5 m .* cannot reach") as caught:
         simulate_contact(bundled(MECHANISM), 4000.0, 10.0, **{argument: 0.5})
-    assert (caught.value.argument, caught.value.position) == (argument, 0.5)
+    assert caught.value.argument == argument
 
 
 def test_an_environment_that_gives_no_number_is_named_with_where_it_was():
-    with pytest.raises(NoAnswerError, match=r"^silent gave no finite force at 0\.011 s") as caught:
+    numbers = r"given a position of [-0-9.e]+ m and [-0-9.e]+ m/s;"
+    with pytest.raises(
+        NoAnswerError, match=rf"^silent gave no finite force at 0\.011 s, where it was {numbers}"
+    ):
         simulate_contact(one_mass(), environment=silent)
-    error = caught.value
-    assert (error.environment, error.time) == ("silent", pytest.approx(0.011))
-    assert isfinite(error.penetration)
-    assert isfinite(error.velocity)
 
 
 NUMBERS = [

@@ -135,7 +135,7 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
 def test_a_plan_that_cannot_be_meant_is_refused(numbers, argument, says):
     with pytest.raises(ArgumentError, match=f"{argument} {says}") as caught:
         Plan(**numbers)
-    assert (caught.value.argument, caught.value.reason[: len(says)]) == (argument, says)
+    assert (caught.value.argument, caught.value.reasons[0][: len(says)]) == (argument, says)
 
 
 def test_a_one_sided_wall_is_touched_as_usual_unless_said_otherwise():

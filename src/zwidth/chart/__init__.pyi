@@ -24,7 +24,6 @@ from .verdict import spectral_radius as spectral_radius
 
 # Inner names, for tests and neighbouring packages: they may change with any release.
 # isort: split
-from .traced_edge import TracedEdge as TracedEdge
 from .chart import boundary_points as boundary_points
 from .chart_batch import ALL_NUMBERS as ALL_NUMBERS
 from .edge_by_eigenvalues import closed_rings as closed_rings
@@ -40,5 +39,6 @@ from .robust.instability import unstable as unstable
 from .several_directions.curve_set import trace_curves as trace_curves
 from .several_directions.wall_curves import WallBox as WallBox
 from .table_radii import spectral_radii as spectral_radii
+from .traced_edge import TracedEdge as TracedEdge
 from .tracer import Tracer as Tracer
 from .wall_samples import MOST_DEGREE as MOST_DEGREE

@@ -424,7 +424,7 @@ def _not_controlled(
     motions: FreeMotions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
 ) -> str:
     names = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
-    resting = set.intersection(*(set(idle(H)) for H in each))
+    resting = set.intersection(*(set(idle_drives(H)) for H in each))
     idle = [names[kept[k]].joint for k in sorted(resting)]
     if idle:
         return (
@@ -573,7 +573,7 @@ def controlled(part: Floats) -> bool:
     return len(values) == part.shape[1] and bool(values[-1] > REGULAR * max(values[0], np.finfo(float).tiny))
 
 
-def idle(H: Floats) -> list[int]:
+def idle_drives(H: Floats) -> list[int]:
     """The drives that do not move the handle at all."""
     sizes = np.abs(H).max(axis=0)
     return [

@@ -104,7 +104,7 @@ def run_job(
     ...     def compute(self, first, last):
     ...         n = np.arange(first, last, dtype=float)[:, None]
     ...         return CellValues(n**2, np.zeros(n.shape, dtype=np.uint8), ((),))
-    >>> run(Squares()).values.ravel().tolist()
+    >>> run_job(Squares()).values.ravel().tolist()
     [0.0, 1.0, 4.0]
     """
     check_processor(processor)

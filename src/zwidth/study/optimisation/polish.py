@@ -184,7 +184,7 @@ def gradients(shares: Floats, free: Ints, here: Floats, around: Floats) -> Float
 
     >>> x, free = np.array([0.0, 0.5]), np.array([0, 1])
     >>> f = lambda rows: rows[:, 0] ** 2 + 3.0 * rows[:, 0] + rows[:, 1] ** 2
-    >>> gradients(x, free, f(x[None])[0], f(neighbours(x, free))).round(9).tolist()
+    >>> gradients(x, free, f(x[None])[0], f(neighbouring_designs(x, free))).round(9).tolist()
     [3.0, 1.0]
     """
     slopes = []

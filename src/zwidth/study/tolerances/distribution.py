@@ -152,7 +152,7 @@ class NumberLimits:
 def normal(middle: float, deviation: float, limits: NumberLimits, cut: float = CUT) -> Distribution:
     """A normal distribution, cut off at so many standard deviations and at the limits of the number.
 
-    >>> normal(1.0, 0.5, Limits(0.0, without_least=True)).high
+    >>> normal(1.0, 0.5, NumberLimits(0.0, without_least=True)).high
     3.0
     """
     low, high = middle - cut * deviation, middle + cut * deviation
