@@ -25,7 +25,7 @@ from numba.core.codegen import JITCodeLibrary
 
 from zwidth.compile_events import compiling
 from zwidth.machine_code import MachineCode
-from zwidth.tuple_references import TakesAddresses, refuse_returned_address
+from zwidth.tuple_references import TakesAddresses, check_returned_address
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # Division follows IEEE (1/0 is inf), so that a singular point is data and not an exception.
@@ -274,7 +274,7 @@ class _Kernel(TakesAddresses, registry.CPUDispatcher):
         return [] if self._entry is None else list(self._entry.overloads)
 
     def add_overload(self, result: Any) -> None:
-        refuse_returned_address(self.py_func.__qualname__, result.signature.return_type)
+        check_returned_address(self.py_func.__qualname__, result.signature.return_type)
         # not given to numba's own table of what Python may call: there is nothing to call
         self.overloads[tuple(result.signature.args)] = result
 

@@ -63,7 +63,7 @@ class TakesAddresses:
         return super().get_call_template(given, plain)  # type: ignore[misc]
 
 
-def refuse_returned_address(kernel: str, kind: types.Type) -> None:
+def check_returned_address(kernel: str, kind: types.Type) -> None:
     """Raise TypeError if a kernel returns a tuple that was handed to it.
 
     What stands at that address may be another tuple by the time its caller reads it.
@@ -72,7 +72,7 @@ def refuse_returned_address(kernel: str, kind: types.Type) -> None:
         raise TypeError(f"kernel {kernel} returns a tuple of arrays that it was given; return what is in it")
     if isinstance(kind, types.BaseTuple):
         for part in kind:
-            refuse_returned_address(kernel, part)
+            check_returned_address(kernel, part)
 
 
 def _arrays(kind: types.Type) -> int:

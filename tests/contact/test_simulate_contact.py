@@ -219,9 +219,7 @@ def test_a_place_out_of_the_workspace_is_named_with_its_position(argument):
 
 def test_an_environment_that_gives_no_number_is_named_with_where_it_was():
     numbers = r"given a position of [-0-9.e]+ m and [-0-9.e]+ m/s;"
-    with pytest.raises(
-        NoAnswerError, match=rf"^silent gave no finite force at 0\.011 s, where it was {numbers}"
-    ):
+    with pytest.raises(NoAnswerError, match=rf"^silent gave no finite force at 0\.011 s, where it was {numbers}"):
         simulate_contact(one_mass(), environment=silent)
 
 

@@ -19,7 +19,7 @@ from zwidth.chart.traced_edge import peak_fields
 from zwidth.chart.tracer import tracer_of
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -101,7 +101,7 @@ def stability_chart(loop: Loop, radius: float = 1.0, decay: bool = True) -> Stab
     >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)      # 12 - 8 sqrt 2 and 2 (thesis 4.14)
     (0.686292, 2.0)
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     if not 0.0 < radius <= 1.0:
         raise ValueError(f"radius must be a number with 0 < radius <= 1, got {radius:g}")
     tracer = tracer_of(loop, radius)
@@ -127,7 +127,7 @@ def largest_stiffness(loop: Loop, radius: float = 1.0) -> Peak | None:
     radius  as for `stability_chart`
     Raises  ChartError  as `stability_chart`
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     return LoopEdge.of(tracer_of(loop, radius)).peak
 
 

@@ -64,7 +64,7 @@ from zwidth.loop.factor_response import factor_response
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import table_of_loops
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response, integrators_of
@@ -233,7 +233,7 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
     >>> hysteretic_chart(Loop(plant, Controller(0.001))).stiffness_max > 0.0
     True
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     if loop.plant.hysteresis is None:
         raise HysteresisError("the plant has no loss factor; stability_chart charts it")
     if loop.has_fixed_feedback:

@@ -15,7 +15,7 @@ from zwidth.chart.chart_batch import ChartNumbers, chart_numbers
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import pieces_of_points, table_of_points
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.processors import processor_in_use
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def chart_at(point: OperatingPoint, radius: float = 1.0, *, decay: bool = True) 
     Raises  what `OperatingPoint.loop` raises; ChartError if the edge cannot be closed, ResponseError for what
             cannot be a device's response, ValueError for another radius than 1 where only 1 is charted
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     plain = radius == 1.0
     if not plain and (point.charted_by_response or point.direction_count > 1):
         raise ValueError(f"radius must be 1 for a frequency response and for several directions, got {radius:g}")
@@ -66,7 +66,7 @@ def check_at(
     Returns Verdicts by eigenvalues; MeasuredVerdicts by the count of roots for what has a frequency response only
     Raises  what `chart_at` raises
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     if point.charted_by_response:
         return chart_at(point).check(wall_stiffness, wall_damping)
     from zwidth.chart.verdict import verdicts

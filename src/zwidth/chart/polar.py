@@ -19,7 +19,7 @@ from zwidth.errors import ChartError, DirectionError, LoadError, ModelError, Unm
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import check_several_directions
-from zwidth.model.argument_checks import check_choice, require
+from zwidth.model.argument_checks import check_choice, check_kind
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.progress import Progress
@@ -114,7 +114,7 @@ def largest_stiffness_around(
     progress  as for `largest_stiffness_by_direction`
     Raises    ValueError  for another plane or count, and what `largest_stiffness_by_direction` raises
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     if plane is not None:
         check_choice("plane", plane, PLANES)
     if count < 3:
@@ -151,7 +151,7 @@ def largest_stiffness_by_direction(
     progress    called with "directions", those that are done, and all of them
     Raises      ValueError  for a direction without length, and what `OperatingPoint.plant_of_directions` raises
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     given = np.atleast_2d(np.asarray(directions, dtype=float))
     length = np.linalg.norm(given, axis=1, keepdims=True)
     if given.shape[1] != 3:

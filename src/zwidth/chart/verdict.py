@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop, set_aside, unheld_positions
-from zwidth.model.argument_checks import broadcast_walls, require
+from zwidth.model.argument_checks import broadcast_walls, check_kind
 from zwidth.progress import Progress
 from zwidth.result import Result
 
@@ -100,7 +100,7 @@ class Verdicts(WallVerdicts):
 
 def eigenvalues(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Complexes:
     """All eigenvalues z (..., N) of the transition matrix (thesis eq. 2.41), unobserved motions left out."""
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     K, B = broadcast_walls(wall_stiffness, wall_damping, finite=True)
     return np.asarray(np.linalg.eigvals(loop.transition_matrix(K, B)), dtype=complex)
 
@@ -121,7 +121,7 @@ def judge(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -> Ver
 
     Raises  ValueError  for a single wall that is not finite
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     return verdicts(loop, wall_stiffness, wall_damping)
 
 

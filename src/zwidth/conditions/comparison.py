@@ -36,7 +36,7 @@ from zwidth.conditions.traits import ground_friction, reading_step
 from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import check_number, require
+from zwidth.model.argument_checks import check_kind, check_number
 from zwidth.result import Result
 
 # Keys of a bound that are left out of tables: one is the same for every device, the other is itself a table.
@@ -150,7 +150,7 @@ def compare_bounds(point: OperatingPoint, damping: float | None = None) -> Bound
     >>> round(comparison.exact, 9), round(comparison.stiffness_max(comparison.bounds[0]), 9)
     (0.666666667, 0.666666667)
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     if point.response is not None:
         from zwidth.chart.measured.chart import modelled_point
 
@@ -284,7 +284,7 @@ def compare(
     >>> "rigid mass" in [bound.name for bound in compare(Loop(free_mass, Controller(1.0))) if bound.holds]
     True
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     if isinf(wall_damping):
         raise ValueError(f"wall_damping must be finite, or nan for none, got {wall_damping:g}")
     case = case_of(loop, wall_damping, coulomb_friction, resolution)

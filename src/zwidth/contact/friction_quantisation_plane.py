@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.conditions.diolaiti import dimensionless_friction
 from zwidth.conditions.traits import ground_friction, reading_step, traits
-from zwidth.loop.controller import refuse_feedback, refuse_load
+from zwidth.loop.controller import check_no_feedback, check_no_load
 from zwidth.loop.loop import Loop
 
 PASSIVE: Final = "passive"
@@ -91,8 +91,8 @@ def device_plane(
     K = np.atleast_1d(np.asarray(wall_stiffness, dtype=float))
     if not np.all((K > 0.0) & np.isfinite(K)):
         raise ValueError(f"wall_stiffness must be positive and finite, got {wall_stiffness!r}")
-    refuse_feedback(loop.controller, "the plane of friction and resolution is not known", "leave it out")
-    refuse_load(loop.plant, "the plane of friction and resolution is not known", "leave the load out")
+    check_no_feedback(loop.controller, "the plane of friction and resolution is not known", "leave it out")
+    check_no_load(loop.plant, "the plane of friction and resolution is not known", "leave the load out")
     own, delay = traits(loop), loop.controller.delay
     if np.isnan(own.ground_damping):
         raise ValueError(

@@ -39,7 +39,7 @@ from zwidth.contact.quasi_linear import (
     friction_velocity_of,
 )
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 from zwidth.progress import Progress
 
@@ -129,7 +129,7 @@ def limit_cycles(
     >>> f"{grows.amplitude * 1e3:.2f} mm at {grows.frequency_Hz:.2f} Hz, stable: {grows.stable}"
     '2.02 mm at 10.06 Hz, stable: False'
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     balance = harmonic_balance(
         loop,
         wall_stiffness,

@@ -23,7 +23,7 @@ from zwidth.contact.time_response import RunSettings, TimeResponse
 from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.loop import Loop
 from zwidth.memory_limit import check_memory
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress, watched
 from zwidth.threads import in_chunks
 
@@ -89,7 +89,7 @@ def simulate(
     >>> [round(1e3 * x, 3) for x in response.reading[[0, 10, 20]].tolist()]
     [1.0, 0.556, -0.308]
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     run = Run(loop, np.asarray(values, dtype=float), **circumstances)  # type: ignore[arg-type]
     return simulate_batch([run], environment, duration=duration, substeps=substeps, trail=trail, ledger=ledger)[0]
 

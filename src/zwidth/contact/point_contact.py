@@ -33,7 +33,7 @@ from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.time_response import TimeResponse, judge_response
 from zwidth.errors import ArgumentError, NoAnswerError, PostureError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import check_choice, check_number, require
+from zwidth.model.argument_checks import check_choice, check_kind, check_number
 from zwidth.model.operator import Operator
 from zwidth.progress import Progress
 
@@ -111,7 +111,7 @@ def simulate_contact(
       largest force 1 N, deepest 0.001 m
       501 samples, 0.5 s
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     if point.response is not None:
         from zwidth.chart.measured.chart import modelled_point
 
@@ -329,7 +329,7 @@ def environment_with_values(
 def _environment(environment: str | Environment) -> Environment:
     if isinstance(environment, Environment):
         return environment
-    require("environment", environment, str)
+    check_kind("environment", environment, str)
     try:
         return load_environment(environment)
     except ValueError as error:

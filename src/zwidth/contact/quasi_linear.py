@@ -24,7 +24,7 @@ from zwidth.contact.vibration_kernel import (
     transition,
     vibrations,
 )
-from zwidth.loop.controller import refuse_feedback, refuse_load
+from zwidth.loop.controller import check_no_feedback, check_no_load
 from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
 from zwidth.loop.realisation import FilterStates, filter_states
@@ -207,8 +207,8 @@ def equivalent_loop(
     force_limit  the smallest limit on the force [N];  offset  see `EquivalentLoop`
     Raises       FeedbackError  (loop.unsupported_feedback) for a computer with feedback beside the wall law
     """
-    refuse_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
-    refuse_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
+    check_no_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
+    check_no_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
     counters = parts.counters
     if any(part.step > 0.0 for part in counters):
         counters = tuple(Counter(part.along, part.step, part.weight) for part in counters)

@@ -26,7 +26,7 @@ import numpy as np
 
 from zwidth.arrays import Flags, Floats
 from zwidth.contact.computer import FORCE, HANDLE, READING, TRUTH, VELOCITY, Records
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.result import Result
 
 # The ledger's entries, in the engine's order; the last is what the plant has stored.
@@ -242,7 +242,7 @@ def judge_response(response: TimeResponse, *, drifts: bool = False) -> Judgement
     >>> judge_response(simulate(loop, wall, values, duration=2.0, start_position=1e-3)).behaviour
     'growing'
     """
-    require("response", response, TimeResponse)
+    check_kind("response", response, TimeResponse)
     S = len(response.time)
     touching = response.force != 0.0
     if S < FEWEST:

@@ -27,10 +27,10 @@ from zwidth.contact.harmonic_balance import HarmonicBalance, LimitCycle, harmoni
 from zwidth.contact.loop_simulation import LARGEST_MOTION, Run, simulate_batch
 from zwidth.contact.time_response import Behaviour, Judgement, TimeResponse, judge_response
 from zwidth.errors import ArgumentError, NoAnswerError
-from zwidth.loop.controller import refuse_feedback, refuse_load
+from zwidth.loop.controller import check_no_feedback, check_no_load
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import check_number, require
+from zwidth.model.argument_checks import check_kind, check_number
 from zwidth.model.modes import least_deforming_motion
 from zwidth.progress import Progress
 from zwidth.result import Result
@@ -136,13 +136,13 @@ def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str
 
     Raises  what `predict_limit_cycles` raises before it computes
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     check_number("offset", offset, "steps")
     if abs(offset) > 0.5:
         raise ValueError(f"offset must be from -0.5 to 0.5 of an encoder's step, got {offset:g}")
     loop = point.loop
-    refuse_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
-    refuse_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
+    check_no_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
+    check_no_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")
     _ = loop.sections  # refuses plants that no wall moves, or not in time
     parts = tuple(name for name in loop.nonlinear.kinds if name not in NOT_PREDICTED)
     if not parts:

@@ -42,7 +42,7 @@ NUMBERS: Final = (
 )
 
 
-def beam_inconsistencies(mechanism: dict[str, Any]) -> KeyMessages:
+def beam_faults(mechanism: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement, of the links and those of legs."""
     for member in members(mechanism, "links"):
         if isinstance(member.entry.get("beam"), dict):
@@ -123,7 +123,7 @@ def implausible_beams(device: Device) -> KeyMessages:
     mechanism = table(device.document, "mechanism")
     own = [member for member in members(mechanism, "links") if isinstance(member.entry.get("beam"), dict)]
     seen = set[KeyPath]()
-    modes = _mode_messages(device) if own else {}
+    modes = _mode_faults(device) if own else {}
     for member in own:
         path = ("mechanism", *member.path, "beam")
         if path not in seen:
@@ -159,7 +159,7 @@ def _numbers(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
         )
 
 
-def _mode_messages(device: Device) -> dict[str, tuple[KeyPath, str]]:
+def _mode_faults(device: Device) -> dict[str, tuple[KeyPath, str]]:
     """Of each link whose modes are too fast, by its name: the key below [beam] and the sentence."""
     mechanism, period = device.mechanism, device.controller.sampling_period
     if mechanism is None or not mechanism.flexible or isinstance(period, NotKnown):

@@ -11,18 +11,18 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from zwidth.device.address import exists, in_schema, is_number, row_count, table, tables
-from zwidth.device.beam_plausibility import beam_inconsistencies
+from zwidth.device.beam_plausibility import beam_faults
 from zwidth.device.faults import KeyMessages, KeyPath, comma_list, plural, quote, suggestion
 from zwidth.device.legs import spread_tables, written_path
 from zwidth.device.loop_consistency import (
-    electrical_inconsistencies,
-    feedback_inconsistencies,
-    load_inconsistencies,
-    loop_inconsistencies,
-    ratio_inconsistencies,
+    electrical_faults,
+    feedback_faults,
+    load_faults,
+    loop_faults,
+    ratio_faults,
 )
 from zwidth.device.missing import partly_missing
-from zwidth.device.nonlinear_consistency import nonlinear_inconsistencies
+from zwidth.device.nonlinear_consistency import nonlinear_faults
 from zwidth.device.schema.device_file import flat_sources, keys
 
 Check = Callable[[dict[str, Any]], KeyMessages]
@@ -31,7 +31,7 @@ HELD: Final = "held"  # the assembly of the arm's mechanism
 ELASTIC: Final = ("grasp_stiffness_N_per_m", "grasp_damping_Ns_per_m")
 
 
-def arm_inconsistencies(document: dict[str, Any], checks: tuple[Check, ...]) -> KeyMessages:
+def arm_faults(document: dict[str, Any], checks: tuple[Check, ...]) -> KeyMessages:
     """Path and sentence of every disagreement.
 
     checks  of a mechanism's table, which the arm's links are, too
@@ -118,24 +118,24 @@ def inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMe
 def _inconsistencies(document: dict[str, Any], original: dict[str, Any]) -> KeyMessages:
     yield from _one_kind(original)
     yield from _plant(table(document, "plant"))
-    yield from loop_inconsistencies(document)
-    yield from feedback_inconsistencies(document)
-    yield from nonlinear_inconsistencies(document)
+    yield from loop_faults(document)
+    yield from feedback_faults(document)
+    yield from nonlinear_faults(document)
     yield from _response(original)
-    yield from electrical_inconsistencies(document)
-    yield from operator_inconsistencies(document)
-    yield from load_inconsistencies(document)
-    yield from arm_inconsistencies(document, (_tree, _assemblies, _joint_keys))
+    yield from electrical_faults(document)
+    yield from operator_faults(document)
+    yield from load_faults(document)
+    yield from arm_faults(document, (_tree, _assemblies, _joint_keys))
     yield from _sampling(document)
     mechanism = table(document, "mechanism")
     if mechanism:
         yield from _tree(mechanism)
         if _joints(mechanism):
             yield from _references(mechanism)
-            yield from ratio_inconsistencies(mechanism)
+            yield from ratio_faults(mechanism)
             yield from _assemblies(mechanism)
         yield from _joint_keys(mechanism)
-        yield from beam_inconsistencies(mechanism)
+        yield from beam_faults(mechanism)
         yield from _loop_keys(mechanism)
         yield from _place_of_handle(mechanism)
         yield from _workspace(mechanism)
@@ -200,7 +200,7 @@ def _springless(stiffness: Any) -> bool:
     return stiffness is None or (is_number(stiffness) and stiffness == 0)
 
 
-def operator_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+def operator_faults(document: dict[str, Any]) -> KeyMessages:
     """A handle to hold, one way of holding it, and a mass where the grasp is elastic."""
     operator, plant = table(document, "operator"), table(document, "plant")
     size = row_count(plant.get("mass_kg"))

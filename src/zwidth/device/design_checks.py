@@ -24,7 +24,7 @@ from zwidth.device.schema import magnitudes
 from zwidth.device.schema.device_file import DeviceFile
 from zwidth.device.schema.loop import LONGEST_DELAY
 from zwidth.device.schema.value_types import LARGEST, SYMMETRY_TOLERANCE
-from zwidth.device.validation_messages import refuse_unsupported
+from zwidth.device.validation_messages import without_unsupported
 from zwidth.loop.estimator import quantisation_noise
 from zwidth.loop.estimators.kalman import INDEX
 from zwidth.model.design_axes import join_designs
@@ -113,7 +113,7 @@ def _may_be(document: dict[str, Any], steps: KeyPath, number: float) -> bool:
         place = place[step]
     place[steps[-1]] = number
     try:
-        DeviceFile.model_validate(refuse_unsupported(changed)[0])
+        DeviceFile.model_validate(without_unsupported(changed)[0])
     except ValidationError:
         return False
     return True

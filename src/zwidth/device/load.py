@@ -23,8 +23,8 @@ from zwidth.device.read import bundled, read
 from zwidth.device.schema.device_file import DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.schema.operator import ArmSection
-from zwidth.device.text_file import refuse_newer, without_version
-from zwidth.device.validation_messages import refuse_unsupported, validation_messages
+from zwidth.device.text_file import check_not_newer, without_version
+from zwidth.device.validation_messages import validation_messages, without_unsupported
 from zwidth.errors import BeamError, DeviceError
 from zwidth.model.argument_checks import wrong_type
 from zwidth.model.load import Load
@@ -151,13 +151,13 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
     if not isinstance(document, dict):
         hint = f"write load({document!r})" if isinstance(document, str) else ""
         raise wrong_type("document", "a dictionary", document, hint)
-    refuse_newer(document, label)
+    check_not_newer(document, label)
     if STUDY_KEYS & document.keys() and not DEVICE_KEYS & document.keys():
         named = f", {document['device']}" if isinstance(document.get("device"), str) else ""
         raise fail(
             label, "", f"is a study of designs, not a device; sweep it, or give the device that it names{named}"
         )
-    cleaned, faults = refuse_unsupported(document)
+    cleaned, faults = without_unsupported(document)
     checked: DeviceFile | None = None
     try:
         checked = DeviceFile.model_validate(cleaned)

@@ -20,7 +20,7 @@ KEYS: Final = {"joint_rad", "joint_m", "ratio"}
 FULL_TURN: Final = 2.0 * math.pi * (1.0 + 1e-9)
 
 
-def ratio_inconsistencies(mechanism: dict[str, Any]) -> KeyMessages:
+def ratio_faults(mechanism: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement about a ratio table, in a mechanism with its legs spread."""
     links = {link["name"]: link for _, link in tables(mechanism, "links") if isinstance(link.get("name"), str)}
     for index, drive in tables(mechanism, "drives"):
@@ -92,7 +92,7 @@ def largest_ratio(drive: dict[str, Any]) -> Any:
 FORCES: Final = ("force_N", "push_N", "moment_Nm")
 
 
-def load_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+def load_faults(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement."""
     if "load" not in document:
         return
@@ -133,7 +133,7 @@ LINEAR: Final = ", ".join(name for name in METHODS if name not in ("foaw", "leva
 INERTIAS: Final = ("inertia_kg", "inertia_share")
 
 
-def feedback_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+def feedback_faults(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement about what is commanded beside the wall's force."""
     loop = table(document, "loop")
     T = sampling_period(loop)
@@ -209,7 +209,7 @@ SHORTEST_LAG: Final = 1e-6
 LONGEST_LAG: Final = 1e6
 
 
-def loop_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+def loop_faults(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement in [loop]."""
     loop = table(document, "loop")
     T = sampling_period(loop)
@@ -336,7 +336,7 @@ def along_fault(place: KeyPath, along: Any, size: int | None) -> KeyMessages:
         )
 
 
-def electrical_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+def electrical_faults(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement about windings: of a plant's motors, of a mechanism's drives."""
     T = sampling_period(table(document, "loop"))
     plant = table(document, "plant")

@@ -18,7 +18,7 @@ READ_BY: Final = {
 }
 
 
-def nonlinear_inconsistencies(document: dict[str, Any]) -> KeyMessages:
+def nonlinear_faults(document: dict[str, Any]) -> KeyMessages:
     """Path and sentence of every disagreement."""
     period = table(document, "loop").get("sampling_period_s")
     T = period if is_number(period) and 0 < period <= 1 else math.nan

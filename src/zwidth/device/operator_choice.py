@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
-from zwidth.device.consistency import DEVICE_KEYS, operator_inconsistencies
+from zwidth.device.consistency import DEVICE_KEYS, operator_faults
 from zwidth.device.faults import Fault, dotted, fail
 from zwidth.device.read import OPERATORS, read
 from zwidth.device.schema.operator import OperatorSection
@@ -102,7 +102,7 @@ def operator_table(name_or_path: str | os.PathLike[str]) -> dict[str, Any]:
         )
     table = document["operator"]
     document = {"operator": table} | version
-    faults = list(operator_inconsistencies(document))
+    faults = list(operator_faults(document))
     try:
         OperatorFile.model_validate(document)
     except ValidationError as error:

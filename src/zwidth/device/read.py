@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from zwidth.device.faults import comma_list, fail, nearest
-from zwidth.device.text_file import read_text, refuse_newer
+from zwidth.device.text_file import check_not_newer, read_text
 from zwidth.errors import FileError
 from zwidth.model.argument_checks import check_choice
 
@@ -109,7 +109,7 @@ def parse_document(text: str, label: str, shelf: BundledFiles = DEVICES) -> dict
         raise fail(label, "", f"is nested too deeply; at most {DEEPEST} levels are allowed") from None
     except ValueError as error:  # a whole number of thousands of digits
         raise fail(label, "", f"holds a number that cannot be read: {_lower_first(str(error))}") from None
-    refuse_newer(document, label)
+    check_not_newer(document, label)
     if not document:
         raise fail(label, "", f"is empty; {shelf.needs}")
     if not within_depth(document):

@@ -156,7 +156,7 @@ def unchecked_version_message(version: object) -> str:
     return f"is {number:g}, whose cells have no checksums, and zwidth {__version__} reads version {STORE_VERSION}"
 
 
-def refuse_newer(document: Mapping[str, Any], label: str) -> None:
+def check_not_newer(document: Mapping[str, Any], label: str) -> None:
     """Raise DeviceError for a file of a newer version, whose other keys nobody can judge."""
     if message := newer_version_message(document.get(KEY), FILE_VERSION):
         raise fail(label, KEY, message)

@@ -218,7 +218,7 @@ UNSUPPORTED_VALUES: Final[dict[tuple[str, ...], tuple[frozenset[str], str, froze
 beside it that are checked with it (None: all); what is left out are parameters of the refused value."""
 
 
-def refuse_unsupported(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[KeyPath, str]]]:
+def without_unsupported(document: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[KeyPath, str]]]:
     """The document without what is not supported yet, and a sentence for each thing taken out."""
     document = deep_copy(document)
     refused: list[tuple[KeyPath, str]] = []

@@ -21,7 +21,7 @@ from zwidth.guarantees.stable_alone import AS_BENT, Premise, bent_as_loaded, sta
 from zwidth.loop.fixed_feedback import acts, feedback_name
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import check_number, require, wrong_type
+from zwidth.model.argument_checks import check_kind, check_number, wrong_type
 from zwidth.progress import Progress
 
 SPRINGS = "spring stability after Colgate and Schenkel 1997, known at second hand (thesis 1.1.3)"
@@ -49,7 +49,7 @@ def find_guarantees(
     >>> [guarantee.name for guarantee in result.guarantees]
     ['passive', 'spring-stable', 'nyquist-spring', 'stable']
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     return _guarantees(loop, (stable_alone(loop),), robust, progress)
 
 
@@ -135,7 +135,7 @@ def guarantees_of(
     Raises    ValueError  for a wall whose numbers are not valid
               what `OperatingPoint.loop` raises, and ChartError where the chart of the bare device is undecided
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     if wall is not None:
         _check_wall(wall)
     if point.response is not None:

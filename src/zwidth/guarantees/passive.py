@@ -21,7 +21,7 @@ from zwidth.guarantees.region import Region, empty_region
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.fixed_feedback import Feedforward, feedback_name
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 
 # Largest deviation of chords from the outline, in shares of the wall, inwards and outwards; and largest number of
 # bisections of a direction.
@@ -53,7 +53,7 @@ def passive_region(loop: Loop, held: Floats | None = None) -> Region:
     >>> round(passive_region(Loop(paddle, Controller(sampling_period=0.001)), one).stiffness_max, 4)   # 2 b/T
     2000.0
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     held = loop.plant.handle if held is None else held
     if held is None:
         raise ValueError("the plant has no handle; give `held`, the coordinate at which the operator holds it")

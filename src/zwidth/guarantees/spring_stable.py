@@ -18,7 +18,7 @@ from zwidth.guarantees.region import Region, empty_region, polygon_rings, stiffe
 from zwidth.guarantees.spring_family import SpringFamily, polygons_of, spring_for, spring_handle
 from zwidth.guarantees.stable_alone import stable_alone
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress
 
 # Number of springs charted first, spread by the frequency of the mode that each makes; and the highest of these
@@ -109,7 +109,7 @@ def spring_stable_region(loop: Loop, progress: Progress | None = None) -> Region
     >>> 2000.0 < region.stiffness_max < 2400.0           # every passive operator: 2000 (2 b/T)
     True
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     if (alone := stable_alone(loop)).fails:
         return empty_region(alone.reason)
     springs = SpringFamily.of(Loop(without_idle_motions(loop.plant), loop.controller))

@@ -37,7 +37,7 @@ from zwidth.loop.low_pass import LowPass
 from zwidth.loop.plant_states import PlantStates, SampledInput, plant_states
 from zwidth.loop.pole_zero_form import PoleZeroForm, pole_zero_form
 from zwidth.loop.realisation import FilterStates, filter_states
-from zwidth.loop.sections import Sections, refuse_loss_factor
+from zwidth.loop.sections import Sections, check_no_loss_factor
 from zwidth.model.plant import Plant
 
 SAMPLE, SLOW, FAST, END = range(4)  # what happens in a period, in this order at one instant
@@ -381,7 +381,7 @@ def closed_sections(plant: Plant, controller: Controller) -> ClosedSections:
             UnresolvedError   where it moves so little of it that rounding hides it
             ModelError  for a force sensor where none can be
     """
-    refuse_loss_factor(plant)
+    check_no_loss_factor(plant)
     form, states = close_plant(plant, controller)
     if not len(states.output) or not np.any(states.output):
         raise UnmovedError("the wall force moves nothing that the sensor reads; check actuator and sensor")

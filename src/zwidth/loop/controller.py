@@ -161,7 +161,7 @@ class Controller:
         return replace(self, force_sensor=None, feedforward=None, local_loop=None)
 
 
-def refuse_feedback(controller: Controller, what: str, instead: str) -> None:
+def check_no_feedback(controller: Controller, what: str, instead: str) -> None:
     """Raise FeedbackError for a computer with feedback beside the wall law, Coulomb feedforward included.
 
     what     the answer, such as "limit cycles are not predicted"
@@ -172,7 +172,7 @@ def refuse_feedback(controller: Controller, what: str, instead: str) -> None:
         raise FeedbackError(f"{what} with {' and '.join(names)}; {instead}")
 
 
-def refuse_load(plant: Plant, what: str, instead: str) -> None:
+def check_no_load(plant: Plant, what: str, instead: str) -> None:
     """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as
     before."""
     if plant.is_loaded:

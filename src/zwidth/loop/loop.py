@@ -37,7 +37,7 @@ from zwidth.loop.loop_table import LoopTable, loop_table
 from zwidth.loop.motion_names import motion_name
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections, plant_rows, sampled_sections
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.first_order_form import first_order_form
 from zwidth.model.modes import real_modes, undamped_modes
 from zwidth.model.nonlinear import Nonlinear
@@ -81,7 +81,7 @@ class Loop:
         Raises  TypeError   for anything but a plant and a controller, or for neither a controller nor a period
                 ValueError  for a plant that holds nan, a controller beside a period or delay, numbers out of range
         """
-        require("plant", plant, Plant, _HINTS.get(type(plant).__name__, ""))
+        check_kind("plant", plant, Plant, _HINTS.get(type(plant).__name__, ""))
         if controller is None:
             if sampling_period is None:
                 raise TypeError("Loop needs a controller or a sampling period; write sampling_period=0.001")
@@ -91,7 +91,7 @@ class Loop:
                 "the controller has its own sampling period and delay; leave out sampling_period and delay, or "
                 "write Controller(sampling_period, delay)"
             )
-        require("controller", controller, Controller)
+        check_kind("controller", controller, Controller)
         if has_inertia_share(controller):
             raise ValueError(
                 "feedforward.inertia_share is a share of a device's mass, which a loop does not know; write "

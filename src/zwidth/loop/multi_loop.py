@@ -47,7 +47,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.loop.realisation import FilterStates, filter_states
 from zwidth.loop.wall_matrices import PrincipalDirections, WallMatrices
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.modes import (
     REPEATED,
     UNOBSERVED,
@@ -91,12 +91,12 @@ class MultiLoop:
         for a controller with fixed feedback.
         """
         hint = "write Loop(plant, controller) for one direction" if isinstance(self.plant, Plant) else ""
-        require("plant", self.plant, MultiPlant, hint)
-        require("controller", self.controller, Controller)
+        check_kind("plant", self.plant, MultiPlant, hint)
+        check_kind("controller", self.controller, Controller)
         if self.controller.fixed_feedback:
             raise SeveralDirectionsError(self.controller.feedback_names)
         if self.matrices is not None:
-            require(
+            check_kind(
                 "matrices",
                 self.matrices,
                 WallMatrices,

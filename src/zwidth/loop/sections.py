@@ -55,7 +55,7 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     Raises UnmovedError where no mode is both moved by the wall force and read by the sensor; UnresolvedError where
     dampers couple modes and rounding hides what is read; HysteresisError for a plant with a loss factor.
     """
-    refuse_loss_factor(plant)
+    check_no_loss_factor(plant)
     modes = real_modes(plant)
     # each free motion with damping has a pole at z = 1, for the place where it comes to rest: two share this pole
     if modes is not None and np.count_nonzero((modes.frequency_squared == 0.0) & (modes.decay != 0.0)) < 2:
@@ -67,7 +67,7 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     return sections
 
 
-def refuse_loss_factor(plant: Plant) -> None:
+def check_no_loss_factor(plant: Plant) -> None:
     """Raise HysteresisError for a plant with a loss factor."""
     if plant.hysteresis is not None:
         raise HysteresisError(

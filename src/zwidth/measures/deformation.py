@@ -34,11 +34,11 @@ from zwidth.measures.definition import OK, MeasureValues, WantedWall
 from zwidth.measures.evaluation import evaluate_pointwise, with_status
 from zwidth.measures.handle_impedance import handle_of
 from zwidth.measures.preconditions import (
+    check_assumptions,
+    check_motor_encoders,
     frequency_of,
     loop_case,
     plant_with_handle,
-    require_assumptions,
-    require_motor_encoders,
     wall_of,
 )
 from zwidth.measures.vibration_decay import OptimalMass, optimal_mass
@@ -239,8 +239,8 @@ def structural_distortion_at(point: OperatingPoint, wanted: WantedWall) -> float
 def _optimal(point: OperatingPoint, wanted: WantedWall) -> OptimalMass:
     K, B = wall_of(wanted)
     case = loop_case(point)
-    require_assumptions(case, UNDELAYED)
-    require_motor_encoders(point)
+    check_assumptions(case, UNDELAYED)
+    check_motor_encoders(point)
     stiffness = point.effective.stiffness
     if point.mechanism is None and np.isnan(stiffness):
         if SPRUNG in case.unmet:

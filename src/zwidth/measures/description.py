@@ -11,7 +11,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.dexterity import dynamic_manipulability_at, isotropy_at, manipulability_at
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.effective_mass import EffectiveParameters
 from zwidth.model.flexible_body import FlexibleLink, Method
 from zwidth.model.mechanism import FIXED, Mechanism
@@ -124,7 +124,7 @@ def describe(point: OperatingPoint) -> Description:
 
     Raises  what `OperatingPoint.plant` raises
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     known = "dynamics" not in point.missing
     plant = point.ungripped_plant if known else None
     felt = point.effective if known else None

@@ -35,7 +35,7 @@ from zwidth.measures.definition import (
     Note,
     WantedWall,
 )
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 
 NUMBERS = "biuf"  # kinds of arrays that are numbers: bool, signed, unsigned, floating
 FAILURES = (
@@ -54,8 +54,8 @@ def evaluate(measure: Measure, point: OperatingPoint) -> MeasureValues:
 
     Raises  MeasureError  where this device does not have the measure at any point
     """
-    require("measure", measure, Measure)
-    require("point", point, OperatingPoint)
+    check_kind("measure", measure, Measure)
+    check_kind("point", point, OperatingPoint)
     if not measured_together(measure, point):
         return evaluate_pointwise(measure.compute, point)
     try:
@@ -113,7 +113,7 @@ def measure_at(
                           text begins with its name
     """
     resolved = find_measure(measure) if isinstance(measure, str) else measure
-    require("measure", resolved, Measure)
+    check_kind("measure", resolved, Measure)
     try:
         wanted = WantedWall(
             stiffness,

@@ -29,17 +29,17 @@ from zwidth.loop.measured.measured_port import MeasuredPort
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.handle_impedance import (
     LimitKind,
+    check_no_local_loop,
     commanded_impedance,
     felt_impedance,
     free_impedance,
     free_motion_mass,
     handle_of,
-    refuse_local_loop,
     static_stiffness,
     static_stiffness_limit,
     static_stiffness_limit_kind,
 )
-from zwidth.model.argument_checks import check_number, require
+from zwidth.model.argument_checks import check_kind, check_number
 from zwidth.model.plant import Plant
 from zwidth.result import Result
 
@@ -293,7 +293,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
       free motion 0.287 kg
       impedances at 400 frequencies from 0.4 to 399.6 Hz
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     check_number("stiffness", stiffness, "N/m")
     check_number("damping", damping, "N s/m")
     if point.response is not None:
@@ -304,7 +304,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
     peak = largest_stiffness(point.loop)
     loop = point.without_operator.loop
     computer = loop.controller
-    refuse_local_loop(computer)
+    check_no_local_loop(computer)
     frequency = np.geomspace(LOWEST, HIGHEST, COUNT) * 0.5 / loop.period
     stable = verdict == "stable"
     return FeltWall(
@@ -394,7 +394,7 @@ def felt_chart(chart: StabilityChart, device: Plant | None = None) -> FeltChart:
 
     Raises  HandleError  where the plant has no handle
     """
-    require("chart", chart, StabilityChart)
+    check_kind("chart", chart, StabilityChart)
     plant = device or chart.loop.plant
     walls = np.vstack(chart.regions) if chart.regions else np.zeros((1, 2))
     (_, low), (right, high) = walls.min(axis=0), walls.max(axis=0)

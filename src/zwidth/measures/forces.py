@@ -235,17 +235,17 @@ def acceleration_max_at(point: OperatingPoint) -> Floats:
 def position_resolution_at(point: OperatingPoint) -> Floats:
     """Step of the reading along the rendered direction when all encoders step; for a [plant] its sensor's [m]."""
     if point.given_plant is not None:
-        return _require_nonzero(
+        return _check_nonzero(
             reading_step(point.given_plant), "needs the step of the encoder; give loop.encoder.resolution_m"
         )
-    counts = _require_finite(point, "encoder_counts_per_rev", point.drives.encoder_counts)
+    counts = _check_finite(point, "encoder_counts_per_rev", point.drives.encoder_counts)
     return resolution_along(_jacobian(point), point.direction, 2.0 * np.pi / (counts * point.drives.transmission))
 
 
 def friction_force_at(point: OperatingPoint) -> Floats:
     """Dry friction of all drives felt along the rendered direction; for a [plant] where the wall acts [N]."""
     if point.given_plant is not None:
-        return _require_nonzero(ground_friction(point.given_plant), "needs dry friction; give friction.coulomb_N")
+        return _check_nonzero(ground_friction(point.given_plant), "needs dry friction; give friction.coulomb_N")
     dry = point.drives.nonlinearity
     if dry is None or not np.any(dry.coulomb > 0.0):
         raise MeasureError(f"needs dry friction; give {_key(point, 0, 'coulomb_Nm')}, or that of another drive")
@@ -256,10 +256,10 @@ def motor_heat_at(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> Fl
     """Heat in all windings while the drives hold the wanted force along the rendered direction [W]."""
     jacobian, drives = _jacobian(point), point.drives
     (force,) = numbers_of(wanted, point.shape, "a force to be held", "force")
-    constant = _require_finite(point, "torque_constant_Nm_per_A", drives.torque_constant)
+    constant = _check_finite(point, "torque_constant_Nm_per_A", drives.torque_constant)
     known = drives.winding_resistance
     missing = np.full(len(drives.names), np.nan)
-    resistance = _require_finite(point, "winding_resistance_ohm", missing if known is None else known)
+    resistance = _check_finite(point, "winding_resistance_ohm", missing if known is None else known)
     return heat_along(jacobian, point.direction, force, drives.transmission * constant / np.sqrt(resistance))
 
 
@@ -281,10 +281,10 @@ def _torques(point: OperatingPoint, key: str) -> Floats:
     drives = point.drives
     limits = drives.torque_limit if key == "torque_limit_Nm" else drives.continuous_torque
     known = np.full(len(drives.names), np.nan) if limits is None else limits
-    return np.asarray(drives.transmission * _require_finite(point, key, known))
+    return np.asarray(drives.transmission * _check_finite(point, key, known))
 
 
-def _require_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
+def _check_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
     missing = ~np.isfinite(values)
     if missing.any():
         first = int(np.argwhere(missing)[0][-1])
@@ -292,7 +292,7 @@ def _require_finite(point: OperatingPoint, key: str, values: Floats) -> Floats:
     return values
 
 
-def _require_nonzero(value: float, otherwise: str) -> Floats:
+def _check_nonzero(value: float, otherwise: str) -> Floats:
     """A number of a [plant]. Raises MeasureError where it is 0, as it is if the file leaves it out."""
     if value == 0.0:
         raise MeasureError(otherwise)

@@ -57,11 +57,11 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.errors import HandleError
 from zwidth.loop.closed_plant import path_responses
-from zwidth.loop.controller import Controller, refuse_feedback, refuse_load
+from zwidth.loop.controller import Controller, check_no_feedback, check_no_load
 from zwidth.loop.factor_response import factor_response, feedforward_response, sensor_response
 from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import broadcast_walls, require
+from zwidth.model.argument_checks import broadcast_walls, check_kind
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
 
@@ -75,10 +75,10 @@ UNKNOWN: Final = "the impedance at the handle is not known"
 LEAVE_OUT: Final = "leave the load out"
 
 
-def refuse_local_loop(controller: Controller) -> None:
+def check_no_local_loop(controller: Controller) -> None:
     """Raise FeedbackError for a computer of two rates."""
     two_rates = replace(controller, force_sensor=None, feedforward=None)
-    refuse_feedback(two_rates, UNKNOWN, "leave local_loop out")
+    check_no_feedback(two_rates, UNKNOWN, "leave local_loop out")
 
 
 def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequency: ArrayLike) -> Complexes:
@@ -102,7 +102,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     >>> round(float(-Z.imag * 2 * np.pi), 2), round(1000.0 - 0.1 * (2 * np.pi) ** 2, 2)
     (996.09, 996.05)
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     broadcast_walls(wall_stiffness, wall_damping)
     f = np.asarray(frequency, dtype=float)
     nyquist = 0.5 / loop.period
@@ -111,7 +111,7 @@ def felt_impedance(loop: Loop, wall_stiffness: float, wall_damping: float, frequ
     plant, T = loop.plant, loop.period
     s = 2j * np.pi * f
     if loop.has_fixed_feedback:
-        refuse_local_loop(loop.controller)
+        check_no_local_loop(loop.controller)
         handle_of(plant)
         w = loop.velocity_response(np.exp(s * T), np.expm1(s * T))
         return _controlled_impedance(loop, wall_stiffness + wall_damping * w, s)
@@ -193,7 +193,7 @@ def static_stiffness(plant: Plant, wall_stiffness: ArrayLike, controller: Contro
     >>> static_stiffness(pair, [0.0, 3000.0, 6000.0]).round(6).tolist()
     [0.0, 1500.0, 2000.0]
     """
-    require("plant", plant, Plant)
+    check_kind("plant", plant, Plant)
     K = np.asarray(wall_stiffness, dtype=float)
     gain, error, spring = _static_gains(controller)
     compliance = rest_compliance(plant, handle_of(plant), gain).at(K * (1.0 + gain * error) + spring)
@@ -222,7 +222,7 @@ def static_stiffness_limit(plant: Plant) -> float:
     Returns  inf where nothing gives way, as with rigid drives; 0 where a motion of the handle is not held
     Raises   HandleError  where the plant has no handle
     """
-    require("plant", plant, Plant)
+    check_kind("plant", plant, Plant)
     return rest_compliance(plant, handle_of(plant)).stiffness_limit
 
 
@@ -264,7 +264,7 @@ def free_motion_mass(plant: Plant, controller: Controller | None = None) -> floa
 
 def handle_of(plant: Plant) -> Floats:
     """The plant's handle. Raises HandleError if it has none, FeedbackError under load."""
-    refuse_load(plant, UNKNOWN, LEAVE_OUT)
+    check_no_load(plant, UNKNOWN, LEAVE_OUT)
     if plant.handle is None:
         raise HandleError(
             "the plant has no handle at which a hand could feel it; give `handle`, or use another model"

@@ -46,7 +46,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import modes_of_points, table_of_points
 from zwidth.measures.definition import OK, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_charts, complete_pointwise
-from zwidth.measures.handle_impedance import felt_impedance, free_impedance, refuse_local_loop
+from zwidth.measures.handle_impedance import check_no_local_loop, felt_impedance, free_impedance
 from zwidth.measures.preconditions import numbers_of, plant_with_handle
 from zwidth.measures.rate_hardness import rate_hardness
 from zwidth.model.plant_modes import plant_modes
@@ -449,7 +449,7 @@ def _free_loop(point: OperatingPoint) -> Loop:
     """The loop without operator. Raises MeasureError where it has no handle, or a local loop."""
     loop = Loop(plant_with_handle(point), point.computer)
     try:
-        refuse_local_loop(loop.controller)
+        check_no_local_loop(loop.controller)
     except FeedbackError as error:
         raise MeasureError(f"is not known here: {error}") from None
     return loop

@@ -44,7 +44,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.point_loops import pieces_of_points, tables_of_points
 from zwidth.measures.definition import MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_charts, complete_pointwise, evaluate_pointwise, with_status
-from zwidth.measures.preconditions import loop_case, numbers_of, require_assumptions, require_motor_encoders
+from zwidth.measures.preconditions import check_assumptions, check_motor_encoders, loop_case, numbers_of
 
 NONE_STABLE_WITH_MARGINS: Final = "no wall with K > 0 and B >= 0 is stable with these margins"
 
@@ -310,11 +310,11 @@ def _range(point: OperatingPoint) -> ImpedanceRange:
         numbers, rigid, sprung = point.effective, point.model == "rigid", point.model == "motor-mass"
         mass, motor, stiffness = numbers.rigid_mass, numbers.motor_side_mass, numbers.stiffness
     if rigid:
-        require_assumptions(case, WHOLE_DELAY)
+        check_assumptions(case, WHOLE_DELAY)
         return rigid_range(mass, T, delay_samples)
     if sprung:
-        require_motor_encoders(point)
-        require_assumptions(case, UNDELAYED)
+        check_motor_encoders(point)
+        check_assumptions(case, UNDELAYED)
         return sprung_range(motor, stiffness, T)
     models = [("model", "rigid"), ("model", "motor-mass")]
     raise MeasureError("has a closed form for two models only", models, True)

@@ -63,7 +63,7 @@ def fastest_sideways_motion(point: OperatingPoint) -> SidewaysMotion | None:
 
 def load_change_at(point: OperatingPoint) -> float:
     """Relative change of the largest stiffness by all of the load, in the posture under it."""
-    _require_load(point)
+    _check_load(point)
     try:
         return load_change(point)
     except NoAnswerError as error:
@@ -72,18 +72,18 @@ def load_change_at(point: OperatingPoint) -> float:
 
 def sideways_growth_at(point: OperatingPoint) -> float:
     """Growth rate of the fastest-growing motion along the surface [1/s]; 0 if none grows."""
-    _require_load(point)
+    _check_load(point)
     motion = fastest_sideways_motion(point)
     return 0.0 if motion is None else max(motion.growth_rate, 0.0)
 
 
 def sideways_force_at(point: OperatingPoint) -> float:
     """Size of the hand's force across the direction that the posture needs [N], about an axis of its moment."""
-    _require_load(point)
+    _check_load(point)
     return float(np.linalg.norm(point.equilibrium.sideways_force))
 
 
-def _require_load(point: OperatingPoint) -> None:
+def _check_load(point: OperatingPoint) -> None:
     """Raises MeasureError for a device that bears nothing."""
     if point.load is None:
         raise MeasureError("needs a load, about which the device is linearised", [("load", None)])

@@ -86,7 +86,7 @@ def loop_case(point: OperatingPoint) -> ConditionCase:
         raise MeasureError(f"has no closed form here: {error}") from None
 
 
-def require_assumptions(case: ConditionCase, *more: str) -> None:
+def check_assumptions(case: ConditionCase, *more: str) -> None:
     """Raises MeasureError, with the assumptions in words, where a loop does not meet those of the closed forms.
 
     Closed forms assume the velocity by backward difference and the force as computed; their assumption that
@@ -97,7 +97,7 @@ def require_assumptions(case: ConditionCase, *more: str) -> None:
         raise MeasureError(f"has no closed form for this loop, which breaks what it assumes: {' '.join(broken)}")
 
 
-def require_motor_encoders(point: OperatingPoint) -> None:
+def check_motor_encoders(point: OperatingPoint) -> None:
     """Raises MeasureError for encoders at the links, which do not move in a model with its link side fixed."""
     if point.mechanism is not None and point.encoders == "link":
         raise MeasureError("needs encoders at the motors; those of this device read the links")

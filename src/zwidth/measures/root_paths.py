@@ -23,7 +23,7 @@ from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.chart.verdict import BAND
 from zwidth.errors import NoAnswerError
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.result import Result
 
 # A step along a path longer than this share of its |z|, or of 1, is halved; one shorter than the second length is
@@ -159,7 +159,7 @@ def wall_paths(loop: Loop, wall_stiffness: ArrayLike, wall_damping: ArrayLike) -
     >>> [round(c.value, 6) for c in wall_paths(free, 0.5, np.linspace(0.0, 2.0, 9)).crossings]    # thesis eq. 4.14
     [0.359612, 0.359612, 1.390388, 1.390388]
     """
-    require("loop", loop, Loop)
+    check_kind("loop", loop, Loop)
     K, B = np.asarray(wall_stiffness, dtype=np.float64), np.asarray(wall_damping, dtype=np.float64)
     if K.ndim + B.ndim != 1:
         raise ValueError("one of stiffness and damping must be a list of values and the other a single number")

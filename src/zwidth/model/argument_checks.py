@@ -37,12 +37,12 @@ HINTS: Final = {
 }
 
 
-def require(name: str, value: object, kind: type[T] | tuple[type[Any], ...], hint: str = "") -> None:
+def check_kind(name: str, value: object, kind: type[T] | tuple[type[Any], ...], hint: str = "") -> None:
     """Raise TypeError unless the value is of a kind, such as "loop must be a Loop, got a Device; write ...".
 
     hint  what to type instead; "": what HINTS has for these two
 
-    >>> require("mass", "heavy", float)
+    >>> check_kind("mass", "heavy", float)
     Traceback (most recent call last):
     TypeError: mass must be a float, got the text 'heavy'
     """

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.design_axes import Number
 from zwidth.model.mechanism import Drives
 from zwidth.model.nonlinear import project_onto_motions
@@ -114,7 +114,7 @@ def repeat_tolerance(squared: Floats) -> Floats:
 
 def natural_frequencies(plant: Plant) -> Floats:
     """Undamped natural frequencies [Hz], ascending; rigid modes exactly 0, unstable ones (w^2 < 0) nan."""
-    require("plant", plant, Plant)
+    check_kind("plant", plant, Plant)
     squared, _ = undamped_modes(plant.mass, plant.stiffness)
     return np.sqrt(np.where(squared < 0.0, np.nan, squared)) / (2.0 * np.pi)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.errors import OperatorError
-from zwidth.model.argument_checks import check_choice, check_number, require
+from zwidth.model.argument_checks import check_choice, check_kind, check_number
 from zwidth.model.design_axes import Number, stack_numbers
 from zwidth.model.plant import Plant
 
@@ -69,8 +69,8 @@ def attach(plant: Plant, operator: Operator, across: Floats | None = None) -> Pl
     >>> float(attach(paddle, Operator(0.5, 500.0, 10.0)).mass[0, 0])
     0.53
     """
-    require("plant", plant, Plant)
-    require("operator", operator, Operator)
+    check_kind("plant", plant, Plant)
+    check_kind("operator", operator, Operator)
     held = _held(plant, operator)
     for motion in () if across is None else across:
         row = np.append(motion, np.zeros(held.size - plant.size))

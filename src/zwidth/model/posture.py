@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.errors import BeyondLimit, LoopOpen, OutOfReach, PostureError, Singular
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.bias import bias_batch
 from zwidth.model.continuation import (
     ASSEMBLY_TOLERANCE,
@@ -183,7 +183,7 @@ def solve_posture(
               ValueError  for an unknown assembly, an orientation that the mechanism does not control or that is no
                           rotation, or drives that do not fit the mechanism's freedom
     """
-    require("mechanism", mechanism, Mechanism)
+    check_kind("mechanism", mechanism, Mechanism)
     name = _assembly_name(mechanism, assembly)
     mech, designs = pack(mechanism), mechanism.design_shape
     target = _goals(mechanism, position, orientation)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats, Ints
 from zwidth.errors import DirectionError, ModelError
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
 from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.mechanism import Drives, Mechanism, nonlinear_of_drives
@@ -155,7 +155,7 @@ def reduce_plant(plant: Plant, model: Model) -> Plant:
     Returns  Plant; `full` gives the plant itself, and so does the model it already is
     Raises   ModelError  where the model does not apply, with the reason; for hysteresis all but `full`
     """
-    require("plant", plant, Plant)
+    check_kind("plant", plant, Plant)
     _check_model(model)
     if model != "full" and plant.hysteresis is not None:
         raise ModelError("a loss factor is charted on the full model only; leave model out")

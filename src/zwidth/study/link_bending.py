@@ -31,7 +31,7 @@ from zwidth.device.schema.beam import BeamSection
 from zwidth.errors import BeamError, ChartError, EquilibriumError, UnresolvedError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.load_effect import NONE_STABLE
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.beam_bodies import carried_body
 from zwidth.model.beam_section import beam_properties, typical_material
 from zwidth.model.beam_section import tube as tube_section
@@ -169,7 +169,7 @@ def bending(device: Device, point: OperatingPoint | None = None) -> Bending | No
              masses that are not known, or asked for in its rigid model
     Raises   what `Device.at`, and `OperatingPoint.loop` of this point raise
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     point = point or device.at()
     if device.mechanism is None or point.model == "rigid" or "dynamics" in device.missing:
         return None

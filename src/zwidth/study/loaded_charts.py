@@ -27,7 +27,7 @@ from zwidth.errors import ChartError, EquilibriumError, NoMechanismError, Postur
 from zwidth.loop.loop import SidewaysMotion
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.load_effect import NONE_STABLE, fastest_sideways_motion
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.effective_mass import screw
 from zwidth.model.equilibrium import Equilibrium
 from zwidth.model.load import HandForce, Load
@@ -216,7 +216,7 @@ def load_path(
               NoMechanismError  for a device without a mechanism
               what `Device.at` raises, but for the lack of an equilibrium; what `OperatingPoint.loop` raises
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     if not (isfinite(push) and push > 0.0):
         raise ValueError(f"push must be a positive number [N], got {push:g}")
     if count < 3 or count % 2 == 0:

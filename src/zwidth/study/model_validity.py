@@ -27,7 +27,7 @@ from zwidth.errors import ChartError, LoadError, ModelError
 from zwidth.loop.controller import Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model
@@ -141,7 +141,7 @@ def validity(point: OperatingPoint, tolerance: float = TOLERANCE) -> Validity:
     tolerance  largest e that counts as agreement
     Raises     what `OperatingPoint.plant` raises, and ChartError if the full model cannot be charted
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     full = point.in_model("full")
     chart = stability_chart(full.loop, decay=False)
     natural = natural_frequencies(full.ungripped_plant)

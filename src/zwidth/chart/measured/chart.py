@@ -53,7 +53,7 @@ from zwidth.chart.traced_edge import TracedEdge
 from zwidth.errors import ResponseError
 from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.response import CONFIDENCE, Response, joint_radius
 
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
@@ -184,8 +184,8 @@ def measured_chart(response: Response, controller: Controller) -> MeasuredChart:
     >>> chart.integrators, round(chart.stiffness_max, 5), round(chart.damping_max, 5)   # 12 - 8 sqrt 2 and 2
     (2, 0.68629, 2.0)
     """
-    require("response", response, Response)
-    require("controller", controller, Controller)
+    check_kind("response", response, Response)
+    check_kind("controller", controller, Controller)
     loop = MeasuredLoop(response, controller)
     cells, closed = _stable_regions(loop)
     if cells is None:

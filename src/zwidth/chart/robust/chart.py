@@ -30,7 +30,7 @@ from zwidth.chart.tracer import CHORD
 from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge, sides_of_circle
 from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
-from zwidth.model.argument_checks import require, wrong_type
+from zwidth.model.argument_checks import check_kind, wrong_type
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -105,7 +105,7 @@ def robust_chart(members: Sequence[Loop]) -> RobustChart:
     if not members:
         raise ValueError("a robust chart needs at least one member")
     for index, loop in enumerate(members):
-        require(f"members[{index}]", loop, Loop)
+        check_kind(f"members[{index}]", loop, Loop)
     charted, failed = chart_members(members)
     return robust_chart_of_members(charted, failed)
 

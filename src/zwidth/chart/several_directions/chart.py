@@ -33,7 +33,7 @@ from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import Verdicts, sides_of_circle, verdicts
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 
 # How closely chords follow curves, in shares of the box: at first, and before corners are solved.
 COARSE, CLOSE = 1e-3, 1e-5
@@ -203,7 +203,7 @@ def multi_chart(loop: MultiLoop) -> MultiChart:
     >>> round(chart.stiffness_max, 6), round(chart.damping_max, 6)       # the lighter mass's, thesis 4.14
     (0.686292, 2.0)
     """
-    require("loop", loop, MultiLoop, "stability_chart takes a Loop" if isinstance(loop, Loop) else "")
+    check_kind("loop", loop, MultiLoop, "stability_chart takes a Loop" if isinstance(loop, Loop) else "")
     cells = _stable_cells(loop, trace_curves(loop))
     edge = _edge(loop, cells.inside, cells.polygons)
     off = _walls_off_circle(loop, edge)

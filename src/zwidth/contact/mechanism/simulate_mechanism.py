@@ -27,10 +27,10 @@ from zwidth.contact.mechanism.rendering import rendering_inputs
 from zwidth.contact.mechanism.surfaces import Plane, Surface, depth_and_normal, packed
 from zwidth.contact.mechanism.system import System, system_of
 from zwidth.errors import ArgumentError, NoMechanismError
-from zwidth.loop.controller import Controller, refuse_feedback
+from zwidth.loop.controller import Controller, check_no_feedback
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.memory_limit import check_memory
-from zwidth.model.argument_checks import check_choice, require
+from zwidth.model.argument_checks import check_choice, check_kind
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture import OK, Posture, handle_motions, solve_posture
@@ -102,7 +102,7 @@ def simulate_mechanism(
     >>> simulate_mechanism(device.at(), wall, hollow, duration=0.1, start_velocity=device.direction()).status
     'done'
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     mechanism, posture = point.mechanism, point.posture
     if mechanism is None or posture is None:
         raise NoMechanismError
@@ -128,7 +128,7 @@ def simulate_mechanism(
     if wall is not None and surface is not None:
         environment, values = rendered_environment(wall, surface)
     controller = point.controller
-    refuse_feedback(
+    check_no_feedback(
         controller,
         "the large motion of a mechanism is not simulated",
         "simulate one rendered direction, or leave it out",

@@ -197,12 +197,12 @@ def read_record(path: str | os.PathLike[str], wanted: Columns) -> Record:
         names, wrong = wanted.choose([name.strip() for name in header])
         if wrong:
             raise fail(str(file), f"line {lines.line_num}", wrong)
-        _refuse_longer_rows(str(file), len(header), lines)
+        _check_row_lengths(str(file), len(header), lines)
         return CsvRecord(file, [name.strip() for name in header], names, wanted.text)
     raise fail(str(file), "", f"is empty; its first line must name columns: {wanted.listed}")
 
 
-def _refuse_longer_rows(label: str, width: int, lines: Any) -> None:
+def _check_row_lengths(label: str, width: int, lines: Any) -> None:
     """Raise DeviceError for the first row of a csv.reader with more cells than the header names, as decimal commas
     make them."""
     for row in lines:

@@ -54,14 +54,14 @@ def held_response(response: Response, operator: Operator, period: float) -> Resp
     period  sampling period T [s]
     Raises  ResponseError  where the handle was not measured, see `measured_port`
     """
-    _require_mass(operator)
+    _check_mass(operator)
     return hold_port(response, measured_port(response, period), operator)
 
 
 def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Response:
     """The same of a response whose port is known already. Raises OperatorError for an arm without mass behind an
     elastic grasp."""
-    _require_mass(operator)
+    _check_mass(operator)
     D = operator_stiffness(operator, port.theta / port.period)
     beyond = _aliases(port, operator)
     change = _change(port.baseband, D)
@@ -116,7 +116,7 @@ def response_of_port(response: Response, port: MeasuredPort, operator: Operator 
     )
 
 
-def _require_mass(operator: Operator) -> None:
+def _check_mass(operator: Operator) -> None:
     """Raise OperatorError for an arm without mass behind an elastic grasp."""
     if not operator.rigid_grasp and not operator.arm_mass > 0.0:
         raise OperatorError(f"an arm held by an elastic grasp needs a mass, got {operator.arm_mass:g} kg")

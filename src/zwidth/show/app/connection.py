@@ -157,7 +157,7 @@ class Connection:
         try:
             if len(message) > MOST_CHARACTERS:
                 raise ValueError(f"a message may have {LARGEST_FILE:,} characters at most")
-            content = json.loads(message, parse_constant=_refuse_constant)
+            content = json.loads(message, parse_constant=_check_constant)
             if not isinstance(content, dict):
                 raise ValueError("a message is a JSON object")
             if content.get("kind") == "shown":
@@ -221,7 +221,7 @@ def failure(number: int, kind: str, sentences: list[str], status: str) -> bytes:
     return pack_frame({"id": number, "kind": kind, "ok": False, "status": status, "sentences": sentences}, {})
 
 
-def _refuse_constant(name: str) -> Any:
+def _check_constant(name: str) -> Any:
     raise ValueError(f"numbers must be finite, got {name}")
 
 

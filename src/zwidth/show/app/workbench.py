@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Final
 
 from zwidth.device.device import Device
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.show.app.opened import changes
 from zwidth.show.app.request import State
 from zwidth.show.app.run import listen, make_server, page_address, start_of_device
@@ -39,7 +39,7 @@ class Workbench:
         Raises  BadInput  (show.cli.errors) where no port can be had; TypeError for what is no device; RuntimeError
                 where the server does not start
         """
-        require("device", device, Device)
+        check_kind("device", device, Device)
         self._device = device
         self._socket = listen("127.0.0.1", port)
         settings = Settings("127.0.0.1", self._socket.getsockname()[1], "", start_of_device(device), framed=True)

@@ -10,7 +10,7 @@ import click
 from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.options import Finite, refuse_empty
+from zwidth.show.cli.options import Finite, check_not_empty
 from zwidth.show.output import DATA
 from zwidth.show.units import NONE, amount, radius
 from zwidth.study.boundary.points_file import Walls, read_walls
@@ -34,7 +34,7 @@ class CheckCommand(Command):
         click.option(
             "--points",
             metavar="FILE.csv",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Walls: columns stiffness_N_per_m, damping_Ns_per_m.",
         ),
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of one wall [N/m]."),

@@ -11,7 +11,7 @@ import click
 
 from zwidth.errors import NoAnswerError
 from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.options import Finite, Numbers, ParamType, refuse_empty
+from zwidth.show.cli.options import Finite, Numbers, ParamType, check_not_empty
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -216,7 +216,7 @@ def environment_options() -> list[Callable[..., Any]]:
         click.option(
             "--environment",
             metavar="NAME|FILE.py:NAME",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="An environment instead of a wall: a bundled one, or one from a file of your own.",
         ),
         click.option(

@@ -16,7 +16,7 @@ import click
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Numbers, refuse_empty
+from zwidth.show.cli.options import Numbers, check_not_empty
 from zwidth.show.cli.progress import say
 from zwidth.show.units import amount
 from zwidth.study.boundary.points_file import read_points
@@ -154,7 +154,7 @@ class ExperimentCommand(Command):
         click.option(
             "--measured",
             metavar="FILE.csv",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Your own points, with columns stiffness_N_per_m, damping_Ns_per_m, and edge (lower, upper, tip) "
             "or verdict (stable, unstable); optional: damping_low_Ns_per_m, "
             "damping_high_Ns_per_m, stiffness_low_N_per_m, stiffness_high_N_per_m, trials.",
@@ -162,7 +162,7 @@ class ExperimentCommand(Command):
         click.option(
             "--resume",
             metavar="FILE",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Save finished work here; the same command continues from it.",
         ),
     )

@@ -14,7 +14,7 @@ from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, refuse_empty
+from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, check_not_empty
 from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
 from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import amount
@@ -82,7 +82,7 @@ class ExportCommand(Command):
         click.option(
             "--hands",
             metavar="A,B,C",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Operators that may hold the handle: bundled ones, files, none. Default: that of DEVICE.",
         ),
         click.option(
@@ -122,7 +122,7 @@ class ExportCommand(Command):
         click.option(
             "--arduino",
             metavar="FOLDER",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Also write a sketch that clamps its gains by the table, with the header.",
         ),
         click.option(

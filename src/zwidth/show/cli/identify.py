@@ -17,8 +17,8 @@ from zwidth.show.cli.options import (
     Finite,
     Question,
     about_a_device,
+    check_not_empty,
     example,
-    refuse_empty,
     with_settings_option,
 )
 from zwidth.show.output import destination, printable, write_text
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from zwidth.identify.identification import Estimate, Identification
 
 
-def _refuse_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+def _check_no_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
     for value in values:
-        refuse_empty(ctx, param, value)
+        check_not_empty(ctx, param, value)
     return values
 
 
 device_option = click.option(
-    "--device", metavar="DEVICE", required=True, callback=refuse_empty, help="The device that was measured."
+    "--device", metavar="DEVICE", required=True, callback=check_not_empty, help="The device that was measured."
 )
 joint_option = click.option(
     "--joint",
     metavar="NAME",
-    callback=refuse_empty,
+    callback=check_not_empty,
     help="Drive, or link whose joint it drives, that was measured. Default: the only one, or a column joint.",
 )
 
@@ -50,7 +50,7 @@ parameter_option = click.option(
     "paths",
     metavar="PATH",
     multiple=True,
-    callback=_refuse_empty_items,
+    callback=_check_no_empty_items,
     help="Number of the device file to be fitted, as --set takes it; repeatable.",
 )
 spring_option = click.option(

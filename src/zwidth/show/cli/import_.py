@@ -18,7 +18,7 @@ from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import PostureType, Question, refuse_empty
+from zwidth.show.cli.options import PostureType, Question, check_not_empty
 from zwidth.show.output import printable, write_text
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class ImportCommand(Command):
         click.option(
             "--handle",
             metavar="NAME",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Site, body or link that is the handle. Default: the only one with such a name, or the end of a "
             "single chain.",
         ),
@@ -59,7 +59,7 @@ class ImportCommand(Command):
             help="What of the handle the drives control. Default: the least that tells the posture.",
         ),
         click.option(
-            "--keyframe", metavar="NAME", callback=refuse_empty, help="Keyframe that is the reference posture."
+            "--keyframe", metavar="NAME", callback=check_not_empty, help="Keyframe that is the reference posture."
         ),
         click.option(
             "--posture",
@@ -83,7 +83,7 @@ class ImportCommand(Command):
         def with_file(file: str, **more: Any) -> int:
             return command(Question(file), **more)
 
-        return click.argument("file", metavar="FILE", callback=refuse_empty)(with_file)
+        return click.argument("file", metavar="FILE", callback=check_not_empty)(with_file)
 
     def default_output(self, question: Question) -> str:
         return (Path(question.name).stem or "device") + ENDING

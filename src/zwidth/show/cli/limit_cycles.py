@@ -14,7 +14,7 @@ from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import BoundedNumber, wall_options
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import refuse_empty
+from zwidth.show.cli.options import check_not_empty
 from zwidth.show.output import FIGURES, destination
 from zwidth.show.units import amount, as_written
 
@@ -58,7 +58,7 @@ class LimitCyclesCommand(Command):
         click.option(
             "--plane",
             metavar="FILE",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Draw the device in the friction-quantisation plane (.png .svg .pdf).",
         ),
     )

@@ -19,7 +19,14 @@ from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Finite, Numbers, ParamType, about_a_workspace, processor_option, refuse_empty
+from zwidth.show.cli.options import (
+    Finite,
+    Numbers,
+    ParamType,
+    about_a_workspace,
+    check_not_empty,
+    processor_option,
+)
 from zwidth.show.cli.resumable import check_workers, report_kept_work, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.units import amount, area_text, percent, typed, vector
@@ -110,7 +117,7 @@ class MapCommand(Command):
         click.option(
             "--measures-file",
             metavar="FILE.py",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="File with measures of your own, for --measure.",
         ),
         click.option(

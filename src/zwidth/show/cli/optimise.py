@@ -15,7 +15,7 @@ from zwidth.show.circumstances import omission_text
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Callback, refuse_empty
+from zwidth.show.cli.options import Callback, check_not_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
 from zwidth.show.output import DATA, FIGURES, printable, write_text
@@ -34,7 +34,7 @@ def _designs_option(command: Callback) -> Callback:
     option: Any = click.option(
         "--designs",
         metavar="FOLDER",
-        callback=refuse_empty,
+        callback=check_not_empty,
         help="Write a device file for each design of the front into this folder, replacing earlier ones.",
     )
     decorated: Callback = option(command)

@@ -221,7 +221,7 @@ class Finite(ParamType):
         return number
 
 
-def refuse_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+def check_not_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """A callback that refuses an empty name."""
     if value == "":
         raise click.BadParameter("is empty; give a name (is a variable of the shell not set?)")
@@ -258,7 +258,7 @@ LOAD_OPTIONS: Final = (
 )
 
 
-DEVICE: Final = click.argument("device", metavar="DEVICE", callback=refuse_empty)
+DEVICE: Final = click.argument("device", metavar="DEVICE", callback=check_not_empty)
 
 
 def about_a_device(command: Callback, loads: bool = True, device: Any = DEVICE) -> Callback:
@@ -352,7 +352,7 @@ def _with_device_options(command: Callback, device: Any, *where: Any) -> Callbac
         click.option(
             "--operator",
             metavar="NAME|FILE|none",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
             "[operator] of DEVICE.",
         ),
@@ -392,7 +392,7 @@ def _with_device_options(command: Callback, device: Any, *where: Any) -> Callbac
 
 def output_option(what: str) -> Callable[[Callback], Callback]:
     """`--output FILE`, with what its ending may be."""
-    return click.option("--output", metavar="FILE", callback=refuse_empty, help=what)
+    return click.option("--output", metavar="FILE", callback=check_not_empty, help=what)
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")

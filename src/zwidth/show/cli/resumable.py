@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.errors import BadInput, UnfinishedRun, as_option
-from zwidth.show.cli.options import Callback, Finite, refuse_empty
+from zwidth.show.cli.options import Callback, Finite, check_not_empty
 from zwidth.show.cli.progress import say, stopped_in_a_kernel
 from zwidth.show.output import printable
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 resume_option: Final = click.option(
     "--resume",
     metavar="FOLDER",
-    callback=refuse_empty,
+    callback=check_not_empty,
     help="Save finished work here; the same command continues from it.",
 )
 
@@ -42,7 +42,7 @@ def worker_options(command: Callback) -> Callback:
         click.option(
             "--cluster",
             metavar="ADDRESS",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Compute on the dask cluster whose scheduler has this address, such as tcp://192.168.1.5:8786, "
             "or 'local' for one on this computer.",
         ),

@@ -16,7 +16,7 @@ from zwidth.show.circumstances import member_text, operator_text, value_text
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import refuse_empty
+from zwidth.show.cli.options import check_not_empty
 from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
@@ -52,13 +52,13 @@ class RobustCommand(Command):
         click.option(
             "--operators",
             metavar="A,B,C",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="Operators that may hold the handle: names, files, none.",
         ),
         click.option(
             "--operator-list",
             metavar="FILE",
-            callback=refuse_empty,
+            callback=check_not_empty,
             help="File of operators that may hold the handle, one per line; # begins a comment.",
         ),
         click.option(

@@ -14,7 +14,7 @@ from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, processor_option, refuse_empty
+from zwidth.show.cli.options import Question, check_not_empty, processor_option
 from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
 from zwidth.show.units import keys_of_moments, number, printed, typed
@@ -67,7 +67,7 @@ def about_a_study(command: Callback, *, bounds: bool = False) -> Callback:
     def with_study(study: str, **more: Any) -> int:
         return command(StudyQuestion(study, bounds=bounds), **more)
 
-    return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
+    return click.argument("study", metavar="STUDY.toml", callback=check_not_empty)(with_study)
 
 
 def _omissions_of_study(device: Device, study: Study) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, refuse_empty
+from zwidth.show.cli.options import Question, check_not_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import circumstances_of_study
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
@@ -104,7 +104,7 @@ class ToleranceCommand(Command):
         def with_study(study: str, samples: int | None, seed: int | None, **more: Any) -> int:
             return command(ToleranceFile(study, samples=samples, seed=seed), **more)
 
-        return click.argument("study", metavar="STUDY.toml", callback=refuse_empty)(with_study)
+        return click.argument("study", metavar="STUDY.toml", callback=check_not_empty)(with_study)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         assert isinstance(case.question, ToleranceFile)

@@ -33,11 +33,11 @@ from zwidth.contact.boundary_experiment import (
 from zwidth.contact.hand import Hand, Reflex
 from zwidth.contact.stability_trial import StabilityTrial
 from zwidth.errors import ArgumentError, ChartError, NonlinearError
-from zwidth.loop.controller import refuse_load
+from zwidth.loop.controller import check_no_load
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.operator import Operator, attach
 from zwidth.progress import Progress
 from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint, Plan
@@ -73,11 +73,11 @@ def measure_boundary(
                  OSError       where it cannot be read or written
                  what `run_experiment` and `OperatingPoint.plant` raise
     """
-    require("point", point, OperatingPoint)
+    check_kind("point", point, OperatingPoint)
     plan = plan or Plan()
     loop = point.contact_loop
     if plan.one_sided:
-        refuse_load(loop.plant, "a boundary of one-sided walls is not measured", "measure two-sided ones")
+        check_no_load(loop.plant, "a boundary of one-sided walls is not measured", "measure two-sided ones")
     operator = None if loop.plant.handle is None else point.operator
     journal = Journal(None if file is None else Path(file), question(loop, operator, plan))
     result = run_experiment(loop, operator, plan, journal, progress, causes and bool(loop.nonlinear))

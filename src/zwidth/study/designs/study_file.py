@@ -22,11 +22,11 @@ from zwidth.device.load import from_document, in_order
 from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
-from zwidth.device.text_file import read_text, refuse_newer
+from zwidth.device.text_file import check_not_newer, read_text
 from zwidth.errors import DeviceError, FileError, as_argument
 from zwidth.measures.definition import WANTED_NUMBERS, Measure
 from zwidth.measures.user_measures import load_measures
-from zwidth.model.argument_checks import require, wrong_type
+from zwidth.model.argument_checks import check_kind, wrong_type
 from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import measure_list
 from zwidth.study.designs.study import KEYS, Study, check_study
@@ -83,7 +83,7 @@ def study_of(
     Raises  DeviceError  with all faults found
             TooLarge     where its designs would not fit into memory
     """
-    refuse_newer(document, label)
+    check_not_newer(document, label)
     if DEVICE_KEYS & document.keys() and not STUDY_KEYS & document.keys():
         raise _device_instead(label, "a device")
     faults: TableFaults = []
@@ -247,9 +247,11 @@ def study_over(
             TooLarge     where the designs would not fit into memory
             TypeError    for arguments of another kind
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     if plane is not None:
-        require("plane", plane, PlaneGrid, f"write plane_of(device, {plane!r})" if isinstance(plane, str) else "")
+        check_kind(
+            "plane", plane, PlaneGrid, f"write plane_of(device, {plane!r})" if isinstance(plane, str) else ""
+        )
     names, measures_by_name = measures_in_file(measures, user_measures)
     given = {
         "position": None if isinstance(position, Mapping) else position,

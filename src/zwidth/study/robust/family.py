@@ -23,7 +23,7 @@ from zwidth.arrays import Floats
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.robust.measured import MeasuredRobustChart, measured_robust_chart, open_edge
 from zwidth.device import address, build
-from zwidth.device.consistency import operator_inconsistencies
+from zwidth.device.consistency import operator_faults
 from zwidth.device.device import Device
 from zwidth.device.faults import Fault, KeyPath, dotted, fail, one_line, quote
 from zwidth.device.load import check, device_of_point, from_document
@@ -218,7 +218,7 @@ class Family:
             section = OperatorSection.model_validate(table)
         except ValidationError:
             return None
-        if list(operator_inconsistencies(document)):
+        if list(operator_faults(document)):
             return None
         return replace(self.operating_point, operator=build.operator(section))
 

@@ -22,7 +22,7 @@ from zwidth.chart.robust.chart import RobustChart, robust_chart_of_members
 from zwidth.chart.robust.common_chart import CommonChart
 from zwidth.chart.robust.members import Member, chart_member
 from zwidth.errors import ChartError, NoAnswerError, NonlinearError, RangeError
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.robust.family import Family, FamilyMember, build_together
@@ -198,7 +198,7 @@ def robust_study(
     >>> round(study.chart.stiffness_max, 2), study.violation.violating    # the lightest mass binds
     (68629.15, 0)
     """
-    require("family", family, Family)
+    check_kind("family", family, Family)
     progress = progress or (lambda stage, done, of: None)
     if family.operating_point.response is not None:
         return _measured_study(family, members or MEASURED_MEMBERS, unseen or MEASURED_UNSEEN, seed, progress)

@@ -35,7 +35,7 @@ from zwidth.device.numbers import number_limits, typical_size
 from zwidth.device.schema.device_file import key_unit
 from zwidth.errors import ChartError, DeviceError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress
 from zwidth.result import Result
 from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping, build_at_point
@@ -152,7 +152,7 @@ def numbers_for_goal(
             DeviceError  for a measured device, whose numbers are in its response
             what `sensitivities` raises for the device itself
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     if isinstance(goal_stiffness, bool) or not isinstance(goal_stiffness, int | float | np.number):
         raise TypeError(f"goal_stiffness must be a number [N/m], got {goal_stiffness!r}")
     goal = float(goal_stiffness)

@@ -38,7 +38,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.measured.held_response import response_of_port
 from zwidth.loop.measured.measured_port import MeasuredPort, changed_port, command_port
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.operator import Operator
 from zwidth.model.response import Response
 from zwidth.progress import Progress
@@ -77,7 +77,7 @@ def sensitivities(
     >>> [(n.path, round(n.logarithmic, 6)) for n in sensitivities(plain).numbers][:2]
     [('loop.sampling_period_s', -2.0), ('plant.mass_kg', 1.0)]
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     operating_point = point or device.at()
     device = device_of_point(device, operating_point)
     if operating_point.response is not None:

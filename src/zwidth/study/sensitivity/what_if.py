@@ -18,7 +18,7 @@ from zwidth.errors import ChartError, LoadError, ModelError
 from zwidth.loop.controller import Butterworth, Controller
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model
 
@@ -80,7 +80,7 @@ def what_if(device: Device, point: OperatingPoint | None = None) -> list[Variant
     A change that does not apply has no chart and says why; the device as described comes first and always has one.
     Raises  what `Device.at` and `OperatingPoint.plant` raise; ChartError if the device itself cannot be charted
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     point = point or device.at()
     variants = [Variant(BASE, "as described", point.loop, stability_chart(point.loop).drawn())]
     steps = [*_changes(device, point), *_models(point)]

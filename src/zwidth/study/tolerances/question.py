@@ -26,7 +26,7 @@ from zwidth.measures.definition import Measure, MeasureValues, WantedWall, Wante
 from zwidth.measures.evaluation import complete_pointwise
 from zwidth.measures.preconditions import walls_of
 from zwidth.memory_limit import check_memory
-from zwidth.model.argument_checks import require, wrong_type
+from zwidth.model.argument_checks import check_kind, wrong_type
 from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
@@ -262,7 +262,7 @@ def question_over(
             TooLarge     where the devices would not fit into memory
             TypeError    for arguments of another kind
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     names, by_name = measures_in_file(measures, user_measures)
     angles = circumstances.get("at") if isinstance(circumstances.get("at"), Mapping) else None
     given = {

@@ -124,7 +124,7 @@ def cells_of(
         )
     _check_counts(cells, 2 if flat else 3)
     if flat:
-        _refuse_third(ranges)
+        _check_plane_alone(ranges)
         lines = None if cells is None else (cells[0] + 1, cells[1] + 1)
         plane = plane_of(device, None, None, ranges[0], ranges[1], lines or (2, 2), assembly)
         low, high = np.array([plane.x[0], plane.y[0]]), np.array([plane.x[-1], plane.y[-1]])
@@ -162,7 +162,7 @@ def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:
         raise WorkspaceError(f"a table needs at least 1 cell along each axis, got {','.join(map(str, cells))}")
 
 
-def _refuse_third(ranges: Sequence[Sequence[float] | None]) -> None:
+def _check_plane_alone(ranges: Sequence[Sequence[float] | None]) -> None:
     if len(ranges) > 2 and ranges[2] is not None:
         raise WorkspaceError(
             "the handle moves in a plane, whose two axes have the ranges x and y", Advice("leave out {}", "z")

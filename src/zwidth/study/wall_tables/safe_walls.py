@@ -19,7 +19,7 @@ from zwidth.device.device import Device
 from zwidth.device.operator_choice import NOBODY
 from zwidth.errors import Advice, WorkspaceError
 from zwidth.measures.definition import OK, STATUS, Note
-from zwidth.model.argument_checks import describe_value, require, wrong_type
+from zwidth.model.argument_checks import check_kind, describe_value, wrong_type
 from zwidth.progress import Progress
 from zwidth.study.jobs.executor import run_job
 from zwidth.study.jobs.job import CellValues
@@ -110,7 +110,7 @@ def safe_walls_job(
     seed: int,
 ) -> SafeWallsJob:
     """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made."""
-    require("device", device, Device)
+    check_kind("device", device, Device)
     _check_kinds(hands, cells, ranges)
     _check_numbers(levels, directions, margin)
     if device.response is not None:

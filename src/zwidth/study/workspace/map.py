@@ -39,7 +39,7 @@ from zwidth.measures.definition import (
     WantedWall,
 )
 from zwidth.measures.evaluation import evaluate
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture_batch import shells
@@ -236,7 +236,7 @@ def map_job(
     user_measures: Mapping[str, Measure] | None = None,
 ) -> MapJob:
     """Check the arguments of `workspace_map` and return the job, for which a `Store` can be made."""
-    require("device", device, Device)
+    check_kind("device", device, Device)
     requested_measures = tuple(
         one if isinstance(one, Measure) else find_measure(one, user_measures) for one in measure_list(measures)
     )

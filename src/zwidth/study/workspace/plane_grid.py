@@ -12,7 +12,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.errors import Advice, WorkspaceError
-from zwidth.model.argument_checks import require
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.mechanism import ORIENTATION, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture import reachable_positions
@@ -89,7 +89,7 @@ def plane_of(
               DeviceError  for a device without a mechanism, or a point that is not a position
               PostureError where the assembly is singular throughout, or does not close
     """
-    require("device", device, Device)
+    check_kind("device", device, Device)
     point = device.position(through)
     mechanism = device.mechanism
     assert mechanism is not None
