@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import CHORD, PAIR, PLUS, Arc, Arcs, Wall
-from zwidth.chart.circle_sampling import NEAR_END
+from zwidth.chart.circle_sampling import MOST_SAMPLES, NEAR_END
 from zwidth.chart.corner import better_conditioned, fill_corners, solve_crossing
 from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_arcs import SAME_CORNER, add_line_arcs, fill_line_pieces, fill_pair_arcs, join_arcs
@@ -39,7 +39,6 @@ from zwidth.errors import ChartError
 from zwidth.loop.circle_factors import COMPUTER, CircleFactors, wall_with_slopes
 from zwidth.loop.loop_table import LoopTable
 
-MOST_SAMPLES: Final = 20_000
 # Steps along the curve, in shares of the distance to its nearest singularity, tried one after the other.
 SHARES: Final = (0.2, 0.1, 0.05, 0.02)
 # How far a corner may be blurred where a mode so weakly coupled that rounding hides it touches the edge.

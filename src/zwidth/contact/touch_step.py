@@ -58,6 +58,7 @@ from zwidth.contact.computer import (
 from zwidth.contact.energy_ledger import energy_of
 from zwidth.contact.engine_inputs import HeldDevice, pack_plants, start_states
 from zwidth.contact.hand import Hand
+from zwidth.contact.loop_simulation import SUBSTEPS
 from zwidth.contact.plant_step import PlantState, dot, read_sensor, step_with_frictions
 from zwidth.errors import UnmovedError
 from zwidth.loop.estimators import Foaw, Levant
@@ -271,7 +272,6 @@ def view(typing_context: Any, block: Any, start: Any, shape: Any) -> Any:
 
 INPUT_NAMES: Final = ("law", "stiffness", "damping", "wall_position", "push", "last_push")
 OUTPUT_NAMES: Final = ("reading", "truth", "velocity", "command", "handle", "handle_velocity", "energy")
-SUBSTEPS: Final = 20
 
 
 @dataclass(frozen=True)

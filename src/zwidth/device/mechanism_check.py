@@ -12,7 +12,7 @@ from zwidth.device.faults import KeyMessages, comma_list, plural
 from zwidth.device.legs import members
 from zwidth.device.schema.mechanism import MechanismSection
 from zwidth.model.continuation import assemble_batch
-from zwidth.model.handle_position import constraints
+from zwidth.model.handle_position import NEARBY, constraints
 from zwidth.model.inertia import joint_axes, joint_mass_matrix
 from zwidth.model.mechanism import FIXED, POSE, PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
@@ -20,7 +20,6 @@ from zwidth.model.mechanism_arrays import MechanismArrays, pack
 CLOSED: Final = 1e-9  # gap of a closed loop, relative to the mechanism's size
 RANK_TOLERANCE: Final = 1e-7  # of singular values, relative to the largest
 RESTARTS: Final = 30  # random postures tried before a loop is said not to close
-NEARBY: Final = 0.05  # how far joints turn to a posture that is not special [rad]
 INDEPENDENT: Final = 1e-6  # share of the largest motion, below which a joint follows from others
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes are parallel
 MOVING: Final = 1e-6  # share of the largest part of a motion, below which a joint rests in it

@@ -27,15 +27,14 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Flags, Floats, Ints
+from zwidth.chart.measured.loop import BETWEEN
+from zwidth.chart.measured.response_interpolation import FEWEST, MIRRORED
 from zwidth.guarantees.disks import Disks
 
-BETWEEN: Final = 2.0  # times the error that interpolation is expected to leave: what is allowed for
 FORM_SIGNS: Final = np.array([1.0, 1.0, -1.0, 1.0])  # of n0, Re n1, Im n1, n2 at mirrored angles
 CENTRES: Final = 3  # kinds of interpolated centres
 GROWTH: Final = 1.5  # from node to node, of those that tell the disks below the lowest angle
 OUTSIDE: Final = 5.0  # times as much below the lowest angle, where a resonance may lie
-MIRRORED: Final = 3  # angles repeated beyond either end
-FEWEST: Final = 6  # angles
 PAIR: Final = 0.05  # of both gaps beside it, below which a gap is that of two angles which count as one
 BELOW: Final = 1.0 / 64.0  # of the lowest angle: how far down the disks are followed
 KEPT: Final = 0.25  # share of n0 that each error may take off it at most; the rest comes off n2

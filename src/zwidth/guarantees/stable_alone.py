@@ -18,6 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from zwidth.arrays import Floats
+from zwidth.chart.verdict import BAND
 from zwidth.guarantees.port import port
 from zwidth.loop.closed_plant import close_plant, zero_poles
 from zwidth.loop.loop import Loop
@@ -32,7 +33,6 @@ SIGN: Final = 1e-10
 # The same of the damping along a motion: dampers that are written down singular have eigenvalues of -1e-16.
 DAMPS: Final = 1e-12
 # Half-width of the band about the unit circle within which a root is not told from one on it, as for walls.
-BAND: Final = 1e-9
 ROUNDING: Final = 1e-15  # of a computed root, in units of its own condition number and of the matrix
 
 

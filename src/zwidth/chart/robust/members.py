@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from zwidth.arrays import Floats
-from zwidth.chart.arcs import MINUS, PLUS, signed_area
+from zwidth.chart.arcs import MINUS, PLUS, ROUNDING_AREA, signed_area
 from zwidth.chart.hurwitz import all_roots_inside, work_array
 from zwidth.chart.loop_edge import trace_edge
 from zwidth.chart.traced_edge import TracedEdge
@@ -20,8 +20,6 @@ from zwidth.chart.tracer import ROOTS, Tracer
 from zwidth.errors import ChartError, UnmovedError
 from zwidth.loop.loop import Loop
 
-# Parts of a polygon smaller than this share of it are rounding.
-ROUNDING_AREA = 1e-12
 # Share of an arc's first and last chord that is left out of intersections: there it touches its neighbours.
 TRIM = 1e-7
 # An eigenvalue this far outside the circle is outside.

@@ -8,10 +8,10 @@ from pydantic import Discriminator, Field, Strict, Tag, ValidationInfo, field_va
 
 from zwidth.device.schema.value_types import Number, Section, WholeNumber, documented_key
 from zwidth.loop.estimators import METHODS
+from zwidth.loop.estimators.foaw import LONGEST_WINDOW
 
 HIGHEST_DEGREE: Final = 10  # of a Savitzky-Golay polynomial
 HIGHEST_ORDER: Final = 20  # of a Butterworth filter; each adds a state to the loop
-LONGEST_WINDOW: Final = 100  # samples; each adds a state to the loop, and a chart with more takes minutes
 DEFAULT_METHOD: Final = "backward-difference"
 
 

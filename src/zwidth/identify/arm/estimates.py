@@ -40,12 +40,12 @@ from zwidth.device.device import Device
 from zwidth.identify.arm.parameters import BaseParameters, Parameters
 from zwidth.identify.arm.regression import Regression
 from zwidth.identify.identification import Estimate
+from zwidth.identify.profile_likelihood import LEVEL
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.effective_mass import lever_arms, screw
 from zwidth.model.inertia_regressor import PARAMETERS, inertia_regressor
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 
-LEVEL: Final = 0.95
 DIGITS: Final = 12  # of numbers written into a device file
 
 

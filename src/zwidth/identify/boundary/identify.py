@@ -20,6 +20,7 @@ from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, fail, plural
 from zwidth.errors import DeviceError
 from zwidth.identify.boundary.checks import (
+    MOST_NAMED,
     check_circumstances,
     check_explained,
     check_file_period,
@@ -56,7 +57,6 @@ NOTHING: Final = 1e-9  # change of the points, in units of the scatter, that a n
 OUTLIER: Final = 4.0  # standard deviations
 ROUNDING: Final = 1e-6  # standard deviations, below which nothing is an outlier
 FEWEST_VALIDATED: Final = 6  # points on the boundary
-MOST_NAMED: Final = 3
 MOST_LOST_NAMED: Final = 12  # points without an edge in trials
 
 

@@ -19,9 +19,9 @@ import numpy as np
 from zwidth.arrays import Complexes, Floats
 from zwidth.identify.records.record import Piece
 from zwidth.identify.records.sampling import joined
+from zwidth.model.local_polynomials import ORDER
 
 HALF: Final = 4  # of a window, in spacings of the transform
-ORDER: Final = 2  # of both polynomials
 STRIDE: Final = 2  # spacings from one window to the next
 TERMS: Final = ORDER + 1
 KEPT: Final = 2 * HALF + 1 - TERMS  # values that a segment keeps of a window

@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, neighbouring_lines
+from zwidth.identify.profile_likelihood import LEVEL
 from zwidth.identify.records.record import Piece, Record
 from zwidth.identify.records.sampling import SampleTimes, joined
 
 FORCE, POSITION = "force", "position"
-LEVEL: Final = 0.95
 FEWEST_LINES: Final = 8  # frequencies for a fit
 KEPT_POWERS: Final = 3  # of s, that are stated: stiffness, damping, mass
 BACK: Final = 0.45  # share of the highest frequency at which a fit still holds, up to which it is made

@@ -16,8 +16,8 @@ import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.identify.joint.motion import follow_windows
+from zwidth.identify.profile_likelihood import LEVEL
 
-LEVEL: Final = 0.95
 MASS, STIFFNESS = 0, 5  # indices among the numbers
 DELAY: Final = 6  # index of the force's delay behind the six numbers of the motion
 DRIFTS: Final = (7, 8, 9)  # indices of the bias's drift: even, bent and S-shaped

@@ -27,20 +27,11 @@ import numpy as np
 from zwidth.arrays import Flags, Floats
 from zwidth.device.faults import comma_list, plural
 from zwidth.identify.identification import Check
-from zwidth.identify.joint.fit import (
-    COUNT,
-    LEVEL,
-    MASS,
-    ONE,
-    STIFFNESS,
-    JointNumbers,
-    Windows,
-    explained,
-    squares_of,
-)
+from zwidth.identify.joint.fit import COUNT, MASS, ONE, STIFFNESS, JointNumbers, Windows, explained, squares_of
 from zwidth.identify.joint.joint import Joint
 from zwidth.identify.joint.record import JointMotion
 from zwidth.identify.joint.start import MOVING, PARTLY, SHORTEST, force_balance_rows, search_guess, weighting
+from zwidth.identify.profile_likelihood import LEVEL
 from zwidth.identify.records.record import Record
 
 BY_CHANCE: Final = 5e-4  # probability that noise alone passes for a mass: a larger one tells masses that are none

@@ -46,6 +46,7 @@ from zwidth.identify.modes.local_response import (
 )
 from zwidth.identify.modes.modal_fit import (
     MOST_MODES,
+    STRONG,
     ModalFit,
     fit_modes,
     modal_intervals,
@@ -79,7 +80,6 @@ COLUMNS: Final = Columns(
     ("reference_N", "reference_Nm", "command_N", "command_Nm"),
 )
 MOST_ROUNDS: Final = 8
-STRONG: Final = 10.0  # difference of the information criterion that is clear (Kass and Raftery 1995)
 SHIFTED: Final = -0.5  # samples of delay, below which nothing more is fitted
 MISFIT: Final = 1.5  # by which residuals may exceed the noise before a model is said to miss something
 FOLLOWED: Final = 0.97  # share of the unseen motion that follows a force with flat tops, if it is what acted

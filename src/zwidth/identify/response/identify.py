@@ -21,6 +21,7 @@ from zwidth.device.device import Device
 from zwidth.errors import ResponseError
 from zwidth.identify.identification import Check, Estimate, Identification, refused
 from zwidth.identify.modes.checks import FACTORS_LINEAR, NEAR, flip_check, order_check
+from zwidth.identify.modes.identify import FEW_LEVELS
 from zwidth.identify.modes.model import sampled_response
 from zwidth.identify.records.record import Columns, Record
 from zwidth.identify.records.sampling import SampleTimes, check_sampling
@@ -37,7 +38,6 @@ FIT_SHARE: Final = 2.0 / 3.0  # of each record, its beginning; the rest is predi
 FEWEST_COUNTS: Final = 10.0  # of the motion
 LIMITED: Final = 0.05  # share of the samples at the largest and the smallest force, from which on it was clipped
 FIRST_LEVELS: Final = 100_000  # samples among which the force's levels are counted
-FEW_LEVELS: Final = 8  # of a force that steps between levels on purpose
 FEWEST_USABLE: Final = 0.2  # share of the frequencies
 UNKNOWN_BELOW: Final = 10.0  # times the lowest frequency: from there on a free device does not show as one
 

@@ -28,7 +28,7 @@ from zwidth.errors import PostureError
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.plant import Plant
 from zwidth.model.posture import Posture, link_points, solve_posture
-from zwidth.show.figures.contact_response import LONGEST_LINE, draw_envelope, draw_line
+from zwidth.show.figures.contact_response import LONGEST_LINE, WORTH, draw_envelope, draw_line
 from zwidth.show.figures.style import (
     BLACK,
     BLUE,
@@ -58,7 +58,6 @@ GRID: Final = 801  # points across a drawing at which a surface's depth is compu
 FILLED: Final = 1.0  # widths of the view that a wall is drawn beyond it: equal scales show more of one axis
 NEAR: Final = 1e-6  # rad, by which a posture found again may differ; share of a place that is no motion
 LEAST: Final = 1e-3  # share of the mechanism's size that a close-up shows at least
-WORTH: Final = 1e-3  # share of the largest energy below which an entry is no line
 ROOM: Final = 0.12
 TITLE: Final = 60  # letters of a line
 LINK_COLOURS: Final = tuple(colour for colour, _ in LINES if colour != VERMILION)  # which is the path's

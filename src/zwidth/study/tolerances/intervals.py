@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats
+from zwidth.model.response import CONFIDENCE
 
-CONFIDENCE: Final = 0.95  # of every interval
 OUTSIDE: Final = 0.5 * (1.0 - CONFIDENCE)  # on either side of one
 SPAN: Final = 1.959963984540054  # standard deviations of a normal distribution within it
 

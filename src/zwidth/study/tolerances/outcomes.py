@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Flags, Floats
 from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
+from zwidth.model.response import CONFIDENCE
 from zwidth.study.designs.column import Column
 from zwidth.study.jobs.job import CellValues
-from zwidth.study.tolerances.intervals import CONFIDENCE, Interval, quantile_interval
+from zwidth.study.tolerances.intervals import Interval, quantile_interval
 from zwidth.study.tolerances.question import WALL_IS_STABLE
 
 STABLE, UNSTABLE = "stable", "unstable"  # outcomes of the wanted wall; the others are a status in words

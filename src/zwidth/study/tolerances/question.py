@@ -32,6 +32,7 @@ from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
 from zwidth.study.designs.study import Study, check_study
 from zwidth.study.designs.study_file import measures_in_file, plain_value, read_document, study_of
+from zwidth.study.designs.sweep_data import PER_VALUE
 from zwidth.study.tolerances.distribution import Tolerance
 from zwidth.study.tolerances.intervals import draws_needed
 from zwidth.study.tolerances.tolerance_tables import tolerances_of
@@ -44,7 +45,6 @@ INDEX_SAMPLES: Final = 512
 LEAST_INDEX_SAMPLES: Final = 32
 QUANTILES: Final = (5.0, 50.0, 95.0)
 SEED: Final = 1
-PER_VALUE: Final = 3  # numbers of memory for each value: the value, its status, and a copy
 PER_NUMBER: Final = 12  # numbers of memory for each number of a device that differs
 PER_CHART: Final = 16000  # numbers of memory for the edge of each drawn device on some 600 lines of the bands
 STIFFEST: Final = "stiffness_max"  # is asked of every device, whether the study names it or not
