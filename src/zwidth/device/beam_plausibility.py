@@ -50,6 +50,7 @@ def beam_faults(mechanism: dict[str, Any]) -> KeyMessages:
 
 
 def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
+    """What is wrong between the keys of one link with a [beam]: length, joint, section or stiffnesses, modes."""
     beam, at = table(link, "beam"), (*place, "beam")
     length = link.get("length_m", 0.0)
     if is_number(length) and not length > 0.0:

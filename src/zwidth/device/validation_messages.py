@@ -98,6 +98,10 @@ def _where(detail: ErrorDetails, document: Any) -> KeyPath:
 
 
 def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
+    """What pydantic found as a sentence after the key: what it must be, what came.
+
+    about  what the key means, with a separator; "" where it is known
+    """
     kind, got = detail["type"], detail["input"]
     limits: Mapping[str, Any] = detail.get("ctx", {})
     match kind:

@@ -438,6 +438,11 @@ class _Work:
         band: TorqueBand,
         validation: Sequence[Compared],
     ) -> ArmIdentification:
+        """The result of a fit: numbers of the links nearest to the file's with the base parameters found, masses
+        along the directions, friction and delay with their intervals, and the checks of the unseen part.
+
+        beta  (b,) base parameters;   validation  unseen records beside what the fit makes of their motion
+        """
         links = consistent_links(base, self.mechanism, beta, fit.information)
         values = np.zeros(len(base.parameters.names))
         values[list(base.kept)] = beta

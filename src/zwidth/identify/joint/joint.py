@@ -131,6 +131,10 @@ def joint_of(device: Device, name: str | int | None = None) -> Joint:
 
 
 def _of_plant(device: Device, name: str | None) -> Joint:
+    """The coordinate of a plant given by its matrices, by its number; of a measured response a joint without keys.
+
+    Raises  DeviceError  where the number is missing or no coordinate's
+    """
     plant = device.given_plant
     if plant is None:
         remark = "the device is a measured response, whose file has no key for friction or mass"

@@ -194,6 +194,8 @@ class _Seen:
 def _saw(
     device: Device, point: OperatingPoint, sources: Sequence[Source], survey: Survey, estimator: Estimator | None
 ) -> _Seen:
+    """Checks of each record before anything is fitted (levels, excitation, steps of the encoder, force limits),
+    and what of it may be fitted."""
     checks = list[Check]()
     nothing = np.zeros(0)
     given = device.document.get("loop", {}).get("encoder", {}).get("resolution_m", 0.0)
@@ -268,6 +270,11 @@ def _fitted(
     survey: Survey,
     seen: _Seen,
 ) -> Identification:
+    """What the records identify: modes fitted to the seen part in bands about their poles, the device's numbers
+    fitted to the same response, each with its interval, and the check on the part that no fit has seen.
+
+    pilot  modes fitted to a coarse response, which say where the bands lie; they are laid anew until poles stay
+    """
     modal = pilot
     for _ in range(MOST_ROUNDS):
         before = modal.poles

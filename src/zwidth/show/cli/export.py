@@ -194,6 +194,8 @@ class ExportCommand(Command):
         return False  # which `compute` refuses
 
     def compute(self, case: CommandLine) -> SafeWalls:
+        """The table of safe walls, continued from its store where there is one. Raises NoAnswerError where no cell
+        has a safe wall."""
         from zwidth.errors import TooLarge, WorkspaceError
         from zwidth.study.wall_tables.safe_walls import compute_table, safe_walls_job
 
