@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any, Final
 
 START: Final = (
-    "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from zwidth.show.app.worker import work; work()"
+    "import sys, json; sys.path[:] = json.loads(sys.argv[1]); "
+    "from zwidth.show.app.worker import compute_answers; compute_answers()"
 )
 LENGTH: Final = 8  # bytes of the number that a message's length is
 MOST_SPARES: Final = 2  # as many as one page has; each more would hold 150 MB for pages that may never open
