@@ -485,19 +485,37 @@ def moved_arcs(
     # at z = 1 the curve ends where it did, as steady forces are the same; at z = -1 it ends on the moved line
     last = np.flatnonzero((before & (end > np.pi - NEAREST)) | (after & (arcs.start[following] > np.pi - NEAREST)))
     corner[last] = np.column_stack(curve.walls(np.full(len(last), np.pi - NEAREST))) if len(last) else corner[last]
-    crossed = np.flatnonzero(~before & ~after & (arcs.kind != arcs.kind[following]))
+    _move_line_corners(corner, arcs, lines)
+
+    if not found or _differ_from(arcs, start, end, corner, size):
+        return None
+    first = np.empty_like(corner)
+    first[following] = corner
+    return MovedArcs(first, corner, start, end)
+
+
+def _move_line_corners(corner: Floats, arcs: Arcs, lines: dict[int, tuple[float, float]]) -> None:
+    """Move, in place, those of the arcs' last walls (n, 2) [N/m, N s/m] at which the lines of real roots cross.
+
+    lines  as in `moved_arcs`
+    """
+    before, after = arcs.kind == PAIR, arcs.kind[arcs.next_arc] == PAIR
+    crossed = np.flatnonzero(~before & ~after & (arcs.kind != arcs.kind[arcs.next_arc]))
     if len(crossed):
         (h0, w0), (h1, w1) = lines[PLUS], lines[MINUS]
         B = (h1 - h0) / (w1 - w0)
         corner[crossed] = h0 - B * w0, B
 
+
+def _differ_from(arcs: Arcs, start: Floats, end: Floats, corner: Floats, size: Floats) -> bool:
+    """Return whether moved arcs differ from the former ones: a corner is far from its former place or is nan, or
+    an arc of a pair of roots runs backwards.
+
+    start, end  (n,) moved angles [rad];   corner  (n, 2) moved last walls, size (2,) of the edge [N/m, N s/m]
+    """
     ahead = np.sign(arcs.end - arcs.start) == np.sign(end - start)
     far = not np.all(np.abs(corner - arcs.last) < FARTHEST * size)  # true of nan, too
-    if not found or far or not np.all(ahead[before]):
-        return None
-    first = np.empty_like(corner)
-    first[following] = corner
-    return MovedArcs(first, corner, start, end)
+    return far or not np.all(ahead[arcs.kind == PAIR])
 
 
 def _inner(angles: Floats) -> Flags:

@@ -117,6 +117,21 @@ def find_stable_walls(
     more = _largest_stiffnesses(trial, between, 0.5 * tops, FIRST_ZOOM, within, levels=COARSE)
     columns = sorted({*columns, *(column for column in more if column[1] > 0.0)})
     reach, best = max(B for B, _, _ in columns), max(columns, key=lambda column: column[1])
+    best = _close_in(trial, box, columns, best, tell)
+    return StableExtent(best[1], best[0], reach, best[2])
+
+
+def _close_in(
+    trial: StabilityTrial, box: SearchWindow | None, columns: list[_Column], best: _Column, tell: Progress
+) -> _Column:
+    """Close in on the tip, from the best of some columns, by rounds of dampings ever closer together.
+
+    columns  by damping, best one of them; the list is changed
+    tell     called with the number of steps done, and of all six
+    Returns  damping [N s/m] and largest stable stiffness [N/m] of the tip, and whether an unstable wall was found
+    Raises   NoAnswerError  where, seen for longer, none of the columns is stable
+    """
+    within = _within(box)
     zoom = 0
     while zoom < ZOOMS and best[2]:
         index = columns.index(best)
@@ -139,7 +154,7 @@ def find_stable_walls(
         columns = sorted({low, *fresh, high})
         zoom += 1
         tell(zoom + 2, ZOOMS + 2)
-    return StableExtent(best[1], best[0], reach, best[2])
+    return best
 
 
 # damping, largest stable stiffness, whether an unstable one was found

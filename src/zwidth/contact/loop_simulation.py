@@ -125,20 +125,11 @@ def simulate_batch(
         substeps = 1
     plants = pack_plants(held_devices, substeps)
     fine = S * int(plants.substeps.sum(axis=1).max()) if trail else 0
-    check_memory(
-        m * float(S * (TRACES + (ENTRIES if ledger else 0)) + fine),
-        f"{m} run{'s' * (m > 1)} of {S} samples",
-        "simulate a shorter time, or fewer runs at once",
-    )
+    _check_memory(m, S, fine, ledger)
     controllers = [held_device.loop.controller for held_device in held_devices]
     own = computers(controllers, [held_device.limit for held_device in held_devices])
     feedback = feedback_arrays(controllers, reading_rows(held_devices, plants))
-    records = Records(
-        np.zeros(m, dtype=np.int64),
-        np.full((m, S, TRACES), np.nan),
-        np.full((m, fine), np.nan),
-        np.zeros((m, S if ledger else 0, ENTRIES)),
-    )
+    records = _empty_records(m, S, fine, ledger)
     members = _members(runs, held_devices, index, plants)
     with watched(progress, "simulating", lambda: int(records.samples.sum()), int(samples.sum())):
         in_chunks(partial(run_several, plants, own, feedback, members, samples, environment.address, records), m)
@@ -148,6 +139,26 @@ def simulate_batch(
         )
         for i, run in enumerate(runs)
     ]
+
+
+def _check_memory(m: int, S: int, fine: int, ledger: bool) -> None:
+    """Raise TooLarge where the records of m runs of S samples do not fit into memory; see `_empty_records`."""
+    check_memory(
+        m * float(S * (TRACES + (ENTRIES if ledger else 0)) + fine),
+        f"{m} run{'s' * (m > 1)} of {S} samples",
+        "simulate a shorter time, or fewer runs at once",
+    )
+
+
+def _empty_records(m: int, S: int, fine: int, ledger: bool) -> Records:
+    """Return records of m runs, of S samples and `fine` handle positions each, with energies where `ledger` is
+    set: samples done (m,), traces (m, S, TRACES), positions (m, fine), energies (m, S or 0, ENTRIES)."""
+    return Records(
+        np.zeros(m, dtype=np.int64),
+        np.full((m, S, TRACES), np.nan),
+        np.full((m, fine), np.nan),
+        np.zeros((m, S if ledger else 0, ENTRIES)),
+    )
 
 
 def _plan(

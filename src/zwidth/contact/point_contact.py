@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.contact.contact_simulation import (
     ContactSimulation,
+    PredictedGrowth,
     RangeExit,
     RunLength,
     bound_of_run,
@@ -30,7 +31,7 @@ from zwidth.contact.environments.environment import Environment
 from zwidth.contact.hand import Hand, Reach, Reflex, Tremor
 from zwidth.contact.loop_simulation import SUBSTEPS, Run, simulate_batch
 from zwidth.contact.passivity_controller import PassivityController
-from zwidth.contact.time_response import TimeResponse, judge_response
+from zwidth.contact.time_response import Judgement, TimeResponse, judge_response
 from zwidth.errors import ArgumentError, NoAnswerError, PostureError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_choice, check_kind, check_number
@@ -112,76 +113,143 @@ def simulate_contact(
       501 samples, 0.5 s
     """
     check_kind("point", point, OperatingPoint)
-    if point.response is not None:
-        from zwidth.chart.measured.chart import modelled_point
-
-        point = modelled_point(point)
+    point = _with_model(point)
     _check_numbers(wall_position, start_position, start_velocity, duration, seed)
-    parameters = parameters or {}
-    if point.load is not None:
-        wall, environment, parameters = _under_load(point, wall, environment, parameters)
-    touched, values = environment_with_values(
-        _wall_or(environment, wall, has_stiffness=stiffness is not None or "stiffness" in parameters),
-        parameters,
-        stiffness=stiffness,
-        damping=damping,
-        no_pull=no_pull,
-    )
+    chosen, given = _chosen_environment(point, wall, environment, parameters or {}, stiffness)
+    touched, values = environment_with_values(chosen, given, stiffness=stiffness, damping=damping, no_pull=no_pull)
     arm = point.operator if point.ungripped_plant.handle is not None else None
     hand = active_hand(arm, touched.surface, push, ramp, tremor, reach, reflex)
-    if start_position is None:
-        start_position = wall_position + (-DEPTH if touched.surface else DEPTH)
-    _distance_from_path(point, wall_position, "wall_position")
-    off_path = _distance_from_path(point, start_position, "start_position")
-    loop = point.contact_loop
-    growth = predicted_growth(point.loop, touched, values)
-    run = Run(
-        loop,
-        values,
-        hand=hand,
-        start_position=start_position,
-        start_velocity=start_velocity,
-        wall_position=wall_position,
-        seed=seed,
-        bound=bound_of_run(abs(start_position - wall_position), growth.per_sample),
-    )
+    start, off_path = _start_and_distance(point, touched.surface, wall_position, start_position)
+    loop, growth = point.contact_loop, predicted_growth(point.loop, touched, values)
+    bound = bound_of_run(abs(start - wall_position), growth.per_sample)
+    run = Run(loop, values, hand, start, start_velocity, wall_position=wall_position, seed=seed, bound=bound)
+    contact = _Contact(point, touched, run, off_path, growth, substeps)
+    return _simulate(contact, passivity_damping, duration, trail, seconds_to_hear, progress)
+
+
+class _Contact(NamedTuple):
+    """What is simulated of one contact.
+
+    run                 of the device without a passivity controller
+    distance_from_path  how far from the start the handle's path passes [m]; None for a device without a mechanism
+    growth              predicted;   substeps  between samples, as requested
+    """
+
+    point: OperatingPoint
+    environment: Environment
+    run: Run
+    distance_from_path: float | None
+    growth: PredictedGrowth
+    substeps: int
+
+
+def _simulate(
+    contact: _Contact,
+    passivity_damping: float | None,
+    duration: float | None,
+    trail: bool,
+    seconds_to_hear: Callable[[float], float] | None,
+    progress: Progress | None,
+) -> ContactSimulation:
+    """Simulate a contact, with a passivity controller [N s/m] also without it, and judge the motion.
+
+    The other arguments, and what is raised, are those of `simulate_contact`.
+    """
+    run, touched = contact.run, contact.environment
     runs = [run]
     if passivity_damping is not None:
         runs.insert(0, replace(run, passivity=PassivityController(passivity_damping)))
     controlled = len(runs) > 1
-    substeps = needed_substeps(loop, hand, substeps)
+    substeps = needed_substeps(run.loop, run.hand, contact.substeps)
     simulate = partial(
         simulate_batch, runs, touched, substeps=substeps, trail=trail, ledger=True, progress=progress
     )
-    if duration is not None:
-        length = RunLength(duration, "as requested")
-        responses = simulate(duration=duration)
-    else:
-        length = contact_run_length(loop, hand, growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
-        length, responses = _long_enough(simulate, length, loop.period, seconds_to_hear)
+    length, responses = _length_and_responses(contact, simulate, duration, controlled, seconds_to_hear)
     _check_forces(responses, touched)
-    drifts = is_pushed_on(point.loop, touched, values, hand)
-    judgement = judge_response(responses[0], drifts=drifts)
-    if judgement.behaviour == "converged" and growth.decays is False and not _is_disturbed(responses[0]):
-        # a device that nothing disturbs stays at rest on an unstable wall, too
-        judgement = replace(judgement, behaviour="undecided")
     return ContactSimulation(
-        point=point,
+        point=contact.point,
         environment=touched,
-        values=values,
-        hand=hand,
-        start_position=start_position,
-        start_velocity=start_velocity,
-        distance_from_path=off_path,
-        predicted_growth=growth.per_sample,
+        values=run.values,
+        hand=run.hand,
+        start_position=run.start_position,
+        start_velocity=run.start_velocity,
+        distance_from_path=contact.distance_from_path,
+        predicted_growth=contact.growth.per_sample,
         length=length,
         substeps=substeps,
-        seed=seed,
+        seed=run.seed,
         response=responses[0],
-        judgement=judgement,
-        range_exit=range_exit(point, responses[0]),
+        judgement=_judgement(contact, responses[0]),
+        range_exit=range_exit(contact.point, responses[0]),
         uncontrolled=responses[1] if controlled else None,
     )
+
+
+def _length_and_responses(
+    contact: _Contact,
+    simulate: Callable[..., list[TimeResponse]],
+    duration: float | None,
+    controlled: bool,
+    seconds_to_hear: Callable[[float], float] | None,
+) -> tuple[RunLength, list[TimeResponse]]:
+    """Simulate for the requested duration [s], or for one that shows the motion; return it with the responses."""
+    if duration is not None:
+        length = RunLength(duration, "as requested")
+        return length, simulate(duration=duration)
+    loop, hand = contact.run.loop, contact.run.hand
+    length = contact_run_length(loop, hand, contact.growth, controlled=controlled, seconds_to_hear=seconds_to_hear)
+    return _long_enough(simulate, length, loop.period, seconds_to_hear)
+
+
+def _judgement(contact: _Contact, response: TimeResponse) -> Judgement:
+    """Judge a motion; undecided where nothing disturbs a device at rest on a wall that is predicted unstable."""
+    drifts = is_pushed_on(contact.point.loop, contact.environment, contact.run.values, contact.run.hand)
+    judgement = judge_response(response, drifts=drifts)
+    if judgement.behaviour == "converged" and contact.growth.decays is False and not _is_disturbed(response):
+        # a device that nothing disturbs stays at rest on an unstable wall, too
+        judgement = replace(judgement, behaviour="undecided")
+    return judgement
+
+
+def _with_model(point: OperatingPoint) -> OperatingPoint:
+    """Return a measured device's operating point with the model fitted to its response; any other as it is."""
+    if point.response is None:
+        return point
+    from zwidth.chart.measured.chart import modelled_point
+
+    return modelled_point(point)
+
+
+def _chosen_environment(
+    point: OperatingPoint,
+    wall: WallSides,
+    environment: str | Environment | None,
+    parameters: Mapping[str, float],
+    stiffness: float | None,
+) -> tuple[str | Environment, Mapping[str, float]]:
+    """Choose what is touched, under load the wall that holds the load; return it with its parameters by name.
+
+    Raises  ArgumentError  as `_under_load` and `_wall_or` do
+    """
+    if point.load is not None:
+        wall, environment, parameters = _under_load(point, wall, environment, parameters)
+    has_stiffness = stiffness is not None or "stiffness" in parameters
+    return _wall_or(environment, wall, has_stiffness=has_stiffness), parameters
+
+
+def _start_and_distance(
+    point: OperatingPoint, surface: bool, wall_position: float, start_position: float | None
+) -> tuple[float, float | None]:
+    """Return the start of the reading [m], and how far from it the handle's path passes [m], None for a device
+    without a mechanism.
+
+    surface  whether what is touched has one, outside of which the start is then by default
+    Raises   ArgumentError  where the handle cannot be moved to the wall, or to the start
+    """
+    if start_position is None:
+        start_position = wall_position + (-DEPTH if surface else DEPTH)
+    _distance_from_path(point, wall_position, "wall_position")
+    return start_position, _distance_from_path(point, start_position, "start_position")
 
 
 def _is_disturbed(response: TimeResponse) -> bool:

@@ -48,6 +48,7 @@ from zwidth.contact.computer import (
     TRUTH,
     VELOCITY,
     Computer,
+    Computers,
     PlantArrays,
     Signals,
     arrived_command,
@@ -344,24 +345,7 @@ def touch_numbers(
     w, k, f = int(computer.window_size[0]), int(computer.estimator_size[0]), int(computer.filter_size[0])
     delay = int(computer.delay[0])
     sizes[:] = held.modal_plant.size, N, E, P, C, delay, w, k, f
-    numbers = (
-        computer.period,
-        computer.limit,
-        plants.transition,
-        plants.inputs,
-        plants.length,
-        plants.numbers,
-        plants.sensor,
-        plants.handle,
-        plants.channel,
-        plants.step,
-        plants.weight,
-        plants.noise,
-        plants.energy,
-        computer.window[:, :w],
-        computer.estimator[:, :k],
-        computer.filter[:, :f],
-    )
+    numbers = _block_factors(plants, computer, w, k, f)
     memory = np.zeros(STATES_AT + 3 * R + E + w + 2 * k + 2 * f + delay + 2)
     memory[STATES_AT : STATES_AT + R] = start
     names = loop.plant.names or tuple(f"coordinate {i + 1}" for i in range(loop.plant.size))
@@ -378,6 +362,31 @@ def touch_numbers(
         coordinates=held.shapes,
         names=names + ("arm",) * (held.attached_plant.size - loop.plant.size),
         arm=arm_spring(operator),
+    )
+
+
+def _block_factors(plants: PlantArrays, computer: Computers, w: int, k: int, f: int) -> tuple[Floats, ...]:
+    """Return the arrays of the block `numbers`, in the order in which `touch_of` reads it.
+
+    w, k, f  weights of the velocity's window, factors of the estimate and of the force filter that are in use
+    """
+    return (
+        computer.period,
+        computer.limit,
+        plants.transition,
+        plants.inputs,
+        plants.length,
+        plants.numbers,
+        plants.sensor,
+        plants.handle,
+        plants.channel,
+        plants.step,
+        plants.weight,
+        plants.noise,
+        plants.energy,
+        computer.window[:, :w],
+        computer.estimator[:, :k],
+        computer.filter[:, :f],
     )
 
 

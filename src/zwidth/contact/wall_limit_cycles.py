@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, log, nan, pi
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -96,22 +96,14 @@ def predict_limit_cycles(
     check_number("damping", damping, "N s/m")
     loop, K, B = point.loop, stiffness, damping
     balance = harmonic_balance(loop, K, B, offset=offset, largest_motion=largest_motion(point), progress=progress)
-    cycles, by = balance.cycles, BY_FIRST
-    if parts == ("the force limit",):
-        cycles, by = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
-    runs: list[list[SimulatedVibration]] = [[] for _ in cycles]
-    otherwise: SimulatedVibration | None = None
-    others: list[SimulatedVibration] = []
+    cycles, by = _balanced_cycles(loop, K, B, balance, parts)
+    runs = _Simulations([[] for _ in cycles], None, [])
     if simulate:
         tell = progress or (lambda stage, done, of: None)
         tell("simulating", 0, 1)
-        runs = [_simulated(loop, K, B, offset, cycle) if settles(cycle) else [] for cycle in cycles]
-        if not any(map(settles, cycles)):
-            otherwise = _simulate_small_start(loop, K, B, offset, cycles)
-            others.append(otherwise)
-        others += _simulate_large_starts(loop, K, B, offset, cycles, balance.largest_motion)
+        runs = _simulate_all(loop, K, B, offset, cycles, balance.largest_motion)
         tell("simulating", 1, 1)
-    found = answered_cycles(cycles, runs, others, balance.largest_motion)
+    found = answered_cycles(cycles, runs.near_cycles, runs.others, balance.largest_motion)
     resting, quiet = _limits(loop, K, B)
     return LimitCyclePrediction(
         wall_stiffness=K,
@@ -124,7 +116,7 @@ def predict_limit_cycles(
         balance=balance,
         answers=found.cycles,
         contradicted=found.contradicted,
-        small_start_vibration=otherwise,
+        small_start_vibration=runs.small_start,
         resting_limit=resting,
         quiet_limit=quiet,
         was_simulated=simulate,
@@ -171,6 +163,42 @@ def largest_motion(point: OperatingPoint) -> float:
 def settles(cycle: LimitCycle) -> bool:
     """Whether the cycle is stable and within the range of the device."""
     return cycle.stable and cycle.within_range
+
+
+def _balanced_cycles(
+    loop: Loop, K: float, B: float, balance: HarmonicBalance, parts: tuple[str, ...]
+) -> tuple[tuple[LimitCycle, ...], str]:
+    """Return the cycles of a balance on a wall (K [N/m], B [N s/m]), with harmonics where only the force is
+    limited, and the method in words."""
+    cycles, by = balance.cycles, BY_FIRST
+    if parts == ("the force limit",):
+        cycles, by = tuple(with_harmonics(loop, K, B, cycle) for cycle in cycles), BY_HARMONICS
+    return cycles, by
+
+
+class _Simulations(NamedTuple):
+    """Where simulations of one wall end: from both sides of each cycle, from a small start, from all other starts.
+
+    near_cycles  one list for each cycle, empty where it was not simulated;   small_start  None: not simulated
+    """
+
+    near_cycles: list[list[SimulatedVibration]]
+    small_start: SimulatedVibration | None
+    others: list[SimulatedVibration]
+
+
+def _simulate_all(
+    loop: Loop, K: float, B: float, offset: float, cycles: tuple[LimitCycle, ...], largest: float
+) -> _Simulations:
+    """Simulate a wall (K [N/m], B [N s/m]) from near each cycle that settles, from a small start where none does,
+    and from large starts below the largest motion [m]."""
+    runs = [_simulated(loop, K, B, offset, cycle) if settles(cycle) else [] for cycle in cycles]
+    small_start, others = None, list[SimulatedVibration]()
+    if not any(map(settles, cycles)):
+        small_start = _simulate_small_start(loop, K, B, offset, cycles)
+        others.append(small_start)
+    others += _simulate_large_starts(loop, K, B, offset, cycles, largest)
+    return _Simulations(runs, small_start, others)
 
 
 def _limits(loop: Loop, K: float, B: float) -> tuple[float | None, float | None]:

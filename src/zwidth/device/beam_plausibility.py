@@ -64,20 +64,7 @@ def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
             f"does not go with a {link['joint']} joint at the link's base; use revolute, prismatic or fixed, or "
             "leave it out",
         )
-    given = [key for key in NUMBERS if key in beam]
-    if "section" in beam:
-        if given:
-            yield (*at, given[0]), "stands beside section; give the section and its material, or all stiffnesses"
-        if "material" not in beam:
-            yield (*at, "material"), "is missing; a section needs one"
-    elif "material" in beam:
-        yield (*at, "section"), "is missing; a material needs one"
-    elif len(given) < len(NUMBERS):
-        lacks = [key for key in NUMBERS if key not in beam]
-        yield (
-            at,
-            f"lacks {comma_list(lacks)}; give all of them (large numbers for what hardly gives), or a section",
-        )
+    yield from _section_or_stiffnesses(at, beam)
     method = beam.get("method", "assumed-modes")
     for key, methods in (("elements", ("finite-elements",)), ("modes", ("finite-elements", "assumed-modes"))):
         if key in beam and method in METHODS and method not in methods:
@@ -95,6 +82,25 @@ def _beam(place: KeyPath, link: dict[str, Any]) -> KeyMessages:
             "is missing; give mass and inertia of the whole link, or neither for the beam's own",
         )
     yield from _wall((*at, "section"), table(beam, "section"))
+
+
+def _section_or_stiffnesses(at: KeyPath, beam: dict[str, Any]) -> KeyMessages:
+    """Yield what is wrong between the keys of a [beam], which stands at a path: it has either a section and a
+    material, or all stiffnesses."""
+    given = [key for key in NUMBERS if key in beam]
+    if "section" in beam:
+        if given:
+            yield (*at, given[0]), "stands beside section; give the section and its material, or all stiffnesses"
+        if "material" not in beam:
+            yield (*at, "material"), "is missing; a section needs one"
+    elif "material" in beam:
+        yield (*at, "section"), "is missing; a material needs one"
+    elif len(given) < len(NUMBERS):
+        lacks = [key for key in NUMBERS if key not in beam]
+        yield (
+            at,
+            f"lacks {comma_list(lacks)}; give all of them (large numbers for what hardly gives), or a section",
+        )
 
 
 def _wall(place: KeyPath, section: dict[str, Any]) -> KeyMessages:

@@ -301,20 +301,7 @@ def _twice(mechanism: dict[str, Any], group: str) -> KeyMessages:
 def _references(mechanism: dict[str, Any]) -> KeyMessages:
     """Loops, handle and drives speak of links that exist; drives of revolute joints, one each."""
     links = _joints(mechanism)
-    for index, loop in tables(mechanism, "loops"):
-        names = loop.get("links")
-        names = names if isinstance(names, list) else []
-        for place, name in enumerate(names):
-            if isinstance(name, str) and name not in links and name != "base":
-                yield (
-                    ("mechanism", "loops", index, "links", place),
-                    f"'{name}' is not a link; {suggestion(name, {*links, 'base'}, 'links')}",
-                )
-        if len(names) == 2 and names[0] == names[1]:
-            yield (
-                ("mechanism", "loops", index, "links"),
-                f"joins '{names[0]}' to itself; name two different links",
-            )
+    yield from _links_of_loops(mechanism, links)
     link = table(mechanism, "handle").get("link")
     if isinstance(link, str) and link not in links:
         yield (
@@ -342,6 +329,27 @@ def _references(mechanism: dict[str, Any]) -> KeyMessages:
             yield path, f"'{joint}' has a drive already; one joint takes one drive"
         driven.add(joint)
     yield from _couplings(mechanism, links, driven)
+
+
+def _links_of_loops(mechanism: dict[str, Any], links: dict[str, Any]) -> KeyMessages:
+    """Yield what is wrong with the links that loops join: names of none, and one link joined to itself.
+
+    links  name -> joint of each link
+    """
+    for index, loop in tables(mechanism, "loops"):
+        names = loop.get("links")
+        names = names if isinstance(names, list) else []
+        for place, name in enumerate(names):
+            if isinstance(name, str) and name not in links and name != "base":
+                yield (
+                    ("mechanism", "loops", index, "links", place),
+                    f"'{name}' is not a link; {suggestion(name, {*links, 'base'}, 'links')}",
+                )
+        if len(names) == 2 and names[0] == names[1]:
+            yield (
+                ("mechanism", "loops", index, "links"),
+                f"joins '{names[0]}' to itself; name two different links",
+            )
 
 
 def _couplings(mechanism: dict[str, Any], links: dict[str, Any], driven: set[str]) -> KeyMessages:

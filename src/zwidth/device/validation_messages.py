@@ -104,25 +104,11 @@ def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
     """
     kind, got = detail["type"], detail["input"]
     limits: Mapping[str, Any] = detail.get("ctx", {})
+    if demand := _number_demand(kind, limits, got):
+        return f"{demand}, got {quote(got)}{about}"
     match kind:
         case "missing":
             return f"is missing; add it{about}"
-        case "float_type" if isinstance(got, int) and not isinstance(got, bool):
-            return f"must be a finite number, got {quote(got)}{about}"
-        case "float_type":
-            return f"must be a number, got {quote(got)}{about}"
-        case "int_type" | "int_from_float":
-            return f"must be a whole number, got {quote(got)}{about}"
-        case "finite_number":
-            return f"must be finite, got {quote(got)}{about}"
-        case "greater_than":
-            return f"must be greater than {limits['gt']:.10g}, got {quote(got)}{about}"
-        case "greater_than_equal":
-            return f"must be at least {limits['ge']:.10g}, got {quote(got)}{about}"
-        case "less_than":
-            return f"must be less than {limits['lt']:.10g}, got {quote(got)}{about}"
-        case "less_than_equal":
-            return f"must be at most {limits['le']:.10g}, got {quote(got)}{about}"
         case "too_short" | "too_long":
             return _length(limits, got, about)
         case "string_type":
@@ -151,6 +137,33 @@ def _sentence(detail: ErrorDetails, path: KeyPath, about: str) -> str:
             return f"must be true or false, got {quote(got)}{about}"
         case _:
             return detail["msg"].removeprefix("Value error, ")
+
+
+def _number_demand(kind: str, limits: Mapping[str, Any], got: object) -> str:
+    """Return what a number must be, by the kind of what pydantic found; "" for kinds that are not about numbers.
+
+    limits  name -> limit that the number broke
+    got     what came instead
+    """
+    match kind:
+        case "float_type" if isinstance(got, int) and not isinstance(got, bool):
+            return "must be a finite number"
+        case "float_type":
+            return "must be a number"
+        case "int_type" | "int_from_float":
+            return "must be a whole number"
+        case "finite_number":
+            return "must be finite"
+        case "greater_than":
+            return f"must be greater than {limits['gt']:.10g}"
+        case "greater_than_equal":
+            return f"must be at least {limits['ge']:.10g}"
+        case "less_than":
+            return f"must be less than {limits['lt']:.10g}"
+        case "less_than_equal":
+            return f"must be at most {limits['le']:.10g}"
+        case _:
+            return ""
 
 
 def _unknown(path: KeyPath, document: dict[str, Any]) -> str:

@@ -61,14 +61,35 @@ def _guarantees(
 ) -> Guarantees:
     """Every guarantee of a loop as far as its premises allow; the first that fails is why others are withheld."""
     moving = _without_idle_motions(loop)
-    plant = moving.plant
-    guarantees = []
+    guarantees = list[Guarantee]()
     failing = next((each for each in premises if each.fails), None)
     unknown = "; ".join(each.reason for each in premises if each.holds is None)
 
     def as_known(find: Callable[[], Region]) -> Region:
         return empty_region(failing.reason) if failing is not None else find().with_warning(unknown)
 
+    guarantees += _passive_guarantees(moving, as_known)
+    guarantees += _spring_guarantees(moving, as_known, progress)
+    if robust is not None:
+        guarantees.append(
+            Guarantee("robust", "stable for a whole range of operators", region_of(robust), "robust chart")
+        )
+    chart = stability_chart(loop, decay=False).drawn()
+    of_chart = next((each for each in premises if each.fails and each.what == AS_BENT), None)
+    stable = _stable(chart) if of_chart is None else empty_region(of_chart.reason)
+    guarantees.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
+    return Guarantees(loop, tuple(guarantees), chart, premises=premises)
+
+
+def _passive_guarantees(moving: Loop, as_known: Callable[[Callable[[], Region]], Region]) -> list[Guarantee]:
+    """Find the walls [N/m, N s/m] for passive operators: at the actuator where it is not the handle, and at the
+    handle.
+
+    moving    the loop without idle motions
+    as_known  gives the region that a function finds, or an empty one where a premise fails
+    """
+    plant = moving.plant
+    guarantees = []
     apart = plant.handle is None or not _same_place(plant.actuator, plant.handle)
     if apart:
         guarantees.append(
@@ -88,31 +109,31 @@ def _guarantees(
             COLGATE,
         )
     )
-    guarantees.append(
+    return guarantees
+
+
+def _spring_guarantees(
+    moving: Loop, as_known: Callable[[Callable[[], Region]], Region], progress: Progress | None
+) -> list[Guarantee]:
+    """Find the walls [N/m, N s/m] for springs at the handle: for any of them, and for the one of the Nyquist
+    frequency.
+
+    moving, as_known  as in `_passive_guarantees`;   progress  as in `spring_stable_region`
+    """
+    return [
         Guarantee(
             "spring-stable",
             "stable whatever spring holds the handle, from none to one that holds it fixed",
             as_known(lambda: _of_springs(partial(spring_stable_region, progress=progress), moving)),
             SPRINGS,
-        )
-    )
-    guarantees.append(
+        ),
         Guarantee(
             "nyquist-spring",
             "stable with the one spring that puts a mode at the Nyquist frequency",
             as_known(lambda: _of_springs(nyquist_region, moving)),
             SPRINGS,
-        )
-    )
-    if robust is not None:
-        guarantees.append(
-            Guarantee("robust", "stable for a whole range of operators", region_of(robust), "robust chart")
-        )
-    chart = stability_chart(loop, decay=False).drawn()
-    of_chart = next((each for each in premises if each.fails and each.what == AS_BENT), None)
-    stable = _stable(chart) if of_chart is None else empty_region(of_chart.reason)
-    guarantees.append(Guarantee("stable", "stable with the device as described", stable, EXACT))
-    return Guarantees(loop, tuple(guarantees), chart, premises=premises)
+        ),
+    ]
 
 
 def _stable(chart: StabilityChart) -> Region:

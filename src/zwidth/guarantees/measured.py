@@ -126,25 +126,50 @@ def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
     frequency = port.theta / (2.0 * np.pi * port.period)
     lost = inner & hidden
     if np.any(lost):
-        at = np.flatnonzero(lost)
-        stretch = f"{frequency[at[0]]:.4g} to {frequency[at[-1]]:.4g} Hz"
-        return empty_region(
-            f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, "
-            f"{stretch}, "
-            "its error is larger than the power that the handle takes in; measure longer or with more force "
-            "there, or state hardware_delay_samples"
-        )
+        return empty_region(_hidden_reason(lost, inner, frequency))
     if not np.all(np.isfinite(disks.radius[inner])):
         return empty_region(
             "this is not known: the fitted modes, which continue the device beyond half the sampling rate, do not "
             "all take in power there"
         )
     kept = Disks(*(getattr(disks, name)[inner] for name in ("angles", "centre", "radius", "power")))
-    scale, regions = _softest_spring(kept), []
+    regions = _passive_regions(kept, port, loop)
+    if regions is None:
+        return empty_region("this is not known: the handle is known at too few frequencies")
+    region = max(regions, key=lambda one: float(np.nan_to_num(one.stiffness_max)))
+    warning = (
+        f"from {np.count_nonzero(inner)} measured frequencies, interpolated, with twice the error of that taken "
+        f"off; below {frequency[inner][0]:.4g} Hz continued"
+    )
+    return replace(region, warning=warning)
+
+
+def _hidden_reason(lost: Flags, inner: Flags, frequency: Floats) -> str:
+    """Say at which of the known frequencies the measurement's error hides the power that the handle takes in.
+
+    lost, inner  (k,) of all frequencies (k,) [Hz]: those hidden, at least one, and those known
+    """
+    at = np.flatnonzero(lost)
+    stretch = f"{frequency[at[0]]:.4g} to {frequency[at[-1]]:.4g} Hz"
+    return (
+        f"this is hidden by the measurement: at {len(at)} of {np.count_nonzero(inner)} frequencies, "
+        f"{stretch}, "
+        "its error is larger than the power that the handle takes in; measure longer or with more force "
+        "there, or state hardware_delay_samples"
+    )
+
+
+def _passive_regions(kept: Disks, port: MeasuredPort, loop: MeasuredLoop) -> list[Region] | None:
+    """Find the passive walls [N/m, N s/m] by interpolation at some scales of stiffness, at most SCALES of them.
+
+    kept     disks at the known frequencies
+    Returns  one region for each scale; None where the handle is known at too few frequencies
+    """
+    scale, regions = _softest_spring(kept), list[Region]()
     for _ in range(SCALES):
         between = disks_between(kept, scale)
         if between is None:
-            return empty_region("this is not known: the handle is known at too few frequencies")
+            return None
         # a negative spring shows at frequencies below all that were measured: none is promised
         found = Gauge(conics_of_disks(between.disks, loop.w, between.ends), (np.inf, np.inf))
         regions.append(passive_region_of(found, port.period))
@@ -152,12 +177,7 @@ def measured_passive_region(port: MeasuredPort, loop: MeasuredLoop) -> Region:
         if not stiffness > 0.0 or 1.0 / ALIKE < stiffness * scale < ALIKE:
             break
         scale = 1.0 / stiffness
-    region = max(regions, key=lambda one: float(np.nan_to_num(one.stiffness_max)))
-    warning = (
-        f"from {np.count_nonzero(inner)} measured frequencies, interpolated, with twice the error of that taken "
-        f"off; below {frequency[inner][0]:.4g} Hz continued"
-    )
-    return replace(region, warning=warning)
+    return regions
 
 
 def measured_guarantees(point: OperatingPoint) -> Guarantees:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -97,20 +98,12 @@ def fit_least_squares(
                      least is the fit, and all whose rise is below that of an interval's end widen the interval
     Raises           ValueError  for fewer residuals than parameters, or some that are no numbers at the start
     """
-    from scipy.optimize import least_squares
-    from scipy.stats import norm, t
-
     x0 = np.atleast_1d(np.asarray(start, dtype=float))
     low, high = np.broadcast_to(lower, x0.shape), np.broadcast_to(upper, x0.shape)
     first = residuals(x0)
     if len(first) < len(x0) or not np.all(np.isfinite(first)):
         raise ValueError(f"{len(first)} residuals for {len(x0)} parameters, or some are no finite numbers")
-    settings = {"bounds": (low, high), "x_scale": "jac", "diff_step": diff_step}
-    minima = [least_squares(residuals, x0, xtol=1e-10, ftol=tolerance, gtol=1e-12, **settings)]
-    minima += [
-        least_squares(residuals, place, xtol=1e-8, ftol=max(tolerance, 1e-8), gtol=1e-12, **settings)
-        for place in rivals
-    ]
+    minima = _minima(residuals, x0, rivals, (low, high), diff_step, tolerance)
     solved = min(minima, key=lambda one: float(one.cost))
     x, r = solved.x, np.asarray(solved.fun)
     count = len(r) if effective_count is None else effective_count
@@ -118,25 +111,81 @@ def fit_least_squares(
     freedom = max(count - len(x), 1.0)
     scale = 1.0 if known_scale else float(np.sqrt(np.sum(r**2) * thinned / freedom))
     covariance = _covariance(np.asarray(solved.jac)) * scale**2 / thinned
-    tail = 0.5 + 0.5 * level
     scale_known_by = scale_freedom if known_scale else freedom
-    quantile = norm.ppf(tail) if scale_known_by is None else t.ppf(tail, scale_known_by)
-    quantile = np.broadcast_to(np.asarray(quantile) * widening, x.shape)
+    quantile = np.broadcast_to(_half_widths(level, scale_known_by, widening), x.shape)
     sigma = np.sqrt(np.diag(covariance))
     ends = np.stack([x - quantile * sigma, x + quantile * sigma])
     if profiled and scale > 0.0:
         least = float(np.sum(r**2))
         places = _distinct(minima, solved, scale**2 / thinned)
-        for i in range(len(x)):
-            rise = float(quantile[i] * scale) ** 2 / thinned
-            for place, height, own in places:
-                search = _EndSearch(residuals, place, height, least, rise, low, high, own, diff_step)
-                if height - least < rise:
-                    width = quantile[i] * np.sqrt(own[i, i])
-                    both = [search.end(i, place[i] - width), search.end(i, place[i] + width)]
-                    ends[:, i] = both if place is x else (min(ends[0, i], both[0]), max(ends[1, i], both[1]))
+        search = partial(_EndSearch, residuals, least=least, lower=low, upper=high, diff_step=diff_step)
+        ends = _profiled_ends(search, places, quantile, scale, thinned, ends)
     ends = np.where(np.isfinite(ends), ends, np.array([[-np.inf], [np.inf]]))
     return Fit(x, ends[0], ends[1], covariance, r, scale, freedom, bool(solved.status > 0))
+
+
+def _minima(
+    residuals: Residuals,
+    start: Floats,
+    rivals: Sequence[Floats],
+    bounds: tuple[Floats, Floats],
+    diff_step: float | None,
+    tolerance: float,
+) -> list[OptimizeResult]:
+    """Find the minima of the sum of squares from start (p,) and each rival (p,), and return them in this order.
+
+    bounds, diff_step, tolerance  as in `fit_least_squares`
+    """
+    from scipy.optimize import least_squares
+
+    settings = {"bounds": bounds, "x_scale": "jac", "diff_step": diff_step}
+    minima = [least_squares(residuals, start, xtol=1e-10, ftol=tolerance, gtol=1e-12, **settings)]
+    minima += [
+        least_squares(residuals, place, xtol=1e-8, ftol=max(tolerance, 1e-8), gtol=1e-12, **settings)
+        for place in rivals
+    ]
+    return minima
+
+
+def _half_widths(level: float, freedom: ArrayLike | None, widening: ArrayLike) -> Floats:
+    """Give the half widths () or (p,) of intervals at this level [standard deviations].
+
+    freedom   () or (p,) degrees of freedom by which the deviation of the residuals was estimated; None: is known
+    widening  () or (p,) factor
+    """
+    from scipy.stats import norm, t
+
+    tail = 0.5 + 0.5 * level
+    quantile = norm.ppf(tail) if freedom is None else t.ppf(tail, freedom)
+    return np.asarray(np.asarray(quantile) * widening)
+
+
+def _profiled_ends(
+    search: Callable[..., _EndSearch],
+    places: Sequence[tuple[Floats, float, Floats]],
+    quantile: Floats,
+    scale: float,
+    thinned: float,
+    ends: Floats,
+) -> Floats:
+    """Move the ends (2, p) of the intervals to where the sum of squares has risen by enough; return them.
+
+    search    makes the search for ends from a minimum
+    places    place (p,), sum of squares and covariance (p, p) of each minimum, the least first
+    quantile  (p,) half widths [standard deviations]
+    scale     standard deviation of a residual
+    thinned   how much of an independent residual each one counts for
+    """
+    for i in range(len(quantile)):
+        rise = float(quantile[i] * scale) ** 2 / thinned
+        for place, height, own in places:
+            one = search(best=place, height=height, rise=rise, covariance=own)
+            if height - one.least < rise:
+                width = quantile[i] * np.sqrt(own[i, i])
+                both = [one.end(i, place[i] - width), one.end(i, place[i] + width)]
+                first = place is places[0][0]
+                ends[:, i] = both if first else (min(ends[0, i], both[0]), max(ends[1, i], both[1]))
+    return ends
 
 
 def _distinct(

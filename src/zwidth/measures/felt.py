@@ -12,6 +12,7 @@ with all that was measured, and W G_ha as `loop.measured.measured_port` gives it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from typing import Any, Final
 
@@ -176,9 +177,7 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
     chart: Chart = point.chart()
     verdict = str(np.ravel(chart.check(stiffness, damping).names)[0])
     stable, peak = verdict == "stable", chart.stiffness_max
-    inner = port.theta < np.pi * (1.0 - 1e-9)
-    for source in set(port.origin.values()):
-        inner &= np.isfinite(port.deviations[source])
+    inner = _known_frequencies(port)
     theta = port.theta[inner]
     frequency = theta / (2.0 * np.pi * port.period)
     jw = 2j * np.pi * frequency
@@ -188,27 +187,20 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
     own = port.model.modes[:, 0]
     lowest = min([*own[own > 0.0], LOWEST_MODE * np.pi])
     low = slice(0, max(FEWEST, int(np.searchsorted(theta, AT_REST * lowest))))
-
-    def at_rest(law: Complexes) -> tuple[float, float]:
-        spread = _motion_deviation(port, paths, deviations, law)
-        return _stiffness_and_mass(theta[low] / port.period, _handle_motion(paths, law)[low], spread[low])
-
-    def felt_at_rest(wall: float) -> float:
-        return at_rest(wall * force)[0]
-
+    at_rest = partial(_felt_at_rest, port, theta, low, paths, deviations)
     rigid = port.origin["hh"] == port.origin["sh"]
     spring = not (port.model.free or np.any(own == 0.0))
     unyielding = UNYIELDING * float(np.max(np.abs(1.0 / paths["P"])))
-    limit = np.inf if rigid else felt_at_rest(unyielding)
+    limit = np.inf if rigid else at_rest(unyielding * force)[0]
     free = 1.0 / (jw * paths["hh"])
     return FeltWall(
         wall_stiffness=stiffness,
         wall_damping=damping,
         verdict=verdict,
-        static_stiffness=felt_at_rest(stiffness) if stable else None,
+        static_stiffness=at_rest(stiffness * force)[0] if stable else None,
         free_motion_mass=np.nan if spring else at_rest(0.0 * force)[1],
         stiffness_max=peak if np.isfinite(peak) else None,
-        static_stiffness_at_stiffness_max=felt_at_rest(peak) if np.isfinite(peak) else None,
+        static_stiffness_at_stiffness_max=at_rest(peak * force)[0] if np.isfinite(peak) else None,
         static_stiffness_limit=limit,
         static_stiffness_limit_kind="infinite" if rigid else "unknown" if np.isnan(limit) else "limit",
         frequency=frequency,
@@ -218,6 +210,31 @@ def felt_wall_of_response(point: OperatingPoint, stiffness: float, damping: floa
         commanded_impedance=commanded_impedance(stiffness, damping, frequency),
         free_motion_impedance=free,
     )
+
+
+def _known_frequencies(port: MeasuredPort) -> Flags:
+    """Return which frequencies (n,) lie below half the sampling rate and have a finite error in every path."""
+    inner = port.theta < np.pi * (1.0 - 1e-9)
+    for source in set(port.origin.values()):
+        inner &= np.isfinite(port.deviations[source])
+    return inner
+
+
+def _felt_at_rest(
+    port: MeasuredPort,
+    theta: Floats,
+    low: slice,
+    paths: dict[str, Complexes],
+    deviations: dict[str, Floats],
+    law: Complexes,
+) -> tuple[float, float]:
+    """Return stiffness [N/m] and mass [kg] felt at rest with a wall of this response (k,); nan where errors hide
+    them.
+
+    theta  (k,) angles;   low  those well below the lowest mode;   paths, deviations  (k,) by name
+    """
+    spread = _motion_deviation(port, paths, deviations, law)
+    return _stiffness_and_mass(theta[low] / port.period, _handle_motion(paths, law)[low], spread[low])
 
 
 def _law(controller: Controller, theta: Floats) -> tuple[Complexes, Complexes]:

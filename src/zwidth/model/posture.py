@@ -186,13 +186,8 @@ def solve_posture(
     check_kind("mechanism", mechanism, Mechanism)
     name = _assembly_name(mechanism, assembly)
     mech, designs = pack(mechanism), mechanism.design_shape
-    target = _goals(mechanism, position, orientation)
-    shape = np.broadcast_shapes(designs, target.shape[:-1])
-    # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
-    goals = np.array(np.broadcast_to(target, (*shape, target.shape[-1])), dtype=np.float64, order="C")
-    goals = goals.reshape(-1, target.shape[-1])
+    goals, shape = _goals_of_designs(mechanism, position, orientation)
     design = design_of_each(mechanism, shape)
-
     reference, gaps = _references(mechanism, mech, name)
     if not designs:
         _check_loops(mechanism, mech, name, gaps[0])
@@ -211,9 +206,43 @@ def solve_posture(
         raise singular_throughout(name, uncontrolled)
     singular = uncontrolled and not designs  # of several designs another may be in control
     solved = failed_batch(mech, len(goals)) if singular else solve_batch(mech, design, reference, goals)
+    widest = tolerance if tolerance > 0.0 or not shape else None
+    projected, near = _project_goals(mech, design, reference, goals, solved, widest)
+    posture = _posture(name, mech, goals, solved, projected, shape)
+    if not shape and posture.status != OK:
+        raise posture_failure(mechanism, mech, int(posture.status), name, reference[0], goals[0], near)
+    return posture
+
+
+def _goals_of_designs(
+    mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayLike | None
+) -> tuple[Floats, tuple[int, ...]]:
+    """Return goals (N, g) [m], [rad] of N postures, and the shape of their batch; raises as `_goals`."""
+    target = _goals(mechanism, position, orientation)
+    shape = np.broadcast_shapes(mechanism.design_shape, target.shape[:-1])
+    # a copy that can be written to, as all that is solved for: one that cannot is another type, compiled anew
+    goals = np.array(np.broadcast_to(target, (*shape, target.shape[-1])), dtype=np.float64, order="C")
+    return goals.reshape(-1, target.shape[-1]), shape
+
+
+def _project_goals(
+    mech: MechanismArrays,
+    design: Ints,
+    reference: Floats,
+    goals: Floats,
+    solved: PostureBatch,
+    tolerance: float | None,
+) -> tuple[Floats, Floats | None]:
+    """Replace goals (N, g) out of reach, and their postures, by those of goals near them that the handle can have.
+
+    design     (N,)  of each goal;   reference  (P, n)  joint coordinates of each design [rad], [m]
+    tolerance  how far a goal may be projected, as a share of the arm's length; None: no goal is projected
+    Returns    how far each was projected (N,) [m], nan without a posture; the goal (g,) near the last, or None
+    """
     near, projected = None, np.where(solved.status == OK, 0.0, np.nan)
-    wanted = np.flatnonzero(solved.status == OUT_OF_REACH) if tolerance > 0.0 or not shape else ()
-    for i in wanted:
+    if tolerance is None:
+        return projected, near
+    for i in np.flatnonzero(solved.status == OUT_OF_REACH):
         near, own_design = answered_goal(mech, int(design[i]), reference, goals[i]), int(design[i])
         if near is None:
             continue
@@ -222,10 +251,7 @@ def solve_posture(
             continue
         solved.overwrite(np.array([i]), solve_batch(mech, design[i : i + 1], reference, near[None]))
         goals[i], projected[i] = near, away
-    posture = _posture(name, mech, goals, solved, projected, shape)
-    if not shape and posture.status != OK:
-        raise posture_failure(mechanism, mech, int(posture.status), name, reference[0], goals[0], near)
-    return posture
+    return projected, near
 
 
 def _posture(

@@ -94,40 +94,23 @@ def sweep_response_of_blocks(
     blocks = iter(blocks)
     first, second = next(blocks, (np.zeros(0), np.zeros(0))), next(blocks, None)
     samples = len(first[0])
-    if length < SHORTEST_SEGMENT or samples < 2 * length + m:
-        raise ResponseError(
-            f"has {samples} samples, too few for two segments of {max(length, SHORTEST_SEGMENT)}; record "
-            f"longer, or set segment_samples (at least {SHORTEST_SEGMENT})"
-        )
-    sizes, step = list[_ForceSize](), np.inf
+    _check_samples(samples, length, m)
     count = samples - m if second is None else fast_length(samples - m)
     values = count // 2 + 1
-    least = NARROWEST if second is None else NARROWEST_WINDOW
-    narrowest = max(least, 2 * (count // (4 * segment)) if segment else 2 * (values // (2 * MOST_TILES)))
-    narrowest = min(narrowest, 2 * ((values - 2) // 4))
+    narrowest = _narrowest_window(NARROWEST if second is None else NARROWEST_WINDOW, count, values, segment)
     sums = None if second is None else PieceSums(values, narrowest)
-    for force, position in chain([first], [] if second is None else [second], blocks):
-        sizes.append(_ForceSize.of(force))
-        step = min(step, encoder_step([position]) or np.inf)
-        U, Y = transforms(force, position, m, count)
-        if sums is not None:
-            sums.add(U, Y)
+    every = chain([first], [] if second is None else [second], blocks)
+    sizes, step, U, Y = _read_blocks(every, m, count, sums)
     whole = _ForceSize.together(sizes)
     if whole.low == whole.high:
         raise ResponseError(f"the commanded force is {whole.low:g} N all the time; excite the device")
     step = step if np.isfinite(step) else 0.0
     floor = count * step**2 / 12.0 * np.abs(2.0 * np.sin(np.pi * np.arange(values) / count)) ** (2 * m)
     places = _places(samples, segment) * count
-    if sums is None:
-        local = local_response(U, Y, places, floor, narrowest)
-    else:
-        local = merged_windows(sums.fits(window_widths(values - 1, narrowest)), places, floor)
+    local = _response_of_blocks(U, Y, sums, places, floor, narrowest)
     one = np.abs(2.0 * np.sin(np.pi * places / count)) ** m
     hidden = _hidden_by_steps(whole, step, places / count, local, one, samples)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative = (local.variance + (hidden * one) ** 2) / np.abs(local.value) ** 2
-        coherence = 1.0 / (1.0 + AVERAGES * relative)
-        value = local.value / (np.exp(2j * np.pi * places / count) - 1.0) ** m
+    value, coherence = _value_and_coherence(local, hidden, one, places, count, m)
     excited = _excited(places, local.excited) & np.isfinite(coherence) & np.isfinite(value)
     return Response(
         frequency=places / count / period,
@@ -138,6 +121,72 @@ def sweep_response_of_blocks(
         freedom=local.freedom,
         note=f"from {len(sizes) * samples} samples by local polynomials",
     )
+
+
+def _check_samples(samples: int, length: int, m: int) -> None:
+    """Raise ResponseError where a block's samples are too few for two segments of this length, after m
+    differences."""
+    if length < SHORTEST_SEGMENT or samples < 2 * length + m:
+        raise ResponseError(
+            f"has {samples} samples, too few for two segments of {max(length, SHORTEST_SEGMENT)}; record "
+            f"longer, or set segment_samples (at least {SHORTEST_SEGMENT})"
+        )
+
+
+def _narrowest_window(least: int, count: int, values: int, segment: int | None) -> int:
+    """Return half the narrowest window, in spacings of a transform of `count` samples with so many values; even.
+
+    least  below which it must not be;   segment  samples, as in `sweep_response`
+    """
+    narrowest = max(least, 2 * (count // (4 * segment)) if segment else 2 * (values // (2 * MOST_TILES)))
+    return min(narrowest, 2 * ((values - 2) // 4))
+
+
+def _read_blocks(
+    blocks: Iterable[tuple[Floats, Floats]], m: int, count: int, sums: PieceSums | None
+) -> tuple[list[_ForceSize], float, Complexes, Complexes]:
+    """Read all blocks of force [N] and position [m], at least one, and add their transforms to the sums.
+
+    m      times that the position is differenced;   count  samples that are transformed
+    Returns  the force's size in each block, the encoder's step [m] (inf where the readings show none), and the
+             last block's two transforms (count // 2 + 1,)
+    """
+    sizes, step = list[_ForceSize](), np.inf
+    for force, position in blocks:
+        sizes.append(_ForceSize.of(force))
+        step = min(step, encoder_step([position]) or np.inf)
+        U, Y = transforms(force, position, m, count)
+        if sums is not None:
+            sums.add(U, Y)
+    return sizes, step, U, Y
+
+
+def _response_of_blocks(
+    U: Complexes, Y: Complexes, sums: PieceSums | None, places: Floats, floor: Floats, narrowest: int
+) -> LocalResponse:
+    """Return the response Y / U (n,) [m/N] at places (n,), in spacings of the transforms.
+
+    U, Y       (k,) transforms of the last block;   sums  over all blocks; None: there is one block
+    floor      (k,) least variance of the noise in Y;   narrowest  half the narrowest window, in spacings
+    """
+    if sums is None:
+        return local_response(U, Y, places, floor, narrowest)
+    return merged_windows(sums.fits(window_widths(len(U) - 1, narrowest)), places, floor)
+
+
+def _value_and_coherence(
+    local: LocalResponse, hidden: Floats, one: Floats, places: Floats, count: int, m: int
+) -> tuple[Complexes, Floats]:
+    """Return the response (n,) [m/N] and its coherence (n,), not finite where nothing is known.
+
+    local  the response of the position differenced m times;   hidden  error of P that no scatter shows (n,) [m/N]
+    one    (n,) |z - 1|^m;   places  (n,) frequencies, in spacings of a transform of `count` samples
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = (local.variance + (hidden * one) ** 2) / np.abs(local.value) ** 2
+        coherence = 1.0 / (1.0 + AVERAGES * relative)
+        value = local.value / (np.exp(2j * np.pi * places / count) - 1.0) ** m
+    return value, coherence
 
 
 def fast_length(samples: int) -> int:

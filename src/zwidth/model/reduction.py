@@ -75,10 +75,7 @@ def reduce_mechanism(
                DirectionError  (a ModelError) for a direction along which the handle cannot move
                ValueError  for a batch of postures, a posture that is not OK, a direction not of unit length
     """
-    if posture.status.shape:
-        raise ValueError(f"one posture is reduced at a time, got a batch of shape {posture.status.shape}")
-    if posture.status != OK:
-        raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
+    _check_posture(posture)
     _check_model(model)
     if model == "rigid" and mechanism.flexible:
         mechanism = replace(mechanism, flexible=())
@@ -109,6 +106,14 @@ def reduce_mechanism(
     motions = _motions(full, model)
     with_sensor = replace(_with_sensor(reduced, full, motions), nonlinear=full.nonlinear.project(motions))
     return add_dampers(with_sensor, project_dampers(electrical, motions))
+
+
+def _check_posture(posture: Posture) -> None:
+    """Raise ValueError for a batch of postures, and for a posture that is not OK."""
+    if posture.status.shape:
+        raise ValueError(f"one posture is reduced at a time, got a batch of shape {posture.status.shape}")
+    if posture.status != OK:
+        raise ValueError("the posture is out of reach or singular and has no model; ask for another position")
 
 
 def links_and_drives(mechanism: Mechanism, posture: Posture, screws: Floats) -> tuple[Floats, Floats, DriveSide]:

@@ -211,15 +211,8 @@ def integrators_of(response: Response, period: float) -> int:
             f"{-90 * min(round(fall), 2)} degrees; are columns swapped, or is this no force to position?"
         )
     if response.integrators is not None:
-        m = response.integrators
-        # the corner of a mass and a dashpot may lie below the data: there it lags as a free mass does
-        free = m == 1 and nearest == 2 and clear
-        if abs(phases[m]) > CONTRADICTED and not free:
-            raise ResponseError(
-                f"integrators = {m} does not fit: {where}, where {-90 * m} is expected; give 0 for a device on a "
-                "spring, 1 for one with a dashpot to the ground, 2 for a free one, or measure lower"
-            )
-        return m
+        _check_stated(response.integrators, phases, nearest, clear, where)
+        return response.integrators
     if fit is not None and fit.integrators is not None:
         return fit.integrators
     if not clear:
@@ -229,6 +222,22 @@ def integrators_of(response: Response, period: float) -> int:
             "integrators = 0, 1 or 2 in [response], or measure lower"
         )
     return nearest
+
+
+def _check_stated(m: int, phases: Floats, nearest: int, clear: bool, where: str) -> None:
+    """Raise ResponseError where the phase contradicts the stated number m of integrators.
+
+    phases          (3,) of P (z - 1)^m at the lowest frequencies, for each number [rad]
+    nearest, clear  the number whose phase is nearest to 0, and whether it is near enough
+    where           the phase measured at the lowest frequency, in words
+    """
+    # the corner of a mass and a dashpot may lie below the data: there it lags as a free mass does
+    free = m == 1 and nearest == 2 and clear
+    if abs(phases[m]) > CONTRADICTED and not free:
+        raise ResponseError(
+            f"integrators = {m} does not fit: {where}, where {-90 * m} is expected; give 0 for a device on a "
+            "spring, 1 for one with a dashpot to the ground, 2 for a free one, or measure lower"
+        )
 
 
 CONFIDENCE: Final = 0.95

@@ -12,6 +12,7 @@ method.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import exp, inf, isfinite, log, nan
 from typing import Any, Final
@@ -323,21 +324,35 @@ class _Pushes:
             why = NONE_STABLE if peak is None else ""
             return -inf if peak is None else log(peak.stiffness) - log_stiffness
 
-        high = low = log(near) + START
-        for _ in range(STEPS):
-            off = excess(high)
-            if off <= 0.0:
-                break
-            high += STEP
-        for _ in range(STEPS if off > -inf else 0):
-            low = high - STEP
-            off = excess(low)
-            if off >= 0.0:
-                return exp(float(brentq(excess, low, high, xtol=SETTLED))), OK
-            if off == -inf:
-                break
-            high = low
+        stiffness, low = _balanced_stiffness(excess, near)
+        if stiffness is not None:
+            return stiffness, OK
         return nan, f"none: where the handle sinks in by {abs(push) / exp(low):.4g} m, {why or TOO_SOFT}"
+
+
+def _balanced_stiffness(excess: Callable[[float], float], near: float) -> tuple[float | None, float]:
+    """Find the largest stiffness [N/m] at which `excess` is 0.
+
+    excess  logarithm of a stiffness -> by what ratio it could be larger, a logarithm; -inf where that is not known
+    near    the stiffness from which the search goes upwards, then downwards [N/m]
+
+    Returns  the stiffness, or None where there is none, and the logarithm of the smallest one tried
+    """
+    high = low = log(near) + START
+    for _ in range(STEPS):
+        off = excess(high)
+        if off <= 0.0:
+            break
+        high += STEP
+    for _ in range(STEPS if off > -inf else 0):
+        low = high - STEP
+        off = excess(low)
+        if off >= 0.0:
+            return exp(float(brentq(excess, low, high, xtol=SETTLED))), low
+        if off == -inf:
+            break
+        high = low
+    return None, low
 
 
 def _hand_neglected(point: OperatingPoint, chart: StabilityChart) -> float:

@@ -101,28 +101,11 @@ def interpolate_response(
             "accurate chart"
         )
     G, delay = smooth_part(theta, P, integrators)
-    nodes, values = [-theta[MIRRORED - 1 :: -1], theta], [np.conj(G[MIRRORED - 1 :: -1]), G]
-    if closed:
-        at_end = np.pi - theta[-1] < 1e-9
-        if at_end:
-            values[1] = np.append(G[:-1], G[-1].real or 1e-15 * abs(G[-2]))
-        near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
-        nodes.append(2.0 * np.pi - theta[near])
-        values.append(np.conj(G[near]))
-    x, y = np.concatenate(nodes), np.concatenate(values)
+    x, y = _with_mirror_images(theta, G, closed)
     with np.errstate(divide="ignore"):
         log = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y))
     kinds = np.where(np.isfinite(y) & (y != 0.0), np.array([y, 1.0 / np.where(y == 0.0, 1.0, y), log]), 0.0)
-    # what is next to nothing at half the sampling rate (a free mass) is measured by its neighbours
-    size = np.maximum(np.abs(y), 0.2 * np.mean(np.abs(y[_windows(len(y))[0]]), axis=1))
-    missed = np.array(
-        [
-            _prediction_error(x, kinds[0], size),
-            _prediction_error(x, kinds[1], kinds[1]),
-            _prediction_error(x, kinds[2], 1.0),
-        ]
-    )
-    missed = np.maximum(missed[:, :-1], missed[:, 1:])
+    missed = _missed_between(x, y, kinds)
     if closed and not measured_to_half_rate:
         missed[1, MIRRORED + len(theta) - 1] = np.inf
     kind = np.argmin(missed, axis=0)
@@ -132,6 +115,38 @@ def interpolate_response(
         lines[MIRRORED : MIRRORED + len(straight)] = straight
     kind, error = np.where(lines, 0, kind), np.where(lines, 0.0, error)
     return ResponseInterpolation(x, kinds, slopes, kind, lines, error, integrators, delay, closed)
+
+
+def _with_mirror_images(theta: Floats, G: Complexes, closed: bool) -> tuple[Floats, Complexes]:
+    """Return angles (k,) [rad] and values (k,) of G (n,), with the mirror images of some beside 0 and, of a closed
+    response, beside pi."""
+    nodes, values = [-theta[MIRRORED - 1 :: -1], theta], [np.conj(G[MIRRORED - 1 :: -1]), G]
+    if closed:
+        at_end = np.pi - theta[-1] < 1e-9
+        if at_end:
+            values[1] = np.append(G[:-1], G[-1].real or 1e-15 * abs(G[-2]))
+        near = slice(-2, -MIRRORED - 2, -1) if at_end else slice(None, -MIRRORED - 1, -1)
+        nodes.append(2.0 * np.pi - theta[near])
+        values.append(np.conj(G[near]))
+    return np.concatenate(nodes), np.concatenate(values)
+
+
+def _missed_between(x: Floats, y: Complexes, kinds: Complexes) -> Floats:
+    """Return by how much (3, k - 1), relative, each kind (3, k) of G, 1 / G and log G misses the nodes on both
+    sides of an interval: the larger of the two.
+
+    x, y  (k,) angles [rad] and values of G
+    """
+    # what is next to nothing at half the sampling rate (a free mass) is measured by its neighbours
+    size = np.maximum(np.abs(y), 0.2 * np.mean(np.abs(y[_windows(len(y))[0]]), axis=1))
+    missed = np.array(
+        [
+            _prediction_error(x, kinds[0], size),
+            _prediction_error(x, kinds[1], kinds[1]),
+            _prediction_error(x, kinds[2], 1.0),
+        ]
+    )
+    return np.asarray(np.maximum(missed[:, :-1], missed[:, 1:]))
 
 
 def _windows(n: int) -> tuple[Ints, Flags]:

@@ -80,15 +80,9 @@ def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[
     quadrants = {index: _quadrant(shape) for index, shape in shapes.items()}
     left = _quadrant(common)
     alone = {index: _stiffest(quadrant, unit) for index, quadrant in quadrants.items()}
-    K, B, owner = _stiffest_common(members, alone, left, unit)
+    peak = K, B, _ = _stiffest_common(members, alone, left, unit)
     arcs = tuple(_arcs(members, shapes, common, unit))
-    at_peak: tuple[int, ...] = ()
-    frequencies: tuple[float, ...] = ()
-    if owner is not None:
-        at_peak, frequencies = (owner,), members[owner].frequencies_at_stiffness_max
-    elif K > 0.0:
-        at_peak = _members_at(shapes, common, K * unit, B)
-        frequencies = tuple(sorted({float(members[index].check(K, B).frequency) for index in at_peak}))
+    at_peak, frequencies = _members_at_peak(members, shapes, common, peak, unit)
     areas = {index: float(quadrant.area) / unit for index, quadrant in quadrants.items()}
     by_area = max(areas, key=lambda index: (areas[index], -index))
     by_stiffness = max(alone, key=lambda index: (np.nan_to_num(alone[index][0]), -index))
@@ -115,6 +109,29 @@ def measured_robust_chart(members: Mapping[int, MeasuredChart], failed: Mapping[
         corner_blur=CHORD,
         off_circle=np.empty((0, 2)),  # polygons: their edge is known to chords alone
     )
+
+
+def _members_at_peak(
+    members: Mapping[int, MeasuredChart],
+    shapes: Mapping[int, shapely.MultiPolygon],
+    common: shapely.MultiPolygon,
+    peak: tuple[float, float, int | None],
+    unit: float,
+) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Return the members that bind at the stiffest common wall, and the frequencies there [Hz]; none of either
+    where there is no such wall.
+
+    shapes, common  of each member and of all, in [K unit, B];   peak  as `_stiffest_common` returns it
+    """
+    K, B, owner = peak
+    at_peak: tuple[int, ...] = ()
+    frequencies: tuple[float, ...] = ()
+    if owner is not None:
+        at_peak, frequencies = (owner,), members[owner].frequencies_at_stiffness_max
+    elif K > 0.0:
+        at_peak = _members_at(shapes, common, K * unit, B)
+        frequencies = tuple(sorted({float(members[index].check(K, B).frequency) for index in at_peak}))
+    return at_peak, frequencies
 
 
 def open_edge(chart: MeasuredChart) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
 from numbers import Real
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,6 +102,52 @@ def simulate_mechanism(
     >>> simulate_mechanism(device.at(), wall, hollow, duration=0.1, start_velocity=device.direction()).status
     'done'
     """
+    mechanism, posture = _moved_mechanism(point)
+    check_choice("torque_limits", torque_limits, ("each", "together"))
+    if seed < 0:
+        raise ArgumentError("seed", f"must be zero or positive, got {seed}")
+    environment, values = _environment_at(wall, surface)
+    check_no_feedback(
+        point.controller,
+        "the large motion of a mechanism is not simulated",
+        "simulate one rendered direction, or leave it out",
+    )
+    drives = len(posture.jacobian[0])
+    inputs = motion_inputs(mechanism, point.controller, duration, push, gravity, substeps, drives)
+    start = _MotionStart(mechanism, posture, *start_rates(posture, start_velocity))
+    settings = _Settings(surface, environment, values, substeps, seed, counted, torque_limits)
+    return _simulate(point, start, settings, inputs, duration, progress)
+
+
+class _MotionStart(NamedTuple):
+    """Mechanism and posture from which a motion starts, velocity (3,) of the handle [m/s], rates (d,) of the
+    drives [rad/s]."""
+
+    mechanism: Mechanism
+    posture: Posture
+    velocity: Floats
+    rates: Floats
+
+
+class _Settings(NamedTuple):
+    """What is rendered in a motion, and how it is computed; the fields are those of `MechanismMotion`."""
+
+    surface: Surface | None
+    environment: Environment | None
+    values: Floats
+    substeps: int
+    seed: int
+    counted: bool
+    torque_limits: Literal["each", "together"]
+
+
+def _moved_mechanism(point: OperatingPoint) -> tuple[Mechanism, Posture]:
+    """Return the mechanism that is moved, and the posture from which it starts.
+
+    Raises  ArgumentError  for anything but one posture of one design, in reach and not singular
+            NoMechanismError  for a device without a mechanism
+            what `OperatingPoint.require` raises
+    """
     check_kind("point", point, OperatingPoint)
     mechanism, posture = point.mechanism, point.posture
     if mechanism is None or posture is None:
@@ -117,9 +163,14 @@ def simulate_mechanism(
         )
     if mechanism.design_shape:
         raise ArgumentError("", f"one design is simulated at a time, got a set of shape {mechanism.design_shape}")
-    check_choice("torque_limits", torque_limits, ("each", "together"))
-    if seed < 0:
-        raise ArgumentError("seed", f"must be zero or positive, got {seed}")
+    return mechanism, posture
+
+
+def _environment_at(wall: SurfaceRendering | None, surface: Surface | None) -> tuple[Environment | None, Floats]:
+    """Return the environment that is rendered at a surface, None for a free device, and its parameters (P,).
+
+    Raises  ArgumentError  where one of the two is missing, and as `rendered_environment`
+    """
     if (wall is None) != (surface is None):
         raise ArgumentError(
             "", "a wall needs a surface and a surface a wall; give both, or neither for a free device"
@@ -127,53 +178,78 @@ def simulate_mechanism(
     environment, values = None, np.zeros(0)
     if wall is not None and surface is not None:
         environment, values = rendered_environment(wall, surface)
-    controller = point.controller
-    check_no_feedback(
-        controller,
-        "the large motion of a mechanism is not simulated",
-        "simulate one rendered direction, or leave it out",
-    )
-    inputs = motion_inputs(mechanism, controller, duration, push, gravity, substeps, len(posture.jacobian[0]))
-    velocity, rates = start_rates(posture, start_velocity)
-    shape, mech = packed(surface), pack(mechanism)
-    if surface is not None:
-        check_reach(mechanism, mech, posture, surface)
-    # any direction that the handle can move along will do: matrices and drives are the same for all
-    along = np.linalg.svd(posture.jacobian)[0][:, 0]
-    plant = reduce_mechanism(mechanism, posture, along, "full", point.damping, point.encoders)
-    system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
-    start = _start(mechanism, posture, system, rates)
-    trace = _empty_trace(inputs.samples + 1, len(start), len(system.motor))
-    read = system.motor if point.encoders == "motor" else np.arange(len(system.motor))
-    address = 0 if environment is None else environment.address
-    law = rendering_inputs(
-        mechanism.drives, shape, address, values, read, counted, seed, torque_limits == "together"
-    )
-    with watched(progress, "simulating", partial(_samples_done, trace), len(trace.position)):
-        status, reached = kernel.run_motion(
-            system, law, computers([controller], [controller.force_limit]), start, posture.angles.copy(),
-            inputs.push, controller.fractional_delay, substeps, trace,
-        )  # fmt: skip
+    return environment, values
+
+
+def _simulate(
+    point: OperatingPoint,
+    start: _MotionStart,
+    settings: _Settings,
+    inputs: MotionInputs,
+    duration: float,
+    progress: Progress | None,
+) -> MechanismMotion:
+    """Simulate a motion of so many seconds, and say why it ends where it ends early.
+
+    Raises ArgumentError  for a surface that the handle never touches
+    """
+    surface, environment, period = settings.surface, settings.environment, point.controller.sampling_period
+    system, trace, status, reached = _run(point, start, settings, inputs, progress)
     motion = MechanismMotion(
         point=point,
         surface=surface,
         environment=environment,
-        values=values,
-        start_velocity=velocity,
+        values=settings.values,
+        start_velocity=start.velocity,
         push=inputs.push,
         gravity=inputs.gravity,
         duration=duration,
-        substeps=substeps,
-        seed=seed,
-        counted=counted,
-        torque_limits=torque_limits,
+        substeps=settings.substeps,
+        seed=settings.seed,
+        counted=settings.counted,
+        torque_limits=settings.torque_limits,
         status="at a joint limit" if status >= kernel.AT_LIMIT else REASONS[status][0],
-        reason=_reason(status, mechanism, max(reached - 1, 0) * controller.sampling_period),
-        **_course(system, trace, reached, controller.sampling_period),
+        reason=_reason(status, start.mechanism, max(reached - 1, 0) * period),
+        **_course(system, trace, reached, period),
     )
     if status == kernel.NO_FORCE and environment is not None and surface is not None:
         return replace(motion, reason=_unanswered(motion, environment, surface))
     return motion
+
+
+def _run(
+    point: OperatingPoint,
+    start: _MotionStart,
+    settings: _Settings,
+    inputs: MotionInputs,
+    progress: Progress | None,
+) -> tuple[System, kernel.Trace, int, int]:
+    """Compute a motion; return its equations, its records, the kernel's status and the number of samples reached.
+
+    Raises ArgumentError  for a surface that the handle never touches
+    """
+    mechanism, posture, controller = start.mechanism, start.posture, point.controller
+    shape, mech = packed(settings.surface), pack(mechanism)
+    if settings.surface is not None:
+        check_reach(mechanism, mech, posture, settings.surface)
+    # any direction that the handle can move along will do: matrices and drives are the same for all
+    along = np.linalg.svd(posture.jacobian)[0][:, 0]
+    plant = reduce_mechanism(mechanism, posture, along, "full", point.damping, point.encoders)
+    system = system_of(mech, mechanism.drives, plant, inputs.gravity, controller.actuator_time_constant)
+    state = _start(mechanism, posture, system, start.rates)
+    trace = _empty_trace(inputs.samples + 1, len(state), len(system.motor))
+    read = system.motor if point.encoders == "motor" else np.arange(len(system.motor))
+    address = 0 if settings.environment is None else settings.environment.address
+    together = settings.torque_limits == "together"
+    law = rendering_inputs(
+        mechanism.drives, shape, address, settings.values, read, settings.counted, settings.seed, together
+    )
+    with watched(progress, "simulating", partial(_samples_done, trace), len(trace.position)):
+        status, reached = kernel.run_motion(
+            system, law, computers([controller], [controller.force_limit]), state, posture.angles.copy(),
+            inputs.push, controller.fractional_delay, settings.substeps, trace,
+        )  # fmt: skip
+    return system, trace, status, reached
 
 
 def _start(mechanism: Mechanism, posture: Posture, system: System, rates: Floats) -> Floats:

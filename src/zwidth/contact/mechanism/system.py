@@ -120,18 +120,8 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
     if actuator_lag > 0.0:
         along += list(np.eye(n)[motor])
         strength, lag, command = strength + [0.0] * d, lag + [actuator_lag] * d, command + list(range(d))
-    cubic, excess, kink = np.zeros(d), np.zeros(d), np.zeros(d)
-    friction, kind = np.zeros((d, 5)), np.zeros(d, np.int64)
-    for spring in plant.nonlinear.springs:
-        i = int(np.flatnonzero(spring.along[motor] > 0.0)[0])
-        cubic[i], excess[i], kink[i] = spring.cubic, spring.backward_excess, spring.kink
-    for part in plant.nonlinear.friction:
-        i = int(np.flatnonzero(part.along[motor])[0])
-        bristles = part.bristles
-        if bristles is None:
-            kind[i], friction[i, 0] = DRY, part.coulomb
-        else:
-            kind[i], friction[i] = BRISTLES, bristles
+    cubic, excess, kink = _spring_numbers(plant, motor)
+    friction, kind = _friction_numbers(plant, motor)
     return System(
         mech=mech,
         motor=motor.astype(np.int64),
@@ -149,6 +139,38 @@ def system_of(mech: MechanismArrays, drives: Drives, plant: Plant, gravity: Floa
         friction=friction,
         friction_model=kind,
     )
+
+
+def _spring_numbers(plant: Plant, motor: Ints) -> tuple[Floats, Floats, Floats]:
+    """Return cubic term, excess backward and kink (d,) of the drives' springs, in the units of `System`; zeros for
+    linear springs.
+
+    motor  (d,) coordinates of the motors
+    """
+    d = len(motor)
+    cubic, excess, kink = np.zeros(d), np.zeros(d), np.zeros(d)
+    for spring in plant.nonlinear.springs:
+        i = int(np.flatnonzero(spring.along[motor] > 0.0)[0])
+        cubic[i], excess[i], kink[i] = spring.cubic, spring.backward_excess, spring.kink
+    return cubic, excess, kink
+
+
+def _friction_numbers(plant: Plant, motor: Ints) -> tuple[Floats, Ints]:
+    """Return the parameters (d, 5) of each drive's friction, in the units of `System`, and its kind (d,); zeros
+    where there is none.
+
+    motor  (d,) coordinates of the motors
+    """
+    d = len(motor)
+    friction, kind = np.zeros((d, 5)), np.zeros(d, np.int64)
+    for part in plant.nonlinear.friction:
+        i = int(np.flatnonzero(part.along[motor])[0])
+        bristles = part.bristles
+        if bristles is None:
+            kind[i], friction[i, 0] = DRY, part.coulomb
+        else:
+            kind[i], friction[i] = BRISTLES, bristles
+    return friction, kind
 
 
 @compiled

@@ -34,7 +34,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.arrays import Floats
+from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.device import Device
 from zwidth.identify.arm.parameters import BaseParameters, Parameters
@@ -307,59 +307,92 @@ def consistent_links(
     parameters = base.parameters
     file = pseudo_inertias(mechanism, parameters.bodies)
     roots = np.asarray(np.linalg.cholesky(file), dtype=np.float64)
-    rotor = np.array([_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
-    size = np.sqrt(np.diag(information))
-    size = 1.0 / np.where(size > 0.0, size, 1.0)
-    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
-    whiten = (np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T) / size
+    rotors = np.array([_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
+    whiten = _whitening(information)
     free = np.arange(*parameters.friction.indices(len(parameters.names)))
     own = [base.kept.index(j) if j in base.kept else -1 for j in free]
-
-    count = parameters.inertial + len(rotor)
-
-    def all_parameters(x: Floats) -> tuple[Floats, Floats]:
-        """The parameters (P,), and their derivatives (P, count) by x."""
-        values, slopes = np.zeros(len(parameters.names)), np.zeros((len(parameters.names), count))
-        bodies, by_own = _numbers(roots, x[: parameters.inertial].reshape(-1, PARAMETERS))
-        values[: parameters.inertial] = bodies.ravel()
-        for k in range(len(file)):
-            own = slice(PARAMETERS * k, PARAMETERS * (k + 1))
-            slopes[own, own] = by_own[k]
-        turning = np.arange(parameters.inertial, count)
-        values[turning] = slopes[turning, turning] = rotor * np.exp(x[turning])
-        return values, slopes
-
+    count = parameters.inertial + len(rotors)
     dynamic = np.array([k for k in range(len(base.kept)) if k not in own], dtype=int)
     kept_friction = np.array([k for k in own if k >= 0], dtype=int)
-    # friction is free, so that what is left of the information is that of the rest alone
-    rest = whiten[:, dynamic]
-    if len(kept_friction):
-        Q = np.linalg.qr(whiten[:, kept_friction])[0]
-        rest = rest - Q @ (Q.T @ rest)
+    rest = _without_friction(whiten, dynamic, kept_friction)
     G = base.matrix[dynamic]
 
     def residuals(x: Floats) -> Floats:
-        return np.concatenate([rest @ (G @ all_parameters(x)[0] - beta[dynamic]), x / WIDE])
+        return np.concatenate(
+            [rest @ (G @ _all_parameters(parameters, roots, rotors, x)[0] - beta[dynamic]), x / WIDE]
+        )
 
     def slopes(x: Floats) -> Floats:
-        return np.concatenate([rest @ (G @ all_parameters(x)[1]), np.eye(count) / WIDE])
+        return np.concatenate(
+            [rest @ (G @ _all_parameters(parameters, roots, rotors, x)[1]), np.eye(count) / WIDE]
+        )
 
     solved = least_squares(
         residuals, np.zeros(count), jac=slopes, xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=200
     )
-    values = all_parameters(np.asarray(solved.x))[0]
+    values = _all_parameters(parameters, roots, rotors, np.asarray(solved.x))[0]
     moved = rest @ (G @ values - beta[dynamic])
     deviation = float(np.sqrt(np.sum(moved**2) / max(len(dynamic), 1)))
     # friction at its best beside these links; a negative level is none
-    shift = np.zeros(len(base.kept))
-    shift[dynamic] = G @ values - beta[dynamic]
-    if len(kept_friction):
-        shift[kept_friction] = -np.linalg.lstsq(
-            whiten[:, kept_friction], whiten[:, dynamic] @ shift[dynamic], rcond=None
-        )[0]
+    shift = _shift(whiten, dynamic, kept_friction, G @ values - beta[dynamic])
     for j, k in zip(free, own, strict=True):
         values[j] = beta[k] + shift[k] if k >= 0 else 0.0
     return ConsistentLinks(values, deviation)
+
+
+def _whitening(information: Floats) -> Floats:
+    """Give a root W (b, b) of the information, W^T W, of base parameters."""
+    size = np.sqrt(np.diag(information))
+    size = 1.0 / np.where(size > 0.0, size, 1.0)
+    eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
+    return np.asarray((np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T) / size)
+
+
+def _without_friction(whiten: Floats, dynamic: Ints, friction: Ints) -> Floats:
+    """Give the columns (b, n) of the information's root for the dynamic base parameters, less what friction can
+    take over: it is free, so that what is left of the information is that of the rest alone.
+
+    whiten             (b, b) root of the information
+    dynamic, friction  numbers of the base parameters (n,), (k,) that are no friction, and that are
+    """
+    rest = whiten[:, dynamic]
+    if len(friction):
+        Q = np.linalg.qr(whiten[:, friction])[0]
+        rest = rest - Q @ (Q.T @ rest)
+    return rest
+
+
+def _all_parameters(parameters: Parameters, roots: Floats, rotors: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Compute the parameters (P,) of links, friction being 0, and their derivatives (P, count) by x (count,).
+
+    roots   (w, 4, 4) lower triangles of the file's pseudo-inertias
+    rotors  (r,) inertias of the fitted rotors in the file [kg m^2]
+    x       ten coordinates of each link, and the logarithm of each rotor's inertia over the file's
+    """
+    count = parameters.inertial + len(rotors)
+    values, slopes = np.zeros(len(parameters.names)), np.zeros((len(parameters.names), count))
+    bodies, by_own = _numbers(roots, x[: parameters.inertial].reshape(-1, PARAMETERS))
+    values[: parameters.inertial] = bodies.ravel()
+    for k in range(len(roots)):
+        own = slice(PARAMETERS * k, PARAMETERS * (k + 1))
+        slopes[own, own] = by_own[k]
+    turning = np.arange(parameters.inertial, count)
+    values[turning] = slopes[turning, turning] = rotors * np.exp(x[turning])
+    return values, slopes
+
+
+def _shift(whiten: Floats, dynamic: Ints, friction: Ints, moved: Floats) -> Floats:
+    """Give the change (b,) of all base parameters, friction at its best beside links that change the dynamic ones
+    by `moved` (n,).
+
+    whiten             (b, b) root of the information
+    dynamic, friction  numbers of the base parameters (n,), (k,) that are no friction, and that are
+    """
+    shift = np.zeros(len(whiten))
+    shift[dynamic] = moved
+    if len(friction):
+        shift[friction] = -np.linalg.lstsq(whiten[:, friction], whiten[:, dynamic] @ shift[dynamic], rcond=None)[0]
+    return shift
 
 
 def pseudo_inertias(mechanism: Mechanism, bodies: tuple[int, ...]) -> Floats:

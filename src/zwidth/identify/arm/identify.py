@@ -231,12 +231,7 @@ class _Work:
         checks.append(length_check(seen, validation, base))
         if stop := self.refusal(checks):
             return stop
-        first = regress([one.columns for one in seen], [one.torques for one in seen])
-        noisy = list(self._noisy(comparison, fitted))
-        sources = error_sources(band, first, seen, noisy)
-        groups = np.array([int(j >= parameters.friction.start) for j in base.kept] + [0])
-        fit = regress([one.columns for one in seen], [one.torques for one in seen], sources, groups)
-        beta = _unbiased(fit, noisy)
+        fit, beta = self._regressed(comparison, fitted, seen)
         checks += self._fit_checks(fit, base, beta, seen, validation, weights, band)
         if stop := self.refusal(checks):
             return stop
@@ -370,6 +365,18 @@ class _Work:
 
     # --- the fit ------------------------------------------------------------------------------------------
 
+    def _regressed(
+        self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch], seen: Sequence[Compared]
+    ) -> tuple[Regression, Floats]:
+        """Fit the base parameters; return the regression, and their values (b,) without the bias of noise."""
+        base = comparison.base
+        first = regress([one.columns for one in seen], [one.torques for one in seen])
+        noisy = list(self._noisy(comparison, fitted))
+        sources = error_sources(comparison.band, first, seen, noisy)
+        groups = np.array([int(j >= base.parameters.friction.start) for j in base.kept] + [0])
+        fit = regress([one.columns for one in seen], [one.torques for one in seen], sources, groups)
+        return fit, _unbiased(fit, noisy)
+
     def _noisy(self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch]) -> Iterator[list[Compared]]:
         """The fitted part with as much noise of the positions again, and then with the same of the other sign."""
         rng = np.random.default_rng(0)
@@ -446,13 +453,12 @@ class _Work:
         links = consistent_links(base, self.mechanism, beta, fit.information)
         values = np.zeros(len(base.parameters.names))
         values[list(base.kept)] = beta
-        masses = self._masses(base, values, links)
         numbers, noted = link_settings(self.device, self.mechanism, base.parameters, links.values)
         best = np.append(beta, fit.delay)
         shares, total = _explained(validation, best)
         checks = [*checks, consistency_check(links), validation_check(self.drives, shares, band.edge)]
         estimates = [
-            *link_mass_estimates(self.point, masses, base, fit),
+            *link_mass_estimates(self.point, self._masses(base, values, links), base, fit),
             *joint_friction_estimates(self.device, self.mechanism, base, fit, beta),
             *base_estimates(base, fit, beta),
             delay_estimate(fit),
@@ -463,33 +469,40 @@ class _Work:
             f"compared up to {band.edge:.3g} Hz",
             *noted,
         )
-        last = max(one.record for one in validation)
-        what = (
-            f"the last record, {self.records[last].label}"
-            if len(self.records) > 1
-            else "the last 30 % of the record"
-        )
         return ArmIdentification(
             kind=KIND,
             label=self.device.label,
             checks=tuple(checks),
             estimates=tuple(estimates),
             validation=total,
-            validated_on=f"torque of {what} up to {band.edge:.3g} Hz by its recorded accelerations, whose "
-            "noise is in both; mean of the joints",
+            validated_on=self._validated_on(validation, band),
             remarks=remarks,
             curves=self._curves(validation, best),
-            details={
-                "validation_by_drive": dict(zip(self.drives, shares, strict=True)),
-                "condition_number": fit.condition,
-                "band_Hz": band.edge,
-                "side": self.side,
-                "torque": self.torque,
-                "rotors": self.rotors,
-                "gravity_m_per_s2": self.gravity.tolist(),
-            },
+            details=self._details(fit, shares, band),
             numbers=numbers,
         )
+
+    def _validated_on(self, validation: Sequence[Compared], band: TorqueBand) -> str:
+        """Say what the share that is explained is of."""
+        last = max(one.record for one in validation)
+        many = len(self.records) > 1
+        what = f"the last record, {self.records[last].label}" if many else "the last 30 % of the record"
+        return (
+            f"torque of {what} up to {band.edge:.3g} Hz by its recorded accelerations, whose noise is in both; "
+            "mean of the joints"
+        )
+
+    def _details(self, fit: Regression, shares: Sequence[float], band: TorqueBand) -> dict[str, Any]:
+        """Give the share of each drive's torque that is explained, the fit's condition, and the options."""
+        return {
+            "validation_by_drive": dict(zip(self.drives, shares, strict=True)),
+            "condition_number": fit.condition,
+            "band_Hz": band.edge,
+            "side": self.side,
+            "torque": self.torque,
+            "rotors": self.rotors,
+            "gravity_m_per_s2": self.gravity.tolist(),
+        }
 
     def _masses(self, base: BaseParameters, values: Floats, links: ConsistentLinks) -> Iterator[EffectiveMass]:
         """The effective masses: by the base parameters where these determine them, else by all of the links."""

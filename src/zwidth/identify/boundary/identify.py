@@ -87,16 +87,7 @@ def identify_boundary(
     progress        called with stage, steps done, and steps
     Raises          DeviceError  for faults of the records and of the arguments, and where the device has no chart
     """
-    if not records:
-        raise fail(device.label, "", "no record was given; give a CSV file with points of the boundary")
-    if through not in ROUTES:
-        raise fail(device.label, "through", f"must be chart, experiment or nothing, got {through!r}")
-    point = device.at() if point is None else point
-    if point.operator != device.operator:
-        device = device.held_by(point.operator or "none")
-    if not paths and not damping_models:
-        text = "name the numbers to fit, such as loop.delay_samples, or a damping model, or all of them"
-        raise fail(device.label, "paths", text)
+    device, point = _held_device(device, records, point, paths, damping_models, through)
     report = progress or (lambda stage, done, of: None)
     report("reading the points", 0, 0)
     points, checks = complete_points(read_boundary_points(records), records)
@@ -118,6 +109,47 @@ def identify_boundary(
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     comparison = compare_models(fits, report)
+    return _validated(device, records, checks, comparison, plan, report)
+
+
+def _held_device(
+    device: Device,
+    records: Sequence[Record],
+    point: OperatingPoint | None,
+    paths: Sequence[str],
+    damping_models: str | Sequence[str],
+    through: str | None,
+) -> tuple[Device, OperatingPoint]:
+    """Check the arguments of `identify_boundary`; return the device as it is held, and where it is used.
+
+    Raises  DeviceError  without records or numbers to fit, and for another word in `through`
+    """
+    if not records:
+        raise fail(device.label, "", "no record was given; give a CSV file with points of the boundary")
+    if through not in ROUTES:
+        raise fail(device.label, "through", f"must be chart, experiment or nothing, got {through!r}")
+    point = device.at() if point is None else point
+    if point.operator != device.operator:
+        device = device.held_by(point.operator or "none")
+    if not paths and not damping_models:
+        text = "name the numbers to fit, such as loop.delay_samples, or a damping model, or all of them"
+        raise fail(device.label, "paths", text)
+    return device, point
+
+
+def _validated(
+    device: Device,
+    records: Sequence[Record],
+    checks: list[Check],
+    comparison: DampingComparison,
+    plan: TrialPlan | None,
+    report: Progress,
+) -> Identification:
+    """Check and validate the best model, and return the result; without numbers where a check refuses them.
+
+    checks  passed so far; gets those of the fit
+    plan    of the trials; None where the chart was compared
+    """
     model, fit = comparison.model, comparison.best
     checks += [*_alike(fit), check_explained(model, fit)]
     if (nothing := refused(KIND, device.label, checks)) is not None:

@@ -104,27 +104,65 @@ def identify_impedance(
     point = device.at() if point is None else point
     wall = _wall(device, stiffness, damping)
     report = progress or (lambda stage, done, of: None)
-    samplings, checks = list[SampleTimes](), list[Check]()
-    for record in records:
-        sampling, check = check_sampling(record)
-        checks.append(check)
-        if sampling is not None:
-            samplings.append(sampling)
+    samplings, checks = _samplings(records)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    periods = [one.period for one in samplings]
-    if max(periods) > min(periods) * 1.001:
-        text = (
-            f"the records have sampling periods from {min(periods):.6g} to {max(periods):.6g} s; give each alone"
-        )
-        return Identification(KIND, device.label, (*checks, Check("sampling", False, text)))
+    if (unlike := _unlike_periods(samplings)) is not None:
+        return Identification(KIND, device.label, (*checks, unlike))
     checks += check_periods(records, samplings, device.controller.sampling_period)
     for number, (record, sampling) in enumerate(zip(records, samplings, strict=True)):
         report("looking at the records", number, len(records))
         checks += _check_signals(record, sampling)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    states = []
+    states, coherence_checks = _measured_states(records, samplings, segment, point, wall, report)
+    checks += coherence_checks
+    if not states:
+        return Identification(KIND, device.label, tuple(checks))
+    checks += [check for state in states for check in _check_against(state, wall)]
+    if any(not (check.passed or check.warning) and check.what in ("units", "sign", "columns") for check in checks):
+        return Identification(KIND, device.label, tuple(checks))
+    return _identification(device, checks, states)
+
+
+def _samplings(records: Sequence[Record]) -> tuple[list[SampleTimes], list[Check]]:
+    """Read when the samples were taken; return the samplings of the records that have one, and the check of each.
+    Raises DeviceError for cells that are no numbers."""
+    samplings, checks = list[SampleTimes](), list[Check]()
+    for record in records:
+        sampling, check = check_sampling(record)
+        checks.append(check)
+        if sampling is not None:
+            samplings.append(sampling)
+    return samplings, checks
+
+
+def _unlike_periods(samplings: Sequence[SampleTimes]) -> Check | None:
+    """Check that the records have one sampling period; return what failed, None where they have."""
+    periods = [one.period for one in samplings]
+    if max(periods) > min(periods) * 1.001:
+        text = (
+            f"the records have sampling periods from {min(periods):.6g} to {max(periods):.6g} s; give each alone"
+        )
+        return Check("sampling", False, text)
+    return None
+
+
+def _measured_states(
+    records: Sequence[Record],
+    samplings: Sequence[SampleTimes],
+    segment: int | None,
+    point: OperatingPoint,
+    wall: tuple[float, float] | None,
+    report: Progress,
+) -> tuple[list[_State], list[Check]]:
+    """Measure the impedance in each state of the wall.
+
+    segment  samples of a segment of the spectra; None: a third of the longest stretch
+    Returns  the states in which force and motion are coherent, and the check of each one
+    Raises   DeviceError  for words of the column wall that name no state
+    """
+    states, checks = list[_State](), list[Check]()
     for name in _states(records, wall):
         report(f"spectra, {STATES[name]}", 0, 0)
         longest = max(longest_stretch(*one, name) for one in zip(records, samplings, strict=True))
@@ -132,11 +170,11 @@ def identify_impedance(
         checks.append(check)
         if state is not None:
             states.append(state)
-    if not states:
-        return Identification(KIND, device.label, tuple(checks))
-    checks += [check for state in states for check in _check_against(state, wall)]
-    if any(not (check.passed or check.warning) and check.what in ("units", "sign", "columns") for check in checks):
-        return Identification(KIND, device.label, tuple(checks))
+    return states, checks
+
+
+def _identification(device: Device, checks: Sequence[Check], states: Sequence[_State]) -> Identification:
+    """Validate the states, and return the result with the impedance's numbers, remarks and curves."""
     share = _validation(states)
     return Identification(
         kind=KIND,
@@ -232,21 +270,8 @@ def _state(
     wall: tuple[float, float] | None,
 ) -> tuple[_State | None, Check]:
     """The spectra of one state of the wall, and whether force and motion are coherent in it."""
-
-    def spectra_of(part: tuple[float, float]) -> LocalSpectra:
-        return merged_sums(
-            [
-                local_spectra(
-                    stretches_of(record, sampling, _names(record), name, part),
-                    sampling.period,
-                    length,
-                    (FORCE, POSITION),
-                )
-                for record, sampling in zip(records, samplings, strict=True)
-            ]
-        )
-
-    first, second = spectra_of((0.0, FIRST_PART)), spectra_of((FIRST_PART, 1.0))
+    first = _spectra_of_part(name, records, samplings, length, (0.0, FIRST_PART))
+    second = _spectra_of_part(name, records, samplings, length, (FIRST_PART, 1.0))
     spectra = merged_sums([first, second])
     if spectra.segments < FEWEST_SEGMENTS:
         text = (
@@ -273,6 +298,31 @@ def _state(
     )
     state = _State(name, first, second, impedance, _predicted(name, point, wall, f))
     return state, Check("coherence", True, text)
+
+
+def _spectra_of_part(
+    name: str,
+    records: Sequence[Record],
+    samplings: Sequence[SampleTimes],
+    length: int,
+    part: tuple[float, float],
+) -> LocalSpectra:
+    """Sum the spectra of force and position over the same part of each record, in one state of the wall.
+
+    length  of a segment [samples]
+    part    of the record, from which share of it to which
+    """
+    return merged_sums(
+        [
+            local_spectra(
+                stretches_of(record, sampling, _names(record), name, part),
+                sampling.period,
+                length,
+                (FORCE, POSITION),
+            )
+            for record, sampling in zip(records, samplings, strict=True)
+        ]
+    )
 
 
 def _predicted(

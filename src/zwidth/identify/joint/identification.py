@@ -145,6 +145,37 @@ def fitted_joint(
         joint.force_column(record)  # columns are wrong before samples are
     report = progress or (lambda stage, done, of: None)
     steps = len(records) + 4
+    checks, read = _read_motion(device, records, joint, report, steps)
+    if read is None:
+        return tuple(checks), None
+    sampling, motion, windows = read
+    mass = _assumed_mass(device, joint, motion, mass_from_file)
+    report("fitting", steps - 3, steps)
+    forward, backward = directions(windows, motion)
+    numbers = _numbers(motion, forward, backward, mass, spring is not False)
+    fit, outlying = _fit(windows, motion, numbers, spring)
+    report("validating", steps - 1, steps)
+    unseen, starts, share, left_out = _validation(fit, windows, motion)
+    unit_mass = not motion.driven and not mass_from_file
+    outlying += left_out
+    balance = balance_of(fit, motion) if motion.driven else None
+    fitted = FittedJoint(
+        joint, motion, sampling, (), fit, unseen, starts, forward, backward, share, outlying, unit_mass, balance
+    )
+    checks += _checks_after_fit(fitted, windows, numbers, records)
+    fitted = replace(fitted, checks=tuple(checks))
+    return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
+
+
+def _read_motion(
+    device: Device, records: Sequence[Record], joint: Joint, report: Progress, steps: int
+) -> tuple[list[Check], tuple[SampleTimes, JointMotion, Windows] | None]:
+    """Read the records and check them before anything is fitted.
+
+    steps    of the whole identification, for `report`
+    Returns  all checks; the first record's sampling, the motion, its windows; None where a check refuses the data
+    Raises   DeviceError  for cells that are no numbers
+    """
     checks, samplings = list[Check](), list[SampleTimes]()
     for n, record in enumerate(records):
         report("reading records", n, steps)
@@ -152,12 +183,12 @@ def fitted_joint(
         checks.append(check)
         samplings += [] if sampling is None else [sampling]
     if len(samplings) < len(records):
-        return tuple(checks), None
+        return checks, None
     report("reading records", len(records), steps)
     motion = read_motion(records, samplings, joint)
     checks += _enough(motion, samplings)
     if any(not check.passed for check in checks):
-        return tuple(checks), None
+        return checks, None
     checks += check_periods(records, samplings, device.controller.sampling_period)
     motion = _limited(motion, joint)
     windows = windows_of(motion)
@@ -165,7 +196,13 @@ def fitted_joint(
     if motion.driven and all(check.passed or check.warning for check in checks):
         checks += check_dependence(_balance_before(windows, motion, records), motion)
     if any(not (check.passed or check.warning) for check in checks):
-        return tuple(checks), None
+        return checks, None
+    return checks, (samplings[0], motion, windows)
+
+
+def _assumed_mass(device: Device, joint: Joint, motion: JointMotion, mass_from_file: bool) -> float:
+    """Choose the mass with which the fit begins: the file's [kg or kg m^2] for free motion, where it is asked for;
+    else 1. Raises DeviceError where the file has none."""
     mass = 1.0
     if mass_from_file and not motion.driven:
         mass = joint.mass
@@ -173,42 +210,36 @@ def fitted_joint(
             raise fail(
                 device.label, "", f"gives no mass that moves {joint.place}; set it, or record a driven motion"
             )
-    report("fitting", steps - 3, steps)
-    forward, backward = directions(windows, motion)
-    numbers = _numbers(motion, forward, backward, mass, spring is not False)
-    fit, outlying = _fit(windows, motion, numbers, spring)
-    report("validating", steps - 1, steps)
+    return mass
+
+
+def _validation(
+    fit: JointFit, windows: Windows, motion: JointMotion
+) -> tuple[Windows, Floats, float, tuple[float, ...]]:
+    """Predict the windows that were not fitted.
+
+    Returns  them, their starts (W, 2), the share of their motion that is predicted, and the times of those left
+             out, as they do not follow the model [s]
+    """
     unseen = windows.chosen(_unseen(windows))
     starts = first_starts(unseen, fit.numbers.values)
     _, starts, squares = approach(unseen, replace(fit.numbers, free=(), tied=()), starts, 20)
     kept = squares <= OUTLYING**2 * _mean_square(fit, motion) * unseen.length
     kept |= np.mean(~kept) > MOST_OUTLYING  # then it is the model that is wrong
     share = explained(unseen.chosen(kept), squares[kept])
-    unit_mass = not motion.driven and not mass_from_file
-    outlying += tuple(unseen.time[~kept].tolist())
-    balance = balance_of(fit, motion) if motion.driven else None
-    fitted = FittedJoint(
-        joint,
-        motion,
-        samplings[0],
-        (),
-        fit,
-        unseen,
-        starts,
-        forward,
-        backward,
-        share,
-        outlying,
-        unit_mass,
-        balance,
-    )
-    checks.append(_check_model(fitted, windows, numbers, records))
-    if (checks[-1].passed or checks[-1].warning) and not fit.converged:
-        checks.append(_no_minimum(fit))  # a model that is wrong is the better reason
-    if balance is not None and (checks[-1].passed or checks[-1].warning):
-        checks += check_dependence(balance, motion)
-    fitted = replace(fitted, checks=tuple(checks))
-    return tuple(checks), fitted if checks[-1].passed or checks[-1].warning else None
+    return unseen, starts, share, tuple(unseen.time[~kept].tolist())
+
+
+def _checks_after_fit(
+    fitted: FittedJoint, windows: Windows, numbers: JointNumbers, records: Sequence[Record]
+) -> list[Check]:
+    """Check the model, the search's end, and what the recorded force depends on; return these checks."""
+    checks = [_check_model(fitted, windows, numbers, records)]
+    if (checks[-1].passed or checks[-1].warning) and not fitted.fit.converged:
+        checks.append(_no_minimum(fitted.fit))  # a model that is wrong is the better reason
+    if fitted.balance is not None and (checks[-1].passed or checks[-1].warning):
+        checks += check_dependence(fitted.balance, fitted.motion)
+    return checks
 
 
 def _balance_before(windows: Windows, motion: JointMotion, records: Sequence[Record]) -> ForceBalance:

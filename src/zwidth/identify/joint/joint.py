@@ -14,6 +14,7 @@ from zwidth.device.faults import comma_list, dotted, fail, suggestion
 from zwidth.device.legs import LegMember, members
 from zwidth.errors import DeviceError
 from zwidth.identify.records.record import Columns, Record
+from zwidth.model.plant import Plant
 
 COLUMNS: Final = Columns(
     ("time_s", ("position_m", "angle_rad")),
@@ -152,27 +153,7 @@ def _of_plant(device: Device, name: str | None) -> Joint:
     limit = table(table(document, "loop"), "saturation").get("force_N", inf)
     step = float(encoder) if encoder else nan
     if n == 1:
-        s, a = float(plant.sensor[0]), float(plant.actuator[0])
-        numbers = table(document, "plant")
-        ends = {
-            key: ".0.0" * isinstance(numbers.get(key), list)
-            for key in ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
-        }
-        friction = ".0" * isinstance(table(document, "friction").get("coulomb_N"), list)
-        paths = {
-            "mass": (f"plant.mass_kg{ends['mass_kg']}", s * a),
-            "damping": (f"plant.damping_Ns_per_m{ends['damping_Ns_per_m']}", s * a),
-            "stiffness": (f"plant.stiffness_N_per_m{ends['stiffness_N_per_m']}", s * a),
-            "coulomb": (f"friction.coulomb_N{friction}", abs(a)),
-        }
-        return Joint(
-            "at the device's encoder",
-            False,
-            step=step,
-            limit=float(limit),
-            mass=float(plant.mass[0, 0]) / (s * a),
-            paths=paths,
-        )
+        return _of_single_coordinate(plant, document, step, float(limit))
     levels = table(document, "friction").get("coulomb_N")
     path = {"coulomb": (f"friction.coulomb_N.{i}", 1.0)} if isinstance(levels, list) else {}
     remark = (
@@ -180,6 +161,34 @@ def _of_plant(device: Device, name: str | None) -> Joint:
         "the file has no key for the former, and has the latter by coordinate"
     )
     return Joint(f"{label} of the plant", False, step=step, limit=float(limit), paths=path, remarks=(remark,))
+
+
+def _of_single_coordinate(plant: Plant, document: dict[str, Any], step: float, limit: float) -> Joint:
+    """Give the joint of a plant of one coordinate: its mass at the encoder [kg], and the paths of its numbers.
+
+    step, limit  of the encoder [m]; largest force [N]
+    """
+    s, a = float(plant.sensor[0]), float(plant.actuator[0])
+    numbers = table(document, "plant")
+    ends = {
+        key: ".0.0" * isinstance(numbers.get(key), list)
+        for key in ("mass_kg", "damping_Ns_per_m", "stiffness_N_per_m")
+    }
+    friction = ".0" * isinstance(table(document, "friction").get("coulomb_N"), list)
+    paths = {
+        "mass": (f"plant.mass_kg{ends['mass_kg']}", s * a),
+        "damping": (f"plant.damping_Ns_per_m{ends['damping_Ns_per_m']}", s * a),
+        "stiffness": (f"plant.stiffness_N_per_m{ends['stiffness_N_per_m']}", s * a),
+        "coulomb": (f"friction.coulomb_N{friction}", abs(a)),
+    }
+    return Joint(
+        "at the device's encoder",
+        False,
+        step=step,
+        limit=limit,
+        mass=float(plant.mass[0, 0]) / (s * a),
+        paths=paths,
+    )
 
 
 def _path(member: LegMember, key: str, document: dict[str, Any]) -> str:

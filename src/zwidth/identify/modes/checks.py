@@ -72,6 +72,20 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
         if counts < COUNTS:
             reason += f"; at least {COUNTS:.0f} are needed: drive the device harder, or at lower frequencies"
         checks.append(Check("motion", bool(counts >= COUNTS), reason))
+    checks.append(_saturation_check(source, levels, limit))
+    drift = levels.drift / position
+    reason = f"a straight line through {names.position} makes {100.0 * drift:.3g} % of its span"
+    checks.append(Check("drift", True, reason + "; the position is differenced twice, so that it does not count"))
+    return checks
+
+
+def _saturation_check(source: Source, levels: Levels, limit: float) -> Check:
+    """Check that the force is within the device's largest one, and not held at an amplifier's; a warning where
+    many samples are at the largest or the least force.
+
+    limit  largest force that the device commands
+    """
+    names, label = source.channels, source.record.label
     share = levels.at_limit / levels.count
     beyond = float(np.max(np.abs([levels.low[0], levels.high[0]])))
     if beyond > limit * (1.0 + 1e-9):
@@ -79,21 +93,16 @@ def level_checks(source: Source, levels: Levels, step: float, given_step: float,
             f"{names.force} of {label} reaches {beyond:.4g}, but the device commands {limit:.4g} at most: what "
             "moved it is not what is written; drive it less"
         )
-        checks.append(Check("saturation", False, reason))
-    elif share > AT_LIMIT:
+        return Check("saturation", False, reason)
+    if share > AT_LIMIT:
         reason = (
             f"{100.0 * share:.3g} % of the samples of {label} have the largest or the least {names.force}, "
             f"{levels.high[0]:.4g} or {levels.low[0]:.4g}: right for steps and binary noise; if an amplifier "
             "clipped it there, write the force that was commanded as command_ and the measured one beside it, "
             "or drive less"
         )
-        checks.append(Check("saturation", False, reason, warning=True))
-    else:
-        checks.append(Check("saturation", True, f"{100.0 * share:.2g} % of the samples are at the largest force"))
-    drift = levels.drift / position
-    reason = f"a straight line through {names.position} makes {100.0 * drift:.3g} % of its span"
-    checks.append(Check("drift", True, reason + "; the position is differenced twice, so that it does not count"))
-    return checks
+        return Check("saturation", False, reason, warning=True)
+    return Check("saturation", True, f"{100.0 * share:.2g} % of the samples are at the largest force")
 
 
 def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -64,7 +65,7 @@ from zwidth.identify.modes.overview import (
     survey_of,
 )
 from zwidth.identify.modes.physical_fit import PhysicalFit, device_estimates, fit_model, modal_estimates
-from zwidth.identify.modes.stretches import KEPT, Channels, Source, Stretch, channels_of
+from zwidth.identify.modes.stretches import KEPT, Channels, Levels, Source, Stretch, channels_of
 from zwidth.identify.records.record import Columns, Record
 from zwidth.identify.records.sampling import check_sampling
 from zwidth.loop.operating_point import OperatingPoint
@@ -196,18 +197,8 @@ def _saw(
 ) -> _Seen:
     """Checks of each record before anything is fitted (levels, excitation, steps of the encoder, force limits),
     and what of it may be fitted."""
-    checks = list[Check]()
+    checks = _checks_of_levels(device, point, sources, survey.levels)
     nothing = np.zeros(0)
-    given = device.document.get("loop", {}).get("encoder", {}).get("resolution_m", 0.0)
-    given = float(given) if point.given_plant is not None and isinstance(given, int | float) else 0.0
-    limit = float(point.loop.nonlinear.force_limit)
-    for source, levels in zip(sources, survey.levels, strict=True):
-        if not levels.count:
-            reason = f"no stretch of {source.record.label} without a gap has 256 samples; record longer"
-            checks.append(Check("duration", False, reason))
-            continue
-        first = source.first()
-        checks += level_checks(source, levels, encoder_step([first.position] if first else []), given, limit)
     closed = bool(sources[0].channels.reference)
     chosen = estimator or ("joint" if closed else "H1")
     if any(not (c.passed or c.warning) for c in checks) or not survey.spectra.segments:
@@ -230,12 +221,7 @@ def _saw(
     checks.append(flip_check(survey.agreement))
     if not all(check.passed for check in checks[-2:]):  # all else would be said of what is not so
         return _Seen(checks, chosen, value, coherence, excited, 0.0)
-    squared, _ = undamped_modes(point.plant.mass, point.plant.stiffness)
-    if closed:
-        checks.append(Check("feedback", True, "the reference of the centring loop is recorded: S_yr/S_ur is used"))
-    else:
-        free = bool(np.any(squared == 0.0))
-        checks.append(feedback_check(loudest.force, loudest.position, spectra.period, free))
+    checks.append(_feedback_or_reference(point, loudest, spectra.period, closed))
     checks.append(_input_check(sources[0].channels))
     check, top = coherence_check(spectra, excited, closed)
     checks.append(check)
@@ -244,6 +230,33 @@ def _saw(
         own = sampled_response(point.loop, np.minimum(theta, np.pi))
         checks += sign_and_unit_checks(spectra, excited, value, own, sources[0].channels.turns)
     return _Seen(checks, chosen, value, coherence, excited, top)
+
+
+def _checks_of_levels(
+    device: Device, point: OperatingPoint, sources: Sequence[Source], levels_of: Sequence[Levels]
+) -> list[Check]:
+    """Check the length of each record, and the values in its columns, by its levels; return these checks."""
+    checks = list[Check]()
+    given = device.document.get("loop", {}).get("encoder", {}).get("resolution_m", 0.0)
+    given = float(given) if point.given_plant is not None and isinstance(given, int | float) else 0.0
+    limit = float(point.loop.nonlinear.force_limit)
+    for source, levels in zip(sources, levels_of, strict=True):
+        if not levels.count:
+            reason = f"no stretch of {source.record.label} without a gap has 256 samples; record longer"
+            checks.append(Check("duration", False, reason))
+            continue
+        first = source.first()
+        checks += level_checks(source, levels, encoder_step([first.position] if first else []), given, limit)
+    return checks
+
+
+def _feedback_or_reference(point: OperatingPoint, loudest: Stretch, period: float, closed: bool) -> Check:
+    """Check that no loop centres the device, or that its reference is recorded (closed); period [s]."""
+    squared, _ = undamped_modes(point.plant.mass, point.plant.stiffness)
+    if closed:
+        return Check("feedback", True, "the reference of the centring loop is recorded: S_yr/S_ur is used")
+    free = bool(np.any(squared == 0.0))
+    return feedback_check(loudest.force, loudest.position, period, free)
 
 
 def _input_check(channels: Channels) -> Check:
@@ -275,6 +288,43 @@ def _fitted(
 
     pilot  modes fitted to a coarse response, which say where the bands lie; they are laid anew until poles stay
     """
+    response, unseen_part, modal = _banded_fit(data, pilot)
+    rough, _ = modal_intervals(response, modal, profiled=False)
+    checks.append(shift_check(float(rough.low[0]), float(rough.high[0]), modal.misfit))
+    checks.append(resolution_check(modal, data.line))
+    if numbers is not None and numbers.hand:
+        checks.append(hand_check(response, numbers, point))
+    if result := refused("modes", device.label, checks):
+        return result
+    found, modal, difference = _model_and_damping(response, numbers, modal, data.period)
+    profiled, spread = modal_intervals(response, modal)
+    turns = data.sources[0].channels.turns
+    estimates = modal_estimates(modal, profiled, spread, modal.damping == "hysteretic", turns)
+    remarks = [_damping_remark(difference)] if modal.count else ["no resonance shows in the record"]
+    details = _details(seen, survey, difference, modal.misfit, turns)
+    if numbers is not None and found is not None:
+        own, more = device_estimates(device, numbers, found, data.period)
+        estimates, remarks = own + estimates, remarks + more
+        details["misfit"] = found.misfit
+        if found.misfit > MISFIT:
+            checks.append(_misfit_check(found, numbers, response, data.period))
+    remarks += periodic_lines(survey.period, data.sources[survey.loudest[0]], details)
+    fitted = modal.response if found is None or numbers is None else partial(numbers.response, found.fit.values)
+    curves = _curves(survey.spectra, seen, fitted)
+    share = explained_share(unseen_part, fitted)
+    if _clipped(checks, data.sources) and share < FOLLOWED:
+        return Identification("modes", device.label, (*checks, _unfollowed_check(share)))
+    text = f"{data.unseen}, predicted from its force"
+    return Identification(
+        "modes", device.label, tuple(checks), tuple(estimates), share, text, tuple(remarks), curves, details
+    )
+
+
+def _banded_fit(data: FittedData, pilot: ModalFit) -> tuple[RecordResponse, BandedRecord, ModalFit]:
+    """Fit modes in bands about their poles, which are laid anew until poles stay; sets the noise in `data`.
+
+    Returns  the response that was fitted, the sums for the validation, the modes
+    """
     modal = pilot
     for _ in range(MOST_ROUNDS):
         before = modal.poles
@@ -284,60 +334,45 @@ def _fitted(
         data.noise = response.noise
         if data.settled(before, modal.poles):
             break
-    rough, _ = modal_intervals(response, modal, profiled=False)
-    checks.append(shift_check(float(rough.low[0]), float(rough.high[0]), modal.misfit))
-    checks.append(resolution_check(modal, data.line))
-    if numbers is not None and numbers.hand:
-        checks.append(hand_check(response, numbers, point))
-    if result := refused("modes", device.label, checks):
-        return result
+    return response, unseen_part, modal
+
+
+def _model_and_damping(
+    response: RecordResponse, numbers: SampledModel | None, modal: ModalFit, period: float
+) -> tuple[PhysicalFit | None, ModalFit, float]:
+    """Fit the device's numbers, None without them, and choose the modes' damping.
+
+    Returns  the numbers' fit, the modes, and the criterion with loss factors less that with dampers
+    """
     found = None
     if numbers is not None:
-        found = fit_model(response, numbers, modal, data.period)
+        found = fit_model(response, numbers, modal, period)
         if found.misfit < modal.misfit:
             loop = numbers.loop_of(found.values)
             modal = min(modal, modes_of(response, loop), key=lambda fit: fit.criterion)
     viscous, lossy = with_either_damping(response, modal) if modal.count else (modal, modal)
     difference = lossy.criterion - viscous.criterion
-    modal = lossy if difference < -STRONG else viscous
-    profiled, spread = modal_intervals(response, modal)
-    turns = data.sources[0].channels.turns
-    estimates = modal_estimates(modal, profiled, spread, modal.damping == "hysteretic", turns)
-    remarks = [_damping_remark(difference)] if modal.count else ["no resonance shows in the record"]
-    details: dict[str, Any] = {
+    return found, lossy if difference < -STRONG else viscous, difference
+
+
+def _details(seen: _Seen, survey: Survey, difference: float, misfit: float, turns: bool) -> dict[str, Any]:
+    """Give the spectra's and the modes' numbers by key; `difference` is that of the criterion by the damping."""
+    return {
         "estimator": seen.estimator,
         "averages": survey.spectra.averages,
         "damping_criterion_difference": difference,
-        "modal_misfit": modal.misfit,
+        "modal_misfit": misfit,
         "turns": turns,
     }
-    if numbers is not None and found is not None:
-        own, more = device_estimates(device, numbers, found, data.period)
-        estimates, remarks = own + estimates, remarks + more
-        details["misfit"] = found.misfit
-        if found.misfit > MISFIT:
-            checks.append(_misfit_check(found, numbers, response, data.period))
-    remarks += periodic_lines(survey.period, data.sources[survey.loudest[0]], details)
 
-    def fitted(theta: Floats) -> Complexes:
-        return (
-            modal.response(theta)
-            if found is None or numbers is None
-            else numbers.response(found.fit.values, theta)
-        )
 
-    curves = _curves(survey.spectra, seen, fitted)
-    share = explained_share(unseen_part, fitted)
-    if _clipped(checks, data.sources) and share < FOLLOWED:
-        reason = (
-            f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another "
-            "force acted there than is written; drive less, or write what the amplifier gave"
-        )
-        return Identification("modes", device.label, (*checks, Check("validation", False, reason)))
-    text = f"{data.unseen}, predicted from its force"
-    return Identification(
-        "modes", device.label, tuple(checks), tuple(estimates), share, text, tuple(remarks), curves, details
+def _unfollowed_check(share: float) -> Check:
+    """Say that too small a share of the unseen motion follows a force with flat tops."""
+    reason = (
+        f"only {100.0 * share:.3g} % of the unseen motion follows the force, which has flat tops: another "
+        "force acted there than is written; drive less, or write what the amplifier gave"
     )
+    return Check("validation", False, reason)
 
 
 def _clipped(checks: Sequence[Check], sources: Sequence[Source]) -> bool:

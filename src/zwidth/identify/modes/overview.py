@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.arrays import Complexes, Floats
+from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.identify.modes.stretches import BLOCK, Levels, Source
 from zwidth.identify.records.record import Piece
 from zwidth.progress import Progress
@@ -194,14 +194,28 @@ def periodic_lines(period: int, source: Source, details: dict[str, Any]) -> list
     mean, scatter = Y.mean(axis=0), Y.std(axis=0, ddof=1) / np.sqrt(len(Y))
     inside = np.arange(len(power)) <= h[-1]
     inside &= np.arange(len(power)) >= h[0]
-    odd = np.arange(len(power)) % 2 == 1
     if len(h) == np.count_nonzero(inside):
         text = (
             f"the force repeats every {period} samples and excites each line: what a nonlinearity makes is not "
             "told from the device; leave out even lines, and one odd line in four, to see it"
         )
         return [text]
-    remarks = [f"the force repeats every {period} samples and excites {len(h)} lines"]
+    remark = f"the force repeats every {period} samples and excites {len(h)} lines"
+    return [remark, *_distortion_remarks(mean, scatter, excited, inside, details)]
+
+
+def _distortion_remarks(
+    mean: Complexes, scatter: Floats, excited: Flags, inside: Flags, details: dict[str, Any]
+) -> list[str]:
+    """Say of even and of odd lines that were not excited whether the position moves there beyond noise.
+
+    mean, scatter    (n,) of the position's transform over the periods, and the mean's standard deviation
+    excited, inside  (n,) lines with force, and lines from the first of these to the last
+    details          gets their share of the motion at the excited lines
+    Returns          a remark on each kind that was left out
+    """
+    odd = np.arange(len(excited)) % 2 == 1
+    remarks = list[str]()
     names = {
         "even": "a stiffness or friction that differs with the sign",
         "odd": "friction, backlash or saturation",

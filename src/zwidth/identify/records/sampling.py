@@ -91,19 +91,15 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
              steps of which more than 1 % are off by a fifth
     Raises   DeviceError  for cells that are no numbers
     """
-
-    def failed(reason: str) -> tuple[None, Check]:
-        return None, Check("sampling", False, reason)
-
     pieces = record.pieces()
     first = next(pieces, None)
     if first is None or len(first["time_s"]) < FEWEST:
         rows = 0 if first is None else len(first["time_s"])
-        return failed(f"{plural(rows, 'row')} in {record.label}, at least {FEWEST} are needed; record longer")
+        return _failed(f"{plural(rows, 'row')} in {record.label}, at least {FEWEST} are needed; record longer")
     usual = _usual_step(first["time_s"][:FIRST])
     if not usual > 0.0:
         what = "falls; sort the rows by rising time" if usual < 0.0 else f"stands still; {MORE_DIGITS}"
-        return failed(f"time_s of {record.label} {what}")
+        return _failed(f"time_s of {record.label} {what}")
     row, missing, uneven, sums, runs = 0, 0, 0, np.zeros(3), list[Ints]()
     last, last_whole, first_uneven = np.nan, False, -1
     for piece in chain([first], pieces):
@@ -112,16 +108,7 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
         steps = np.diff(time) / usual
         falling = np.flatnonzero(steps <= 0.0)
         if len(falling):
-            i = int(falling[0])
-            if time[i + 1] == time[i]:
-                again = f"is {time[i]:.9g} s once more at {record.place(row + i)}"
-                return failed(
-                    f"time_s of {record.label} {again}; {MORE_DIGITS}, or leave out the row that is twice"
-                )
-            return failed(
-                f"time_s of {record.label} goes from {time[i]:.9g} to {time[i + 1]:.9g} s at "
-                f"{record.place(row + i)}; sort the rows by rising time"
-            )
+            return _failed(_fault_of_order(record, time, row, int(falling[0])))
         many = np.rint(np.where(np.isfinite(steps), steps, 1.0))
         off = np.flatnonzero(np.isfinite(steps) & (np.abs(steps - many) > UNEVEN) | (many < 1.0))
         uneven += len(off)
@@ -135,24 +122,62 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
         last, last_whole, row = float(piece["time_s"][-1]), bool(whole[-1]), row + len(whole)
     edges = np.sort(np.concatenate([*runs, [row] if last_whole else []]).astype(np.int64))
     if uneven > MOST_UNEVEN * row:
-        return failed(
-            f"{uneven} of {row} rows of {record.label} do not follow the one before by {usual:.6g} s or a "
-            f"multiple of it, first at {record.place(first_uneven)}; record every sample of the loop, with "
-            "its own time"
-        )
+        return _failed(_fault_of_steps(record, uneven, row, usual, first_uneven))
+    sampling = _sample_times(usual, sums, row, missing, edges)
+    if period is not None and abs(sampling.period / period - 1.0) > SAME_PERIOD:
+        return _failed(_fault_of_period(record, sampling.period, period))
+    return sampling, Check("sampling", True, _sentence(sampling))
+
+
+def _failed(reason: str) -> tuple[None, Check]:
+    """Return no sampling, and the check that failed for this reason."""
+    return None, Check("sampling", False, reason)
+
+
+def _fault_of_order(record: Record, time: Floats, row: int, i: int) -> str:
+    """Say where the time stamps [s] do not rise: from `time[i]` to the next one.
+
+    row  of the record at which a piece begins, `time[1]`
+    """
+    if time[i + 1] == time[i]:
+        again = f"is {time[i]:.9g} s once more at {record.place(row + i)}"
+        return f"time_s of {record.label} {again}; {MORE_DIGITS}, or leave out the row that is twice"
+    return (
+        f"time_s of {record.label} goes from {time[i]:.9g} to {time[i + 1]:.9g} s at "
+        f"{record.place(row + i)}; sort the rows by rising time"
+    )
+
+
+def _fault_of_steps(record: Record, uneven: int, rows: int, usual: float, first: int) -> str:
+    """Say how many rows, the first of them at row `first`, do not come a multiple of the usual step [s] after the
+    one before."""
+    return (
+        f"{uneven} of {rows} rows of {record.label} do not follow the one before by {usual:.6g} s or a "
+        f"multiple of it, first at {record.place(first)}; record every sample of the loop, with "
+        "its own time"
+    )
+
+
+def _sample_times(usual: float, sums: Floats, rows: int, missing: int, edges: Ints) -> SampleTimes:
+    """Compute period and jitter of the samples [s].
+
+    usual  step of the time stamps at the beginning [s]
+    sums   number of the steps where no sample is missing, and sums of their deviations from the usual one, over
+           it, and of the squares of these
+    edges  (2 r,) first row, and the one behind the last, of each stretch without a gap
+    """
     count, mean = max(sums[0], 1.0), sums[1] / max(sums[0], 1.0)
     jitter = usual * float(np.sqrt(max(sums[2] / count - mean**2, 0.0)))
-    sampling = SampleTimes(usual * float(1.0 + mean), jitter, row, missing, edges.reshape(-1, 2))
-    if period is not None and abs(sampling.period / period - 1.0) > SAME_PERIOD:
-        return failed(
-            f"the rows of {record.label} come every {sampling.period:.6g} s, the device's computer samples every "
-            f"{period:.6g} s; "
-            + (
-                unit_of_time(sampling.period / period)
-                or "record every sample of the loop, or correct loop.sampling_period_s"
-            )
-        )
-    return sampling, Check("sampling", True, _sentence(sampling))
+    return SampleTimes(usual * float(1.0 + mean), jitter, rows, missing, edges.reshape(-1, 2))
+
+
+def _fault_of_period(record: Record, own: float, period: float) -> str:
+    """Say that a record's own period is not that of the computer, `period` [s], and what may be the cause."""
+    return (
+        f"the rows of {record.label} come every {own:.6g} s, the device's computer samples every "
+        f"{period:.6g} s; "
+        + (unit_of_time(own / period) or "record every sample of the loop, or correct loop.sampling_period_s")
+    )
 
 
 def unit_of_time(ratio: float) -> str:

@@ -60,24 +60,10 @@ def identify_response(
     Raises       DeviceError  for records that cannot be read
     """
     period = device.controller.sampling_period
-    checks, sweeps = list[Check](), list[SweepBlocks]()
-    for record in records:
-        sampling, check = check_sampling(record, period)
-        checks.append(replace(check, what=_named("sampling", record, records)))
-        if sampling is None:
-            continue
-        name = next(one for one in FORCES if one in record)
-        sweep = SweepBlocks.longest(record, sampling, name, "position_m")
-        checks.append(replace(_gaps(len(sweep), sampling.rows), what=_named("gaps", record, records)))
-        checks += [replace(one, what=_named(one.what, record, records)) for one in _check_sweep(sweep)]
-        sweeps.append(sweep)
+    checks, sweeps = _sweeps(records, period)
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
-    count = min(len(sweep) for sweep in sweeps)
-    fitted = int(FIT_SHARE * count)
-    once = min(shared_excitation(sweep, int(FIT_SHARE * len(sweep))) for sweep in sweeps) < LEAST_SHARED
-    if once:  # each frequency is there at one time only: all of it is fitted
-        fitted = count
+    fitted, once = _fitted_samples(sweeps)
     length = block_length(fitted, segment)
     try:
         responses = [
@@ -102,6 +88,58 @@ def identify_response(
         checks += check_prediction(min(shares, default=np.nan))
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
+    share, validated_on = min(shares, default=np.nan), _validated_on(len(sweeps), once)
+    return _charted(device, checks, responses, response, share, validated_on)
+
+
+def _sweeps(records: Sequence[Record], period: float) -> tuple[list[Check], list[SweepBlocks]]:
+    """Check the sampling and the columns of each record.
+
+    period   of the device's computer [s]
+    Returns  the checks; the longest stretch of each record that has a sampling
+    Raises   DeviceError  for cells that are no numbers
+    """
+    checks, sweeps = list[Check](), list[SweepBlocks]()
+    for record in records:
+        sampling, check = check_sampling(record, period)
+        checks.append(replace(check, what=_named("sampling", record, records)))
+        if sampling is None:
+            continue
+        name = next(one for one in FORCES if one in record)
+        sweep = SweepBlocks.longest(record, sampling, name, "position_m")
+        checks.append(replace(_gaps(len(sweep), sampling.rows), what=_named("gaps", record, records)))
+        checks += [replace(one, what=_named(one.what, record, records)) for one in _check_sweep(sweep)]
+        sweeps.append(sweep)
+    return checks, sweeps
+
+
+def _fitted_samples(sweeps: Sequence[SweepBlocks]) -> tuple[int, bool]:
+    """Choose how many samples of each sweep are fitted.
+
+    Returns  their number, and whether each frequency is there at one time only
+    """
+    count = min(len(sweep) for sweep in sweeps)
+    fitted = int(FIT_SHARE * count)
+    once = min(shared_excitation(sweep, int(FIT_SHARE * len(sweep))) for sweep in sweeps) < LEAST_SHARED
+    if once:  # each frequency is there at one time only: all of it is fitted
+        fitted = count
+    return fitted, once
+
+
+def _charted(
+    device: Device,
+    checks: list[Check],
+    responses: Sequence[Response],
+    response: Response,
+    share: float,
+    validated_on: str,
+) -> Identification:
+    """Make the chart of the response, and return the result with it; without a number where there is no chart.
+
+    checks     passed so far; gets that of the chart
+    responses  of each sweep;   response  of all
+    share      of the unseen acceleration that is predicted;   validated_on  what it is of
+    """
     chart, why = _chart(response, device.controller)
     checks.append(Check("chart", chart is not None, why))
     if chart is None:
@@ -111,8 +149,8 @@ def identify_response(
         device.label,
         tuple(checks),
         (_largest_stiffness(chart),),
-        min(shares, default=np.nan),
-        _validated_on(len(sweeps), once),
+        share,
+        validated_on,
         tuple(_remarks(chart, device, response)),
         _columns(responses),
         {"averages": response.averages, "integrators": chart.integrators, "measurement": response.note},

@@ -15,6 +15,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from zwidth.arrays import Floats
 from zwidth.device.device import Device
 from zwidth.device.faults import comma_list, dotted, fail, plural, quote, suggestion
 from zwidth.device.legs import members, written
@@ -165,13 +166,47 @@ def _share_explained(fit: SpringFit, unseen: Strokes) -> float:
 
 def _estimates(fit: SpringFit, strokes: Strokes, drive: Drive, side: str) -> Iterator[Estimate]:
     """The numbers of the spring; forward is where the motor leads the joint, as in the device file."""
-
-    def estimate(name: str, value: float, gradient: dict[str, float], unit: str, key: str = "") -> Estimate:
-        half = fit.half_width(gradient)
-        return Estimate(name, value, value - half, value + half, unit, f"{drive.path}.{key}" if key else "")
-
     bend = fit.bend(strokes)
-    forward, k3 = fit["forward"], fit["hardening"]
+    yield from _stiffness_estimates(fit, bend, drive)
+    if "hardening" in fit.names:
+        path = f"{drive.path}.hardening_Nm_per_rad3"
+        yield _estimate(fit, "hardening", fit["hardening"], {"hardening": 1.0}, "N m/rad^3", path)
+    if fit["preload"] > 0.0:
+        yield _estimate(fit, "preload", fit["preload"], {"preload": 1.0}, "N m", f"{drive.path}.preload_Nm")
+    if "play" in fit.names:
+        yield _estimate(fit, "backlash", fit["play"], {"play": 1.0}, "rad")
+    friction = _estimate(fit, "dry friction", fit["friction"], {"friction": 1.0}, "N m")
+    path = f"{drive.path}.coulomb_Nm" if side == "motor" and friction.low > 0.0 else ""
+    yield replace(friction, low=max(friction.low, 0.0), value=max(friction.value, 0.0), path=path)
+    if "load" in fit.names:
+        yield _estimate(fit, "friction per torque", fit["load"], {"load": 1.0}, "1")
+    if "reversal" in fit.names:
+        yield _estimate(fit, "way over which friction turns", fit["reversal"], {"reversal": 1.0}, "rad")
+    way = 2.0 * float(np.ptp(bend))
+    loaded = way * float(np.mean(np.abs(fit.elastic(np.linspace(np.min(bend), np.max(bend), 1001)))))
+    lost = way * fit["friction"] + loaded * fit["load"]
+    loss = _estimate(fit, "hysteresis loss per cycle", lost, {"friction": way, "load": loaded}, "J")
+    yield replace(loss, low=max(loss.low, 0.0), value=max(loss.value, 0.0))
+
+
+def _estimate(
+    fit: SpringFit, name: str, value: float, gradient: dict[str, float], unit: str, path: str = ""
+) -> Estimate:
+    """Give a number its interval.
+
+    gradient  of the number by the fit's parameters
+    path      in the device file; "" where the file has no key for it
+    """
+    half = fit.half_width(gradient)
+    return Estimate(name, value, value - half, value + half, unit, path)
+
+
+def _stiffness_estimates(fit: SpringFit, bend: Floats, drive: Drive) -> Iterator[Estimate]:
+    """Give the stiffness of both ways, or of the one that was bent, and its largest and average value [N m/rad].
+
+    bend  (n,) of the spring [rad]
+    """
+    forward, k3, path = fit["forward"], fit["hardening"], f"{drive.path}.stiffness_Nm_per_rad"
     if "backward" in fit.names:
         backward = fit["backward"]
         uneven = abs(forward - backward) > fit.half_width({"forward": 1.0, "backward": -1.0})
@@ -179,40 +214,21 @@ def _estimates(fit: SpringFit, strokes: Strokes, drive: Drive, side: str) -> Ite
         halves = {"forward": 0.5, "backward": 0.5}
         unit = "N m/rad"
         if uneven:
-            yield estimate("stiffness", forward, {"forward": 1.0}, unit, "stiffness_Nm_per_rad")
-            yield estimate(
-                "backward stiffness", backward, {"backward": 1.0}, unit, "backward_stiffness_Nm_per_rad"
-            )
+            yield _estimate(fit, "stiffness", forward, {"forward": 1.0}, unit, path)
+            other = f"{drive.path}.backward_stiffness_Nm_per_rad"
+            yield _estimate(fit, "backward stiffness", backward, {"backward": 1.0}, unit, other)
         else:
-            yield estimate("stiffness", 0.5 * (forward + backward), halves, unit, "stiffness_Nm_per_rad")
+            yield _estimate(fit, "stiffness", 0.5 * (forward + backward), halves, unit, path)
         ends = {
             "forward": (forward + 3.0 * k3 * np.max(bend) ** 2, 3.0 * np.max(bend) ** 2),
             "backward": (backward + 3.0 * k3 * np.min(bend) ** 2, 3.0 * np.min(bend) ** 2),
         }
         stiffer = max(ends, key=lambda name: ends[name][0])
         gradient = {stiffer: 1.0, "hardening": float(ends[stiffer][1])}
-        yield estimate("largest stiffness", float(ends[stiffer][0]), gradient, unit)
-        yield estimate("average stiffness", 0.5 * (forward + backward), halves, unit)
+        yield _estimate(fit, "largest stiffness", float(ends[stiffer][0]), gradient, unit)
+        yield _estimate(fit, "average stiffness", 0.5 * (forward + backward), halves, unit)
     else:
-        yield estimate("stiffness", forward, {"forward": 1.0}, "N m/rad", "stiffness_Nm_per_rad")
-    if "hardening" in fit.names:
-        yield estimate("hardening", k3, {"hardening": 1.0}, "N m/rad^3", "hardening_Nm_per_rad3")
-    if fit["preload"] > 0.0:
-        yield estimate("preload", fit["preload"], {"preload": 1.0}, "N m", "preload_Nm")
-    if "play" in fit.names:
-        yield estimate("backlash", fit["play"], {"play": 1.0}, "rad")
-    friction = estimate("dry friction", fit["friction"], {"friction": 1.0}, "N m")
-    path = f"{drive.path}.coulomb_Nm" if side == "motor" and friction.low > 0.0 else ""
-    yield replace(friction, low=max(friction.low, 0.0), value=max(friction.value, 0.0), path=path)
-    if "load" in fit.names:
-        yield estimate("friction per torque", fit["load"], {"load": 1.0}, "1")
-    if "reversal" in fit.names:
-        yield estimate("way over which friction turns", fit["reversal"], {"reversal": 1.0}, "rad")
-    way = 2.0 * float(np.ptp(bend))
-    loaded = way * float(np.mean(np.abs(fit.elastic(np.linspace(np.min(bend), np.max(bend), 1001)))))
-    lost = way * fit["friction"] + loaded * fit["load"]
-    loss = estimate("hysteresis loss per cycle", lost, {"friction": way, "load": loaded}, "J")
-    yield replace(loss, low=max(loss.low, 0.0), value=max(loss.value, 0.0))
+        yield _estimate(fit, "stiffness", forward, {"forward": 1.0}, "N m/rad", path)
 
 
 def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Final
 
 import numpy as np
@@ -207,45 +207,12 @@ def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool
     """All numbers of the model by least squares."""
     from scipy.optimize import approx_fprime, least_squares
 
-    n, first = len(start.squared), int(start.free)
-    m = n - first
-    rows, columns = np.tril_indices(m)
-    tied = start.squared[first:] == 0.0
-    has_handle = "sh" in data.values and not at_sensor
-
-    def unpack(x: Floats) -> ModalModel:
-        squared = np.zeros(n)
-        squared[first:] = np.where(tied, 0.0, np.exp(np.clip(2.0 * x[:m], -200.0, 20.0)))
-        factor = np.zeros((m, m))
-        factor[rows, columns] = x[m : m + len(rows)]
-        damping = np.zeros((n, n))
-        damping[first:, first:] = factor @ factor.T
-        at = m + len(rows)
-        s = x[at : at + n]
-        at += n
-        a = s
-        if not tied_ends:
-            a, at = x[at : at + n], at + n
-        h = s
-        if not at_sensor:
-            h = start.handle
-            if has_handle:
-                h, at = x[at : at + n], at + n
-        delay = start.delay if data.delay is not None else max(float(x[at]), 0.0)
-        return ModalModel(squared, damping, a, s, h, delay, start.free)
+    unpack = partial(_model_of_numbers, data, start, at_sensor, tied_ends)
 
     def residual(x: Floats) -> Floats:
         return np.nan_to_num(_model_residual(data, unpack(x)), nan=1e6, posinf=1e6, neginf=-1e6)
 
-    diagonal = np.diag(np.sqrt(np.maximum(np.diag(start.damping)[first:], 1e-12)))
-    x0 = [0.5 * np.log(np.where(tied, 1.0, start.squared[first:])), diagonal[rows, columns], start.sensor]
-    if not tied_ends:
-        x0.append(start.actuator)
-    if has_handle:
-        x0.append(start.handle)
-    if data.delay is None:
-        x0.append(np.array([start.delay]))
-    x = np.concatenate(x0)
+    x = _numbers_of_model(data, start, at_sensor, tied_ends)
     scale = np.maximum(np.abs(x), 1e-3 * np.max(np.abs(x)))
     if len(x) > 2 * len(data.theta) * len(data.values):
         return start
@@ -257,6 +224,53 @@ def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool
         residual, x, slopes, x_scale=scale, method="lm", max_nfev=STEPS, ftol=1e-8, xtol=1e-10, gtol=1e-15
     )
     return unpack(found.x)
+
+
+def _model_of_numbers(
+    data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool, x: Floats
+) -> ModalModel:
+    """Return the model of the numbers (q,) that are fitted, laid out as by `_numbers_of_model`; the rest is that
+    of the start."""
+    n, first = len(start.squared), int(start.free)
+    m = n - first
+    rows, columns = np.tril_indices(m)
+    tied = start.squared[first:] == 0.0
+    squared = np.zeros(n)
+    squared[first:] = np.where(tied, 0.0, np.exp(np.clip(2.0 * x[:m], -200.0, 20.0)))
+    factor = np.zeros((m, m))
+    factor[rows, columns] = x[m : m + len(rows)]
+    damping = np.zeros((n, n))
+    damping[first:, first:] = factor @ factor.T
+    at = m + len(rows)
+    s = x[at : at + n]
+    at += n
+    a = s
+    if not tied_ends:
+        a, at = x[at : at + n], at + n
+    h = s
+    if not at_sensor:
+        h = start.handle
+        if "sh" in data.values:
+            h, at = x[at : at + n], at + n
+    delay = start.delay if data.delay is not None else max(float(x[at]), 0.0)
+    return ModalModel(squared, damping, a, s, h, delay, start.free)
+
+
+def _numbers_of_model(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> Floats:
+    """Return the numbers (q,) of the start that are fitted, per sample: logarithms of the modes' frequencies, the
+    lower triangle of the damping's factor, the sensor, and as far as they are free actuator, handle and delay."""
+    first = int(start.free)
+    rows, columns = np.tril_indices(len(start.squared) - first)
+    tied = start.squared[first:] == 0.0
+    diagonal = np.diag(np.sqrt(np.maximum(np.diag(start.damping)[first:], 1e-12)))
+    x0 = [0.5 * np.log(np.where(tied, 1.0, start.squared[first:])), diagonal[rows, columns], start.sensor]
+    if not tied_ends:
+        x0.append(start.actuator)
+    if "sh" in data.values and not at_sensor:
+        x0.append(start.handle)
+    if data.delay is None:
+        x0.append(np.array([start.delay]))
+    return np.concatenate(x0)
 
 
 def _model_residual(data: PathData, model: ModalModel) -> Floats:

@@ -98,7 +98,6 @@ def make_app(settings: Settings) -> FastAPI:
     contents = page_files()
     open_pages: set[Connection] = set()
     received: dict[str, Any] = {}
-    reports: dict[str, bytes] = {}
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -109,6 +108,18 @@ def make_app(settings: Settings) -> FastAPI:
         await asyncio.gather(*(page.end() for page in open_pages), pool.end())
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+
+    _add_checks(app, settings)
+    _add_page(app, settings, contents)
+    _add_reports(app, settings)
+    _add_files(app, contents)
+    _add_socket(app, settings, pool, open_pages, received)
+    return app
+
+
+def _add_checks(app: FastAPI, settings: Settings) -> None:
+    """Add to every request the check of the host and of the page that it comes from, and to every answer the
+    headers that restrict what a page may do."""
 
     @app.middleware("http")
     async def guard(request: Request, following: Any) -> Response:
@@ -132,6 +143,13 @@ def make_app(settings: Settings) -> FastAPI:
         )
         return answer
 
+
+def _add_page(app: FastAPI, settings: Settings, contents: dict[str, bytes]) -> None:
+    """Add the address of the page, and that of what it opens first; both want the token.
+
+    contents  name -> contents of each file that a page can fetch
+    """
+
     @app.get("/")
     async def page(token: str | None = None) -> Response:
         if not settings.admits(token):
@@ -143,6 +161,11 @@ def make_app(settings: Settings) -> FastAPI:
         if not settings.admits(token):
             return PlainTextResponse("the token is missing or wrong\n", 403)
         return JSONResponse({**settings.start, "local": settings.local})
+
+
+def _add_reports(app: FastAPI, settings: Settings) -> None:
+    """Add the addresses at which a page leaves a report, and at which the report is opened."""
+    reports: dict[str, bytes] = {}
 
     @app.post("/reports")
     async def keep_report(request: Request, token: str | None = None) -> Response:
@@ -166,12 +189,27 @@ def make_app(settings: Settings) -> FastAPI:
         headers = {"Content-Security-Policy": REPORT_POLICY}
         return Response(reports[name], media_type=TYPES[".html"], headers=headers)
 
+
+def _add_files(app: FastAPI, contents: dict[str, bytes]) -> None:
+    """Add the addresses of the files that a page can fetch: name -> contents."""
+
     @app.get("/{name}")
     async def file(name: str) -> Response:
         if name not in contents:
             return PlainTextResponse("there is no such file\n", 404)
         ending = name[name.rindex(".") :]
         return Response(contents[name], media_type=TYPES[ending])
+
+
+def _add_socket(
+    app: FastAPI, settings: Settings, pool: SparePool, open_pages: set[Connection], received: dict[str, Any]
+) -> None:
+    """Add the socket of a page.
+
+    pool        gives the page its processes
+    open_pages  the connections that are open; each is in it from its start to its end
+    received    takes the state that the page shows, as `state`
+    """
 
     @app.websocket("/socket")
     async def socket(websocket: WebSocket, token: str | None = None) -> None:
@@ -192,8 +230,6 @@ def make_app(settings: Settings) -> FastAPI:
         finally:
             open_pages.discard(opened)
             await opened.end()
-
-    return app
 
 
 def _from_own_page(asked: HTTPConnection, settings: Settings, token: str | None) -> bool:

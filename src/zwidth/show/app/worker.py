@@ -18,7 +18,7 @@ import tempfile
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 START: Final = (
     "import sys, json; sys.path[:] = json.loads(sys.argv[1]); "
@@ -215,14 +215,9 @@ def compute_answers() -> None:
             answers = new_answers()
             answers.warm_up()
         send(READY)
-        while True:
-            head = received.read(LENGTH)
-            if len(head) < LENGTH:
-                break
-            length = int.from_bytes(head, "little")
+        while (length := _request_length(received)) is not None:
             if not length:  # for another page
-                for file in folder.iterdir():
-                    file.unlink()
+                _empty(folder)
                 answers = new_answers()
                 send(READY)
                 continue
@@ -233,3 +228,17 @@ def compute_answers() -> None:
     except (EOFError, BrokenPipeError):
         pass
     os._exit(0)  # the server has ended, or needs no more; nothing to clean up
+
+
+def _request_length(received: BinaryIO) -> int | None:
+    """Read the length [bytes] of the next request and return it; None where no more comes."""
+    head = received.read(LENGTH)
+    if len(head) < LENGTH:
+        return None
+    return int.from_bytes(head, "little")
+
+
+def _empty(folder: Path) -> None:
+    """Remove all files of a folder."""
+    for file in folder.iterdir():
+        file.unlink()

@@ -21,6 +21,7 @@ from zwidth.show.units import amount
 
 if TYPE_CHECKING:
     from zwidth.device.device import Device
+    from zwidth.study.wall_tables.safe_walls import SafeWallsJob
     from zwidth.study.wall_tables.table import SafeWalls
 
 HEADER: Final = ".h"
@@ -197,25 +198,13 @@ class ExportCommand(Command):
         """The table of safe walls, continued from its store where there is one. Raises NoAnswerError where no cell
         has a safe wall."""
         from zwidth.errors import TooLarge, WorkspaceError
-        from zwidth.study.wall_tables.safe_walls import compute_table, safe_walls_job
+        from zwidth.study.wall_tables.safe_walls import compute_table
 
         question, device = case.question, case.device
         if case["arduino"] is not None:
             _check_sketch(question.name, device)
         try:
-            job = safe_walls_job(
-                device,
-                case["hands"],
-                ranges=(case["x_range"], case["y_range"], case["z_range"]),
-                cells=case["cells"],
-                levels=case["levels"],
-                directions=case["directions"],
-                margin=case["margin"],
-                size_limit=case["size_limit"],
-                assembly=question.assembly,
-                model=question.model,
-                seed=case["seed"],
-            )
+            job = self._job(case)
             store = open_store(job, case.path, case["resume"])
             with report_kept_work(store):
                 table = compute_table(
@@ -237,6 +226,24 @@ class ExportCommand(Command):
                 store.remove()
             raise NoAnswerError(f"no cell has safe walls: {'; '.join(table.reasons)}")
         return table
+
+    def _job(self, case: CommandLine) -> SafeWallsJob:
+        """Return the job of the table that the command line asks for. Raises what `safe_walls_job` raises."""
+        from zwidth.study.wall_tables.safe_walls import safe_walls_job
+
+        return safe_walls_job(
+            case.device,
+            case["hands"],
+            ranges=(case["x_range"], case["y_range"], case["z_range"]),
+            cells=case["cells"],
+            levels=case["levels"],
+            directions=case["directions"],
+            margin=case["margin"],
+            size_limit=case["size_limit"],
+            assembly=case.question.assembly,
+            model=case.question.model,
+            seed=case["seed"],
+        )
 
     def table(self, case: CommandLine, result: SafeWalls, document: Mapping[str, Any]) -> dict[str, Any]:
         return result.table()

@@ -340,25 +340,6 @@ def about_every_posture(command: Callback) -> Callback:
 
 def _with_device_options(command: Callback, device: Any, *where: Any) -> Callback:
     """The device, the options `where`, and those that every question about a device has."""
-    decorators = [
-        device,
-        *where,
-        click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
-        click.option(
-            "--model",
-            type=click.Choice(MODELS),
-            help="How much of the device is modelled. Default: full; a [plant] as it is given.",
-        ),
-        click.option(
-            "--operator",
-            metavar="NAME|FILE|none",
-            callback=check_not_empty,
-            help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
-            "[operator] of DEVICE.",
-        ),
-        with_settings_option,
-    ]
-
     takes_loads = LOAD_OPTIONS[0] in where
 
     @wraps(command)
@@ -385,9 +366,32 @@ def _with_device_options(command: Callback, device: Any, *where: Any) -> Callbac
             more["gravity"] = gravity  # the command's own
         return command(question, **more)
 
-    for decorate in reversed(decorators):
+    for decorate in reversed(_device_decorators(device, where)):
         with_arguments = decorate(with_arguments)
     return with_arguments
+
+
+def _device_decorators(device: Any, where: tuple[Any, ...]) -> list[Any]:
+    """Return the decorators of the device, of the options `where`, and of those that every question about a device
+    has, in the order of the help."""
+    return [
+        device,
+        *where,
+        click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
+        click.option(
+            "--model",
+            type=click.Choice(MODELS),
+            help="How much of the device is modelled. Default: full; a [plant] as it is given.",
+        ),
+        click.option(
+            "--operator",
+            metavar="NAME|FILE|none",
+            callback=check_not_empty,
+            help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
+            "[operator] of DEVICE.",
+        ),
+        with_settings_option,
+    ]
 
 
 def output_option(what: str) -> Callable[[Callback], Callback]:

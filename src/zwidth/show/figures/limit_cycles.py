@@ -114,6 +114,26 @@ def draw_plane(ax: Axes, device: DevicePlane) -> None:
     ax.fill_between([corner, right], 0.5, high, color=STABLE, linewidth=0.0)
     ax.axvline(corner, color=BLACK, linewidth=0.8)
     ax.axhline(0.5, color=BLACK, linewidth=0.8)
+    _name_regions(ax)
+    # a device without one of the frictions lies at the border of the figure
+    places_in_view = np.maximum(x, left), np.maximum(y, low)
+    lacking = " and ".join(word for word, part in (("viscous", x), ("dry", y)) if not np.all(part > 0.0))
+    text = f"the device has no {lacking} friction: at the border" if lacking else "the device, by wall stiffness"
+    ax.plot(*places_in_view, color=BLUE, marker="o", markersize=4.0, label=text, clip_on=False)
+    _label_walls(ax, device.wall_stiffness, places_in_view, left, corner)
+    ax.set_xlim(left, right)
+    ax.set_ylim(low, high)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(lambda value, position: f"{value:g}")
+        axis.set_minor_formatter(NullFormatter())
+    ax.set_xlabel("Viscous friction b/(K T)")
+    ax.set_ylabel("Dry friction $f_c$/(K Δ)")
+    legend_above(ax)
+
+
+def _name_regions(ax: Axes) -> None:
+    """Write into each region of the plane which vibrations it has."""
     places = {
         "passive": (0.97, 0.96, "right", "top"),
         "large vibrations": (0.03, 0.96, "left", "top"),
@@ -122,13 +142,19 @@ def draw_plane(ax: Axes, device: DevicePlane) -> None:
     }
     for text, (across, up, side, height) in places.items():
         ax.text(across, up, text, transform=ax.transAxes, ha=side, va=height, fontsize=8.0, color=GREY)
-    # a device without one of the frictions lies at the border of the figure
-    places_in_view = np.maximum(x, left), np.maximum(y, low)
-    lacking = " and ".join(word for word, part in (("viscous", x), ("dry", y)) if not np.all(part > 0.0))
-    text = f"the device has no {lacking} friction: at the border" if lacking else "the device, by wall stiffness"
-    ax.plot(*places_in_view, color=BLUE, marker="o", markersize=4.0, label=text, clip_on=False)
+
+
+def _label_walls(
+    ax: Axes, wall_stiffness: Floats, places_in_view: tuple[Floats, Floats], left: float, corner: float
+) -> None:
+    """Write the stiffness [N/m] beside each place of the ray; of a place with several walls the range.
+
+    wall_stiffness  (n,) of the walls [N/m]
+    places_in_view  viscous and dry friction (n,) of the walls, as drawn
+    left, corner    viscous friction between which a label stands to the left of its place
+    """
     places_of_walls: dict[tuple[float, float], list[float]] = {}
-    for K, across, up in zip(device.wall_stiffness, *map(np.ndarray.tolist, places_in_view), strict=True):
+    for K, across, up in zip(wall_stiffness, *map(np.ndarray.tolist, places_in_view), strict=True):
         places_of_walls.setdefault((across, up), []).append(float(K))
     for (across, up), walls in places_of_walls.items():
         before = left < across < corner  # its label keeps off the corner's line
@@ -141,12 +167,3 @@ def draw_plane(ax: Axes, device: DevicePlane) -> None:
             textcoords="offset points",
             fontsize=7.0,
         )
-    ax.set_xlim(left, right)
-    ax.set_ylim(low, high)
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(lambda value, position: f"{value:g}")
-        axis.set_minor_formatter(NullFormatter())
-    ax.set_xlabel("Viscous friction b/(K T)")
-    ax.set_ylabel("Dry friction $f_c$/(K Δ)")
-    legend_above(ax)

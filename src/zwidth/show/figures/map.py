@@ -119,20 +119,25 @@ def draw_map(
         ax, _view(x, y, mechanism), str(dataset["x_m"].attrs["long_name"]), str(dataset["y_m"].attrs["long_name"])
     )
     if handles:
-        made = ax.legend(
-            handles=handles,
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.02),
-            ncols=1 if area is not None else 3,
-            borderaxespad=0.0,
-            handlelength=2.6,
-            handleheight=1.1,
-            columnspacing=1.6,
-            fontsize=8.0,
-            frameon=False,
-            alignment="left",
-        )
-        made.set_zorder(6.0)
+        _add_legend(ax, handles, one_column=area is not None)
+
+
+def _add_legend(ax: Axes, handles: list[Any], *, one_column: bool) -> None:
+    """Add the legend of these handles above the axes."""
+    made = ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.02),
+        ncols=1 if one_column else 3,
+        borderaxespad=0.0,
+        handlelength=2.6,
+        handleheight=1.1,
+        columnspacing=1.6,
+        fontsize=8.0,
+        frameon=False,
+        alignment="left",
+    )
+    made.set_zorder(6.0)
 
 
 def _contours(

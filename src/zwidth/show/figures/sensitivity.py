@@ -66,27 +66,7 @@ def _draw_bars(ax: Axes, shown: list[tuple[str, float]], label: str) -> None:
     values = [value for _, value in shown]
     widest = max((abs(value) for value in values), default=1.0)
     for row, value in zip(rows, values, strict=True):
-        # gains and losses differ in hatching too, for a grey print
-        ax.barh(
-            row,
-            value,
-            height=0.62,
-            color=BLUE if value > 0.0 else "white",
-            edgecolor=BLUE if value > 0.0 else VERMILION,
-            hatch=None if value > 0.0 else "//////",
-            linewidth=0.8,
-        )
-        ax.annotate(
-            signed(value),
-            (value, row),
-            xytext=(4 if value > 0.0 else -4, 0),
-            textcoords="offset points",
-            ha="left" if value > 0.0 else "right",
-            va="center",
-            fontsize=7.5,
-            zorder=3.0,
-            path_effects=[withStroke(linewidth=2.0, foreground="white")],
-        )
+        _draw_bar(ax, row, value)
     ax.axvline(0.0, color=BLACK, linewidth=0.8)
     low, high = min([0.0, *values]), max([0.0, *values])
     labels = [_fitted(_short(path), 0.45 * figure_width(ax)) for path, _ in shown]
@@ -106,6 +86,31 @@ def _draw_bars(ax: Axes, shown: list[tuple[str, float]], label: str) -> None:
     if not shown:
         ax.set_yticks([])
         ax.text(0.5, 0.5, NONE, transform=ax.transAxes, ha="center", va="center", color=GREY)
+
+
+def _draw_bar(ax: Axes, row: int, value: float) -> None:
+    """Draw the bar of one number in its row, with its value beside it."""
+    # gains and losses differ in hatching too, for a grey print
+    ax.barh(
+        row,
+        value,
+        height=0.62,
+        color=BLUE if value > 0.0 else "white",
+        edgecolor=BLUE if value > 0.0 else VERMILION,
+        hatch=None if value > 0.0 else "//////",
+        linewidth=0.8,
+    )
+    ax.annotate(
+        signed(value),
+        (value, row),
+        xytext=(4 if value > 0.0 else -4, 0),
+        textcoords="offset points",
+        ha="left" if value > 0.0 else "right",
+        va="center",
+        fontsize=7.5,
+        zorder=3.0,
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],
+    )
 
 
 def _widest(labels: list[str]) -> float:

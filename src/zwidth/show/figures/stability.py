@@ -30,6 +30,7 @@ from zwidth.chart.chart_base import BoundaryArc
 from zwidth.chart.decay import FastestDecay
 from zwidth.chart.measured.chart import MeasuredChart
 from zwidth.chart.measured.loop import UnusableRange
+from zwidth.chart.measured.stable_regions import DoubtBand
 from zwidth.chart.robust.common_chart import CommonChart
 from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
@@ -389,30 +390,10 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
     for n, ring in enumerate(chart.regions):
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable walls"))
     if chart.band is not None:
-        for n, ring in enumerate(chart.band.regions):
-            ax.add_patch(
-                Polygon(
-                    ring,
-                    facecolor=ORANGE,
-                    edgecolor="none",
-                    alpha=0.45,
-                    zorder=1.8,
-                    label="" if n else f"in doubt: {chart.band.meaning}",
-                )
-            )
+        _fill_band(ax, chart.band)
     for ring in edges_of(chart.regions):
         ax.plot(*ring.T, color=BLACK, linewidth=0.9)
-    for n, arc in enumerate(chart.boundary):
-        if 0.0 < arc.frequency[0] < 0.5 / chart.loop.period * (1.0 - 1e-9):
-            ax.plot(
-                arc.stiffness,
-                arc.damping,
-                color=BLUE,
-                marker=".",
-                markersize=3.0,
-                linestyle="none",
-                label="" if n else "measured",
-            )
+    _draw_measured_points(ax, chart)
     _unusable(ax, chart)
     if chart.stiffness_max == chart.stiffness_max:
         mark_stiffest(ax, chart)
@@ -428,6 +409,36 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
         )
     frame(ax, window or chart.box, empty=not chart.regions)
     legend_above(ax)
+
+
+def _fill_band(ax: Axes, band: DoubtBand) -> None:
+    """Fill the walls whose verdict the error of the measurement leaves open."""
+    for n, ring in enumerate(band.regions):
+        ax.add_patch(
+            Polygon(
+                ring,
+                facecolor=ORANGE,
+                edgecolor="none",
+                alpha=0.45,
+                zorder=1.8,
+                label="" if n else f"in doubt: {band.meaning}",
+            )
+        )
+
+
+def _draw_measured_points(ax: Axes, chart: MeasuredChart) -> None:
+    """Draw the measured points on the edge, but for those of frequency 0 and of half the sampling rate."""
+    for n, arc in enumerate(chart.boundary):
+        if 0.0 < arc.frequency[0] < 0.5 / chart.loop.period * (1.0 - 1e-9):
+            ax.plot(
+                arc.stiffness,
+                arc.damping,
+                color=BLUE,
+                marker=".",
+                markersize=3.0,
+                linestyle="none",
+                label="" if n else "measured",
+            )
 
 
 def _unusable(ax: Axes, chart: MeasuredChart) -> None:

@@ -142,35 +142,45 @@ def document(facts: Facts) -> dict[str, Any]:
         "static_stiffness_at_stiffness_max_N_per_m": facts.felt and facts.felt.stiffness_max,
         "static_stiffness_limit_N_per_m": facts.felt and facts.felt.limit,
         "static_stiffness_limit_kind": facts.felt and facts.felt.limit_kind,
-        "sensitivities": [
-            {
-                "path": number.path,
-                "value": number.value,
-                "d_ln_stiffness_max_d_ln_value": number.logarithmic,
-                **({"reason": number.reason} if number.reason else {}),
-            }
-            for number in facts.sensitivities.numbers
-        ],
+        "sensitivities": _sensitivity_values(facts),
         "models": facts.validity and facts.validity.document(),
         **_load(facts),
         "bending": facts.bending and facts.bending.document(),
         "what_if": [{"key": v.key, "label": v.label, **_walls(v)} for v in facts.variants],
-        "bounds": [
-            {
-                "name": bound.name,
-                "source": bound.source,
-                "kind": bound.kind,
-                "claim": bound.claim,
-                "stiffness_max_N_per_m": bound.stiffness_max,
-                "assumptions": list(bound.assumptions),
-                "violated": list(bound.violated),
-            }
-            for bound in facts.bounds
-        ],
+        "bounds": _bound_values(facts),
     }
     reason = {} if facts.renders else {"reason": sentences.NO_WALL}
     numbers = keys_of_moments(values) if facts.point.turns else values
     return {key: _known(value) for key, value in {**about, **numbers, **reason}.items()}
+
+
+def _sensitivity_values(facts: Facts) -> list[dict[str, Any]]:
+    """Return by key the sensitivity to each number of the device, with the reason where there is none."""
+    return [
+        {
+            "path": number.path,
+            "value": number.value,
+            "d_ln_stiffness_max_d_ln_value": number.logarithmic,
+            **({"reason": number.reason} if number.reason else {}),
+        }
+        for number in facts.sensitivities.numbers
+    ]
+
+
+def _bound_values(facts: Facts) -> list[dict[str, Any]]:
+    """Return by key and unit the published conditions, what they assume, and what of that the device violates."""
+    return [
+        {
+            "name": bound.name,
+            "source": bound.source,
+            "kind": bound.kind,
+            "claim": bound.claim,
+            "stiffness_max_N_per_m": bound.stiffness_max,
+            "assumptions": list(bound.assumptions),
+            "violated": list(bound.violated),
+        }
+        for bound in facts.bounds
+    ]
 
 
 def _load(facts: Facts) -> dict[str, Any]:

@@ -64,20 +64,41 @@ def axes_of(
             if table.get("tie"):
                 faults.append((("tie",), f"goes with a number of the device file, not with {key}; remove it"))
         elif device is not None:
-            message = list(key_faults(device.document, key, _values(table), whole_ranges=bounds))
-            faults += message
-            if not message:
-                ties = list(ties_of(table, key, device, taken, faults))
-                axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
-                whole = table.get("integer") is True or _takes_whole_numbers(device.document, key)
-                if axis is not None and bounds and whole and axis.span is not None:
-                    if floor(axis.span[1]) - ceil(axis.span[0]) < 1:
-                        faults.append((("range",), "holds fewer than two whole numbers; widen it"))
-                    axis = replace(axis, whole=True)
+            axis = _number_axis(table, key, device, taken, faults, bounds=bounds)
         faults_of_axes += [((*here, *path), message) for path, message in faults]
         if axis is not None and not faults:
             axes.append(axis)
     return tuple(axes)
+
+
+def _number_axis(
+    table: dict[str, Any],
+    key: str,
+    device: Device,
+    taken: SetNumbers,
+    faults: TableFaults,
+    *,
+    bounds: bool,
+) -> Axis | None:
+    """Return the axis over a number of the device file; None where its key or its values have faults, or it has no
+    values.
+
+    taken   the numbers that other axes set; those of this axis' ties are added
+    faults  that this axis' are added to
+    bounds  as for `axes_of`
+    """
+    message = list(key_faults(device.document, key, _values(table), whole_ranges=bounds))
+    faults += message
+    if message:
+        return None
+    ties = list(ties_of(table, key, device, taken, faults))
+    axis = _axis(table, key, unit_of(device.document, key), tuple(ties))
+    whole = table.get("integer") is True or _takes_whole_numbers(device.document, key)
+    if axis is not None and bounds and whole and axis.span is not None:
+        if floor(axis.span[1]) - ceil(axis.span[0]) < 1:
+            faults.append((("range",), "holds fewer than two whole numbers; widen it"))
+        axis = replace(axis, whole=True)
+    return axis
 
 
 def unit_of(document: dict[str, Any], key: str) -> str:

@@ -18,7 +18,7 @@ from zwidth.errors import DeviceError, Spelling, TooLarge, WorkspaceError
 from zwidth.measures.definition import WANTED_NUMBERS, Measure, WantedWall
 from zwidth.study.designs.axis_tables import TableFaults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
-from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling
+from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
 from zwidth.study.designs.study_schema import MOST, StudyFile, description, unknown
 from zwidth.study.designs.task import Task, task_of
 from zwidth.study.workspace.plane_grid import PlaneGrid, plane_of
@@ -113,20 +113,9 @@ def check_study(
     needs          keys that the document must have; None: axis, and without bounds measures
     Raises         TooLarge  where the designs would not fit into memory
     """
-    checked: StudyFile | None = None
-    try:
-        checked = StudyFile.model_validate(document)
-    except ValidationError as error:
-        faults += validation_messages(error, document, description, unknown)
+    checked = _checked_file(document, faults)
     faults += _missing(document, needs or (("axis",) if bounds else ("measures", "axis")))
-    if device is not None and device.response is not None:
-        faults.append(
-            (
-                ("device",),
-                "is a measured [response], which has no numbers to vary; name another device",
-            )
-        )
-        device = None
+    device = _device_with_numbers(device, faults)
     columns = () if user_measures is None else _columns(document, user_measures, faults)
     axes = axes_of(document, device, faults, File(label).parent, bounds=bounds)
     _check_sampling(document, faults)
@@ -136,20 +125,61 @@ def check_study(
     plane = None if task or bounds else plane_of_study(document, device, columns, plane, faults, spelling)
     if faults or checked is None or device is None:
         return None
-    hypercube = checked.sampling == "latin-hypercube"
-    _check_size(checked, hypercube)
     study = Study(
         label=label,
         document=document,
         device=device,
         operators=operators,
-        sampling=Sampling(
-            axes,
-            checked.count if hypercube else None,
-            1 if checked.seed is None else checked.seed,
-            checked.sampling == "paired",
-        ),
+        sampling=_sampling_of(checked, axes),
         columns=columns,
+        plane=plane,
+        task=task,
+        user_measures=user_measures or {},
+        spelling=spelling,
+    )
+    return _in_rendered_units(_with_circumstances(study, checked))
+
+
+def _checked_file(document: dict[str, Any], faults: TableFaults) -> StudyFile | None:
+    """Check a document against the schema of study files and return it; None where it does not fit, the reasons
+    of which are added to `faults`."""
+    try:
+        return StudyFile.model_validate(document)
+    except ValidationError as error:
+        faults += validation_messages(error, document, description, unknown)
+    return None
+
+
+def _device_with_numbers(device: Device | None, faults: TableFaults) -> Device | None:
+    """Return the device where it has numbers to vary; None for a measured one, which is added to `faults`, and
+    where there is none."""
+    if device is not None and device.response is not None:
+        faults.append(
+            (
+                ("device",),
+                "is a measured [response], which has no numbers to vary; name another device",
+            )
+        )
+        return None
+    return device
+
+
+def _sampling_of(checked: StudyFile, axes: tuple[Axis, ...]) -> Sampling:
+    """Return the designs of a checked study over its axes. Raises TooLarge where these are too many."""
+    hypercube = checked.sampling == "latin-hypercube"
+    _check_size(checked, hypercube)
+    return Sampling(
+        axes,
+        checked.count if hypercube else None,
+        1 if checked.seed is None else checked.seed,
+        checked.sampling == "paired",
+    )
+
+
+def _with_circumstances(study: Study, checked: StudyFile) -> Study:
+    """Return the study with the circumstances and the wanted wall of its checked file."""
+    return replace(
+        study,
         at=checked.at,
         direction=checked.direction,
         assembly=checked.assembly,
@@ -158,11 +188,11 @@ def check_study(
             **{one.name: getattr(checked, one.key) for one in WANTED_NUMBERS},
             colliding_links=checked.colliding_links,
         ),
-        plane=plane,
-        task=task,
-        user_measures=user_measures or {},
-        spelling=spelling,
     )
+
+
+def _in_rendered_units(study: Study) -> Study:
+    """Return the study, its measures with stiffness in N m/rad where all its designs render moments."""
     if not study.turns:
         return study
     return replace(
@@ -253,6 +283,14 @@ def plane_of_study(
         return None
     if plane is not None:
         return plane
+    return _plane_of_document(document, device, faults, spelling)
+
+
+def _plane_of_document(
+    document: dict[str, Any], device: Device, faults: TableFaults, spelling: Spelling
+) -> PlaneGrid | None:
+    """Make the grid that the document's [workspace] describes and return it; None where there is no such grid, the
+    reason of which is added to `faults`."""
     given = table(document, "workspace")
     count: Any = given.get("count", 15)
     try:

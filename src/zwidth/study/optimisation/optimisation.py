@@ -258,17 +258,7 @@ class Optimisation(Result):
             "active": [self.active(place) for place in places],
             "premises": [dict(one) for one in self.premises],
             "baseline": None if self.baseline is None else self._baseline_document(names),
-            "demands": [
-                {
-                    "key": one.demand.key,
-                    "measure": names[one.demand.column],
-                    "at_least": one.demand.at_least,
-                    "bound": one.demand.bound,
-                    "kept_share": one.kept,
-                    "best": one.best,
-                }
-                for one in self.demands
-            ],
+            "demands": self._demands_document(names),
             "not_judged": [
                 {"status": STATUS[one.status], "designs": one.designs, "reason": one.reason or None}
                 for one in self.not_judged
@@ -277,16 +267,7 @@ class Optimisation(Result):
             if self.finer is None
             else [dict(zip(names, row, strict=True)) for row in self.finer.values.tolist()],
             "produced": None if self.bars is None else self._bars_document(self.bars, names),
-            "contacts": [
-                {
-                    "stiffness_N_per_m": one.stiffness,
-                    "damping_Ns_per_m": one.damping,
-                    "stable": one.stable,
-                    "amplitude_m": one.amplitude,
-                    "reason": one.reason or None,
-                }
-                for one in self.contacts
-            ],
+            "contacts": self._contacts_document(),
             "searched": self.searched,
             "polished": self.polished,
             "budget": self.problem.budget,
@@ -300,6 +281,34 @@ class Optimisation(Result):
             "values": dict(zip(names, values, strict=True)),
             "status": {name: STATUS[one] for name, one in zip(names, status, strict=True)},
         }
+
+    def _demands_document(self, names: list[str]) -> list[dict[str, Any]]:
+        """Return by key each demand, the share of designs that keep it and the best value; `names` are those of
+        the columns."""
+        return [
+            {
+                "key": one.demand.key,
+                "measure": names[one.demand.column],
+                "at_least": one.demand.at_least,
+                "bound": one.demand.bound,
+                "kept_share": one.kept,
+                "best": one.best,
+            }
+            for one in self.demands
+        ]
+
+    def _contacts_document(self) -> list[dict[str, Any]]:
+        """Return by key and unit the simulated wall of each design of the front."""
+        return [
+            {
+                "stiffness_N_per_m": one.stiffness,
+                "damping_Ns_per_m": one.damping,
+                "stable": one.stable,
+                "amplitude_m": one.amplitude,
+                "reason": one.reason or None,
+            }
+            for one in self.contacts
+        ]
 
     def _bars_document(self, bars: Bars, names: list[str]) -> list[dict[str, Any]]:
         return [

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import shapely
@@ -33,6 +33,10 @@ from zwidth.study.robust.unseen_members import (
     try_unseen_members,
     violating_members,
 )
+
+if TYPE_CHECKING:
+    from zwidth.chart.robust.measured import MeasuredRobustChart
+    from zwidth.study.robust.family import MeasuredMember, MeasuredMembers
 
 __all__ = ["NoAnswerError", "RobustStudy", "Violation", "robust_study", "sample_walls"]
 
@@ -210,7 +214,33 @@ def robust_study(
     points = list(_sample(family, members, seed))
     charted.add(points, "members")
     chart, radii = charted.chart(), MemberRadii(family)
-    rounds, area_change, settled = 0, 0.0, not family.free
+    chart, rounds, area_change, settled = _add_violating(charted, chart, radii, members, tolerance)
+    return RobustStudy(
+        chart=chart,
+        members=tuple(family.values(point) for point in charted.points),
+        sampled=len(points),
+        rounds=rounds,
+        area_change=area_change,
+        settled=settled,
+        violation=_violation(charted, chart, unseen, seed),
+        unknown_searched=radii.met_unknown,
+    ).about(family.operating_point)
+
+
+def _add_violating(
+    charted: _Members, chart: RobustChart, radii: MemberRadii, members: int, tolerance: float
+) -> tuple[RobustChart, int, float, bool]:
+    """Add to the chart, round by round, the members found by the search for which a wall of its edge is unstable.
+
+    charted    the members of the chart; those found are added
+    radii      the spectral radii that the search compares
+    members    largest number of members charted
+    tolerance  the search ends with a round that changes the area by a smaller share
+
+    Returns  the chart of all members, the number of rounds, the share of the area by which the last one moved the
+             edge, and whether the search ended because no member moves it by more than the tolerance
+    """
+    rounds, area_change, settled = 0, 0.0, not charted.family.free
     while not settled and len(charted.points) < members and chart.regions:
         charted.progress("search", rounds, rounds + 1)
         new_members = violating_members(radii, charted.points, chart)[: members - len(charted.points)]
@@ -222,16 +252,7 @@ def robust_study(
         before, chart = chart, charted.chart()
         area_change = _area_change(before, chart)
         settled = area_change < tolerance
-    return RobustStudy(
-        chart=chart,
-        members=tuple(family.values(point) for point in charted.points),
-        sampled=len(points),
-        rounds=rounds,
-        area_change=area_change,
-        settled=settled,
-        violation=_violation(charted, chart, unseen, seed),
-        unknown_searched=radii.met_unknown,
-    ).about(family.operating_point)
+    return chart, rounds, area_change, settled
 
 
 class _Members:
@@ -301,12 +322,7 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
     `unseen_members`), until none of them does; then as many others are tried.
     """
     from zwidth.study.robust.family import MeasuredFamily, MeasuredMember, MeasuredMembers
-    from zwidth.study.robust.unseen_members import (
-        DEPTH,
-        intrusions,
-        random_measured_members,
-        violation_of_measured,
-    )
+    from zwidth.study.robust.unseen_members import random_measured_members, violation_of_measured
 
     measured = MeasuredFamily(family)
     measured.check()
@@ -318,23 +334,8 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
         chart = charted.chart()
     except ChartError as error:
         raise NoAnswerError(str(error)) from None
-    rounds, area_change, settled = 0, 0.0, not family.free
     tried = list(random_measured_members(measured, unseen, [seed, 2], AT_ENDS)) if family.free else []
-    unknown = 0
-    while not settled and chart.regions:
-        deep = {place: one.depth for place, one in intrusions(measured, chart, tried, progress).items()}
-        unknown += len(tried) - len(deep)
-        tried = [one for place, one in enumerate(tried) if deep.get(place, 0.0) > DEPTH]
-        if not tried:
-            area_change, settled = 0.0, True
-        elif len(charted.points) >= members:
-            break
-        else:
-            rounds += 1
-            kept = [depth for depth in deep.values() if depth > DEPTH]
-            charted.add([tried.pop(int(np.argmax(kept)))])
-            before, chart = chart, charted.chart()
-            area_change = _area_change(before, chart)
+    chart, rounds, area_change, settled, unknown = _add_deepest(charted, chart, tried, members)
     violation = None
     if family.free and chart.regions:
         violation = violation_of_measured(measured, chart, unseen, seed, progress)
@@ -348,6 +349,41 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
         violation=violation,
         unknown_searched=unknown > 0,
     ).about(family.operating_point)
+
+
+def _add_deepest(
+    charted: MeasuredMembers, chart: MeasuredRobustChart, tried: list[MeasuredMember], members: int
+) -> tuple[MeasuredRobustChart, int, float, bool, int]:
+    """Add to the chart, one in each round, the member tried that runs deepest into its walls.
+
+    charted  the members of the chart; those that join are added
+    tried    random members; [] for a list without ranges
+    members  largest number of members charted
+
+    Returns  the chart of all members, the number of rounds, the share of the area by which the last one moved the
+             edge, whether the search ended because no member tried runs into the walls, and how often one was
+             tried that has no response
+    """
+    from zwidth.study.robust.unseen_members import MEASURED_DEPTH, intrusions
+
+    measured, progress = charted.family, charted.progress
+    rounds, area_change, settled = 0, 0.0, not measured.family.free
+    unknown = 0
+    while not settled and chart.regions:
+        deep = {place: one.depth for place, one in intrusions(measured, chart, tried, progress).items()}
+        unknown += len(tried) - len(deep)
+        tried = [one for place, one in enumerate(tried) if deep.get(place, 0.0) > MEASURED_DEPTH]
+        if not tried:
+            area_change, settled = 0.0, True
+        elif len(charted.points) >= members:
+            break
+        else:
+            rounds += 1
+            kept = [depth for depth in deep.values() if depth > MEASURED_DEPTH]
+            charted.add([tried.pop(int(np.argmax(kept)))])
+            before, chart = chart, charted.chart()
+            area_change = _area_change(before, chart)
+    return chart, rounds, area_change, settled, unknown
 
 
 def _area_change(before: CommonChart, after: CommonChart) -> float:

@@ -16,7 +16,7 @@ whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import isfinite, isnan, nan
 from typing import Any, Final
@@ -323,28 +323,12 @@ def _sensitivity(
     scale = abs(value) if value and steps not in DELAYS else (T if steps == DELAYS[1] else 1.0)
 
     def stiffness(change: float) -> float:
-        controller, changed, holder = device.controller, port, operator
-        if steps == PERIOD:
-            controller, changed = (
-                replace(controller, sampling_period=T + change),
-                changed_port(port, 0.0, T + change),
-            )
-        elif steps in DELAYS:
-            changed = changed_port(port, change / (T if steps == DELAYS[1] else 1.0))
-        else:
-            controller, holder = _built(device, steps, value + change, operator)
+        controller, changed, holder = _changed(device, port, operator, steps, value, change)
         return _largest(response, changed, controller, holder)
 
     step = STEP * scale
     lowest = (steps in DELAYS and port.model.delay < STEP) or (value == 0.0 and steps not in DELAYS)
-    here, above = largest, stiffness(step)
-    if lowest:
-        wide, narrow = (above - here) / (step * largest), (stiffness(0.5 * step) - here) / (0.5 * step * largest)
-        slope, error, bend = 2.0 * narrow - wide, abs(narrow - wide), abs(narrow - wide)
-    else:
-        below = stiffness(-step)
-        slope, bend = (above - below) / (2.0 * step * largest), abs(above - 2.0 * here + below) / (step * largest)
-        error = STEP * bend
+    slope, error, bend = _relative_slope(stiffness, step, largest, one_sided=lowest)
     if not bend * scale < ABRUPT * (1.0 + abs(slope) * scale):
         return Sensitivity(
             path, value, unit, nan, nan, nan, "", "it changes too abruptly here to have a derivative"
@@ -353,6 +337,58 @@ def _sensitivity(
     if value == 0.0:
         return Sensitivity(path, value, unit, nan, slope * largest, error * largest, side, ZERO)
     return Sensitivity(path, value, unit, slope * value, slope * largest, error * value, side)
+
+
+def _changed(
+    device: Device,
+    port: MeasuredPort,
+    operator: Operator | None,
+    steps: tuple[Any, ...],
+    value: float,
+    change: float,
+) -> tuple[Controller, MeasuredPort, Operator | None]:
+    """Return computer, port and operator with one number of the device changed.
+
+    steps   to the number in the device file
+    value   of the number
+    change  added to it, in its own unit
+    """
+    T = port.period
+    controller, changed, holder = device.controller, port, operator
+    if steps == PERIOD:
+        controller, changed = (
+            replace(controller, sampling_period=T + change),
+            changed_port(port, 0.0, T + change),
+        )
+    elif steps in DELAYS:
+        changed = changed_port(port, change / (T if steps == DELAYS[1] else 1.0))
+    else:
+        controller, holder = _built(device, steps, value + change, operator)
+    return controller, changed, holder
+
+
+def _relative_slope(
+    stiffness: Callable[[float], float], step: float, largest: float, *, one_sided: bool
+) -> tuple[float, float, float]:
+    """Difference the largest stiffness, relative to what it is now, by a number.
+
+    stiffness  change of the number -> largest stiffness [N/m]
+    step       change of the number
+    largest    the largest stiffness now [N/m]
+    one_sided  whether the number can only become larger
+
+    Returns  the slope, its estimated error, and by how much the slopes to both sides, or of two steps, differ;
+             all per unit of the number
+    """
+    here, above = largest, stiffness(step)
+    if one_sided:
+        wide, narrow = (above - here) / (step * largest), (stiffness(0.5 * step) - here) / (0.5 * step * largest)
+        slope, error, bend = 2.0 * narrow - wide, abs(narrow - wide), abs(narrow - wide)
+    else:
+        below = stiffness(-step)
+        slope, bend = (above - below) / (2.0 * step * largest), abs(above - 2.0 * here + below) / (step * largest)
+        error = STEP * bend
+    return slope, error, bend
 
 
 def _largest(response: Response, port: MeasuredPort, controller: Controller, operator: Operator | None) -> float:

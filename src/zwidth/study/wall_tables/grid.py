@@ -11,8 +11,8 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.device.device import Device
 from zwidth.errors import Advice, WorkspaceError
-from zwidth.model.mechanism import ORIENTATION
-from zwidth.study.workspace.plane_grid import FLAT, plane_of, reachable_set, rounded_outwards
+from zwidth.model.mechanism import ORIENTATION, Mechanism
+from zwidth.study.workspace.plane_grid import FLAT, ReachableSet, plane_of, reachable_set, rounded_outwards
 
 LONG_SIDE: Final = {2: 20, 3: 6}  # cells along the longest side, by default, of a plane and of a space
 MOST: Final = 10**6  # cells
@@ -99,22 +99,8 @@ def cells_of(
     """
     mechanism = device.mechanism
     if mechanism is None:
-        if cells is not None or any(one is not None for one in ranges):
-            raise WorkspaceError(
-                "the device has no [mechanism], and so no workspace; its walls are the same everywhere"
-            )
-        none = np.empty(0)
-        return CellGrid(np.empty((0, 3)), np.zeros(3), none, none, (), ())
-    if mechanism.controls == ORIENTATION:
-        raise WorkspaceError(
-            "the drives control the orientation of the handle, and a table needs a handle that they move"
-        )
-    drives = len(mechanism.drives.names)
-    if drives < 2:
-        raise WorkspaceError(
-            "the handle has one drive and moves along a curve, and a table needs two drives or three; describe "
-            "what is felt along the curve as a [plant]"
-        )
+        return _cell_everywhere(ranges, cells)
+    drives = _count_of_drives(mechanism)
     reach = reachable_set(mechanism, assembly or device.reference_assembly)
     spread = np.linalg.svd(reach.positions - reach.positions.mean(axis=0), compute_uv=False)
     flat = not spread[2] > FLAT * spread[0]
@@ -131,22 +117,56 @@ def cells_of(
         axes, through = np.stack([plane.first, plane.second]), plane.through
         names: tuple[str, ...] = plane.names
     else:
-        ends = []
-        for axis, given in enumerate(ranges):
-            bounds = mechanism.workspace[axis]
-            if given is None:
-                given = rounded_outwards(*reach.extent(np.eye(3)[axis])) if np.isnan(bounds).any() else bounds
-            ends.append((float(given[0]), float(given[1])))
-            if not (np.isfinite(ends[-1]).all() and ends[-1][0] < ends[-1][1]):
-                raise WorkspaceError(
-                    f"the range along {'xyz'[axis]} must be LOW,HIGH with LOW < HIGH, got {given}"
-                )
-        low, high = np.array(ends).T.copy()
+        low, high = _ends_in_space(mechanism, reach, ranges)
         axes, through, names = np.eye(3), np.zeros(3), ("x", "y", "z")
     counts = tuple(cells) if cells is not None else _counts(high - low)
     if np.prod(counts, dtype=float) > MOST:
         raise WorkspaceError(f"a table has at most {MOST:.0e} cells, got {' x '.join(map(str, counts))}")
     return CellGrid(axes, through, low, high, counts, tuple(names))
+
+
+def _cell_everywhere(ranges: Sequence[Sequence[float] | None], cells: Sequence[int] | None) -> CellGrid:
+    """Return the one cell of a device without a mechanism. Raises WorkspaceError for ranges or numbers of cells,
+    which such a device has not."""
+    if cells is not None or any(one is not None for one in ranges):
+        raise WorkspaceError(
+            "the device has no [mechanism], and so no workspace; its walls are the same everywhere"
+        )
+    none = np.empty(0)
+    return CellGrid(np.empty((0, 3)), np.zeros(3), none, none, (), ())
+
+
+def _count_of_drives(mechanism: Mechanism) -> int:
+    """Return the number of drives, two or more. Raises WorkspaceError for a mechanism that turns its handle, or
+    moves it along a curve."""
+    if mechanism.controls == ORIENTATION:
+        raise WorkspaceError(
+            "the drives control the orientation of the handle, and a table needs a handle that they move"
+        )
+    drives = len(mechanism.drives.names)
+    if drives < 2:
+        raise WorkspaceError(
+            "the handle has one drive and moves along a curve, and a table needs two drives or three; describe "
+            "what is felt along the curve as a [plant]"
+        )
+    return drives
+
+
+def _ends_in_space(
+    mechanism: Mechanism, reach: ReachableSet, ranges: Sequence[Sequence[float] | None]
+) -> tuple[Floats, Floats]:
+    """Return the lowest and the highest coordinates (3,) [m] of the ranges; of one that is None those of the
+    file's workspace, or of what is reached. Raises WorkspaceError for a range that is none."""
+    ends = []
+    for axis, given in enumerate(ranges):
+        bounds = mechanism.workspace[axis]
+        if given is None:
+            given = rounded_outwards(*reach.extent(np.eye(3)[axis])) if np.isnan(bounds).any() else bounds
+        ends.append((float(given[0]), float(given[1])))
+        if not (np.isfinite(ends[-1]).all() and ends[-1][0] < ends[-1][1]):
+            raise WorkspaceError(f"the range along {'xyz'[axis]} must be LOW,HIGH with LOW < HIGH, got {given}")
+    low, high = np.array(ends).T.copy()
+    return low, high
 
 
 def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:

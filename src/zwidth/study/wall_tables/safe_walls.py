@@ -113,20 +113,7 @@ def safe_walls_job(
     check_kind("device", device, Device)
     _check_kinds(hands, cells, ranges)
     _check_numbers(levels, directions, margin)
-    if device.response is not None:
-        raise WorkspaceError(
-            "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth "
-            "identify"
-        )
-    if device.load is not None:
-        raise WorkspaceError(
-            "a table holds for a device without load: its walls would hang on how hard the hand pushes",
-            Advice("leave the load out, with {}", "set", "load=unset"),
-        )
-    if device.mechanism is not None and device.renders_moments(None):
-        raise WorkspaceError(
-            "the device renders moments about an axis, and a table is about forces; render a force"
-        )
+    _check_device(device)
     grid = cells_of(device, ranges, cells, assembly)
     if directions > 1 and not grid.dimensions:
         raise WorkspaceError(
@@ -143,6 +130,24 @@ def safe_walls_job(
         )
     _check_point(question)
     return SafeWallsJob(question)
+
+
+def _check_device(device: Device) -> None:
+    """Raise WorkspaceError for a measured response, a device under load, and one that renders moments."""
+    if device.response is not None:
+        raise WorkspaceError(
+            "a measured response has a chart of its own uncertainty and no table; fit a [plant] with zwidth "
+            "identify"
+        )
+    if device.load is not None:
+        raise WorkspaceError(
+            "a table holds for a device without load: its walls would hang on how hard the hand pushes",
+            Advice("leave the load out, with {}", "set", "load=unset"),
+        )
+    if device.mechanism is not None and device.renders_moments(None):
+        raise WorkspaceError(
+            "the device renders moments about an axis, and a table is about forces; render a force"
+        )
 
 
 def compute_table(
