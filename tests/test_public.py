@@ -130,7 +130,7 @@ def test_the_lines_of_the_contract():
 
 # --- the page on what changed since 0.2 --------------------------------------------------------------
 
-CHANGES = (Path(__file__).parents[1] / "docs" / "from-0.2.md").read_text(encoding="utf-8")
+CHANGES = (Path(__file__).parents[1] / "docs" / "from-0-2.md").read_text(encoding="utf-8")
 
 
 def test_names_that_the_page_says_are_gone_are_gone_and_what_stands_instead_is_there():
