@@ -15,6 +15,7 @@ from tests.frozen.rules import FIRST_SAMPLES, QUANTISED, ROUNDING, SHAPE, SMOOTH
 
 UNIT = re.compile(r"_((?:N2s|Nms|Nm|Ns|N|kg|m|J|Hz|s|rad|deg)(?:_per_[A-Za-z0-9]+)?)$")
 NUMBERS = re.compile(r"(?<=[\[ ,:])-?\d")
+PROGRESS = re.compile(r"zwidth: [a-z ]+(,.*|: \d.*)?$")  # what is being computed, after two seconds and later
 DEFAULT = Rule("*", "*", Kind.SMOOTH, "a number of a formula, or a converged iteration")
 
 
@@ -87,7 +88,7 @@ def _comparable(name: str, base: dict[str, Any], new: dict[str, Any], tally: Tal
     if codes[0] not in (0, 1, 2):
         return tell("exit code", f"{codes[0]} on both sides: {(base['err'].splitlines() or ['no message'])[-1]}")
     if codes[0] == 2:
-        lines = [len(answer["err"].splitlines()) for answer in (base, new)]
+        lines = [len(faults_of(answer["err"])) for answer in (base, new)]
         if lines[0] != lines[1] or base["out"] != new["out"]:
             tell("lines", f"bad input was refused in {lines[0]} lines, now in {lines[1]}")
         return False
@@ -322,3 +323,8 @@ def _columns(curve: Any) -> dict[str, np.ndarray]:
 def _shown(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def faults_of(messages: str) -> list[str]:
+    """The lines of standard error that name a fault, and not those that say what is being waited for."""
+    return [line for line in messages.splitlines() if not PROGRESS.match(line)]

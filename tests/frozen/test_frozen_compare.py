@@ -231,6 +231,8 @@ def test_exit_codes_and_numbers_of_complaints_are_compared():
     bad = {"code": 2, "out": "", "err": "a: one\na: two\n", "seconds": 0.0}
     assert outcome(bad, bad | {"err": "other: words\na: two\n"}) == []
     assert outcome(bad, bad | {"err": "a: one\n"})[0][0] == "lines"
+    waited = "zwidth: computing\nzwidth: points, 3 of 8: 4 s left\n"
+    assert not outcome(bad, bad | {"err": waited + bad["err"]})
     assert outcome(answer(CHART), bad)[0] == ("exit code", "0 became 2: a: two")
     assert outcome(answer({}, code=70, err="broken"), answer({}, code=70))[0][0] == "exit code"
 

@@ -114,8 +114,8 @@ def test_a_script_needs_no_guard(tmp_path):
         "import sys\n"
         f"sys.path[:0] = {sys.path!r}\n"
         "from tests.study.executor_cases import RootsJob\n"
-        "from zwidth.study.jobs.executor import run\n"
-        "print('once', run(RootsJob(20), workers=2, batch=5, patience=-1.0).values.shape)\n"
+        "from zwidth.study.jobs.executor import run_job\n"
+        "print('once', run_job(RootsJob(20), workers=2, batch=5, patience=-1.0).values.shape)\n"
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("once (20, 2)\n", "")
@@ -126,12 +126,12 @@ import sys
 from pathlib import Path
 sys.path[:0] = {path!r}
 from tests.study.executor_cases import RootsJob
-from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.executor import run_job
 from zwidth.study.jobs.store import Store
 job = RootsJob({count}, seconds=0.2)
 def progress(stage, done, of):
     print(done, flush=True)
-run(job, Store(Path("cells"), job), progress, 2, batch=2, patience=0.1)
+run_job(job, Store(Path("cells"), job), progress, 2, batch=2, patience=0.1)
 """
 
 

@@ -244,8 +244,8 @@ ORPHANS = """
 import os, sys
 sys.path[:0] = {path!r}
 from tests.study.executor_cases import FaultyJob
-from zwidth.study.jobs.executor import run
-run(FaultyJob(4, endless=(1,), starter=os.getpid()), workers=1, batch=2, time_limit=1000.0)
+from zwidth.study.jobs.executor import run_job
+run_job(FaultyJob(4, endless=(1,), starter=os.getpid()), workers=1, batch=2, time_limit=1000.0)
 """
 
 

@@ -28,10 +28,10 @@ import sys, time
 from pathlib import Path
 sys.path[:0] = {path!r}
 from tests.study.executor_cases import RootsJob
-from zwidth.study.jobs.executor import run
+from zwidth.study.jobs.executor import run_job
 from zwidth.study.jobs.store import Store
 job = RootsJob(100, seconds=0.2)
-run(job, Store(Path({store!r}), job), lambda stage, done, of: print(done, flush=True), 1, batch=2)
+run_job(job, Store(Path({store!r}), job), lambda stage, done, of: print(done, flush=True), 1, batch=2)
 """
 
 
