@@ -35,6 +35,7 @@ EVERYWHERE = {
     "result",
     "threads",
     "tuple_references",
+    "unit_text",
     "_version",
 }
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}

@@ -90,7 +90,7 @@ class Curve(Protocol):
         edge."""
 
     def integral(self, arc: Arc) -> float:
-        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2]."""
+        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N² s/m²]."""
 
 
 Curves = Mapping[int, Curve] | Sequence[Curve]  # by `Arc.member`

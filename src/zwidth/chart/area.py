@@ -63,7 +63,7 @@ def lobatto_rule(points: int = POINTS) -> Floats:
 
 
 def quadrant_area(arcs: Arcs, curves: Curves) -> float:
-    """Area within K >= 0, B >= 0 of what rings of arcs enclose [N^2 s/m^2].
+    """Area within K >= 0, B >= 0 of what rings of arcs enclose [N² s/m²].
 
     A blurred corner has two walls, the end of one arc and the beginning of the next: their chord counts.
     """

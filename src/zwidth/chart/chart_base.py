@@ -45,7 +45,7 @@ class Chart(Result, ABC):
     damping_at_stiffness_max     [N s/m]; nan if there is none
     frequencies_at_stiffness_max [Hz] one, or two at a corner, ascending; () if there is none
     damping_max     supremum of B >= 0 stable for all sufficiently small K > 0 [N s/m]; 0 if there is none
-    stable_area     of the set within K >= 0, B >= 0 [N^2 s/m^2]
+    stable_area     of the set within K >= 0, B >= 0 [N² s/m²]
     fastest_decay   the wall of smallest spectral radius over the whole set; None if nothing is stable, or if it
                     was not searched for: only charts of one direction of one modelled loop have it
     fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0
@@ -148,7 +148,7 @@ class Chart(Result, ABC):
         return [
             f"largest stiffness  {stiffest}",
             f"largest damping    {self.damping_max:.6g} N s/m",
-            f"stable area        {self.stable_area:.6g} N^2 s/m^2",
+            f"stable area        {self.stable_area:.6g} N² s/m²",
         ]
 
 

@@ -98,8 +98,8 @@ def viscous_equivalent(plant: Plant) -> Plant:
 class ModalPlant:
     """A plant in the modal coordinates of its undamped self, for G(iw).
 
-    squared                       (n,)    natural frequencies squared [1/s^2]
-    loss, damping                 (n, n)  V^T L V [1/s^2] and V^T B V [1/s]
+    squared                       (n,)    natural frequencies squared [1/s²]
+    loss, damping                 (n, n)  V^T L V [1/s²] and V^T B V [1/s]
     dampers                       (k, n)  directions of the lagged dampers, each times the square root of its
                                   damping [s^-1/2]
     lags                          (k,)    their time constants [s]

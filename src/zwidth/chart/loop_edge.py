@@ -59,7 +59,7 @@ class LoopEdge:
     blur            share of the set's size to which corners are known
     peak            the stiffest wall with K > 0, B >= 0; None if there is none
     largest_damping [N s/m]
-    area            within K >= 0, B >= 0 [N^2 s/m^2]
+    area            within K >= 0, B >= 0 [N² s/m²]
     judged          the edge with its points, all of which have been judged; None: not yet
     """
 

@@ -68,7 +68,7 @@ class TracedEdge:
 
     @cached_property
     def area(self) -> float:
-        """Area within K >= 0, B >= 0 [N^2 s/m^2]."""
+        """Area within K >= 0, B >= 0 [N² s/m²]."""
         return quadrant_area(self.arcs, self.curves) if self.peak else 0.0
 
     def largest_damping(self, stable: Callable[[float, float], bool]) -> float:

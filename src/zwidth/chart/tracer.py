@@ -123,7 +123,7 @@ class Tracer:
         return thetas[::-1], K[::-1], B[::-1]
 
     def integral(self, arc: Arc) -> float:
-        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2]."""
+        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N² s/m²]."""
         first, last = np.array([arc.first, arc.last])
         return arc_integral(self.circle, area_memory(), np.tan(0.5 * arc.angles), first, last)
 

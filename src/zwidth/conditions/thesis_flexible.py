@@ -106,7 +106,7 @@ def largest_damping_of_all(mass: ArrayLike, stiffness: ArrayLike, sampling_perio
 
 
 def stable_area(mass: ArrayLike, stiffness: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Area of the stable set over K, B >= 0 [N^2 s/m^2], (...); 0 where no such wall is stable.
+    """Area of the stable set over K, B >= 0 [N² s/m²], (...); 0 where no such wall is stable.
 
         (m^2/T^3) 2 W^4/(1 - c)^2 (c^2/2 + c - (1 + c) ln(1 + c))
 

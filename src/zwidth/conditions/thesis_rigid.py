@@ -49,7 +49,7 @@ def largest_damping(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Area of the stable set over K, B >= 0: (12 - 16 ln 2) m^2/T^3 [N^2 s/m^2], (...).
+    """Area of the stable set over K, B >= 0: (12 - 16 ln 2) m^2/T^3 [N² s/m²], (...).
 
     Thesis eq. 5.5, the integral of (4.14) over 0 < d < 2.
     """

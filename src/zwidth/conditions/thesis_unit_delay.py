@@ -63,7 +63,7 @@ def largest_damping(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
 
 
 def stable_area(mass: ArrayLike, sampling_period: ArrayLike) -> Floats:
-    """Area of the stable set over K, B >= 0, the integral of (4.32) over 0 < d < 0.828 [N^2 s/m^2], (...).
+    """Area of the stable set over K, B >= 0, the integral of (4.32) over 0 < d < 0.828 [N² s/m²], (...).
 
         ((340 - 208 sqrt 2)/3 + 96 ln((2 + sqrt 2)/4)) m^2/T^3 = 0.0798634 m^2/T^3
 

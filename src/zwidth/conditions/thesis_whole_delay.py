@@ -87,7 +87,7 @@ def largest_damping(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: 
 
 
 def stable_area(mass: ArrayLike, sampling_period: ArrayLike, delay_samples: ArrayLike) -> Floats:
-    """Area of the stable set over K, B >= 0 [N^2 s/m^2], (...): the integral of p dd along the edge.
+    """Area of the stable set over K, B >= 0 [N² s/m²], (...): the integral of p dd along the edge.
 
     By Gauss and Legendre's rule, exact to rounding: both are smooth in (l + 1) t. 0.909645 m^2/T^3 without delay
     (thesis eq. 5.5), 0.0798634 and 0.0223537 with one sample and two.

@@ -121,7 +121,7 @@ def traits(loop: Loop) -> Traits:
 def _moved_modes(squared: Floats, push: Floats, read: Floats) -> list[slice]:
     """Groups of modes of equal frequency that the wall moves and the encoder reads, as slices of the modes.
 
-    squared     (n,)  squared natural frequencies [rad^2/s^2]
+    squared     (n,)  squared natural frequencies [rad²/s²]
     push, read  (n,)  modal parts of the actuator's force and of the reading
     """
     whole = float(np.linalg.norm(push) * np.linalg.norm(read))
@@ -143,7 +143,7 @@ def _is_uncoupled(plant: Plant, shapes: Floats, run: slice, push: Floats) -> boo
 def _mode(plant: Plant, shapes: Floats, run: slice, push: Floats, squared: float) -> tuple[float, float, float]:
     """Mass [kg], friction [N s/m] and spring [N/m] of the one motion that the wall makes, 1 m at the actuator.
 
-    squared  its squared natural frequency [rad^2/s^2]
+    squared  its squared natural frequency [rad²/s²]
     """
     mass = 1.0 / float(push[run] @ push[run])
     motion = mass * (shapes[:, run] @ push[run])

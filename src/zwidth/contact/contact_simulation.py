@@ -26,6 +26,7 @@ from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import unheld_positions
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.result import Result
+from zwidth.unit_text import unit_text
 
 WALLS: Final = ("wall", "one-sided wall")
 AT_LIMIT = 1.0 - 1e-12  # share of the largest force from which a force was cut to it
@@ -283,7 +284,7 @@ class ContactSimulation(Result):
         }
 
     def __repr__(self) -> str:
-        units = {parameter.name: parameter.unit for parameter in self.environment.parameters}
+        units = {parameter.name: unit_text(parameter.unit) for parameter in self.environment.parameters}
         values = [f"{name} {value:.4g} {units[name]}".rstrip() for name, value in self.parameters.items()]
         verdict = {True: "stable", False: "not stable", None: "undecided"}[self.stable]
         by_eigenvalues = "" if self.predicted_growth is None else f" (predicted {self.predicted_growth:.4g})"

@@ -158,7 +158,7 @@ def bent_spring(
         N = (3/4) cubic A^2 + backward_excess/pi (arccos c - c sqrt(1 - c^2)),    c = min(-kink/A, 1)
 
     amplitude        (...)  A of its deflection [m]
-    cubic            (...)  [N/m^3]
+    cubic            (...)  [N/m³]
     backward_excess  (...)  what it is stiffer by for deflections below the kink [N/m]; they also push the mean,
                             what is left out
     kink             (...)  not positive [m]

@@ -120,7 +120,7 @@ RIGID: Final = 10.0  # times half the sampling rate
 RESOLVED: Final = 100.0  # times half the sampling rate
 SOFTEST_MODULUS: Final = 1e6  # Pa; soft rubber has as much
 MEGAPASCAL: Final = 1e4  # a modulus above it in a wrong unit is in MPa rather than in GPa
-LIGHTEST_SOLID: Final = 50.0  # kg/m^3; balsa and foams have more
+LIGHTEST_SOLID: Final = 50.0  # kg/m³; balsa and foams have more
 THICKEST: Final = 0.5  # of the length, from which a section is wider than a beam can be
 FIRST_ROOTS: Final = (1.875104069, 4.694091133)  # of a cantilever; then (n - 1/2) pi
 
@@ -162,7 +162,7 @@ def _numbers(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
         density = material["density_kg_per_m3"]
         yield (
             (*path, "material", "density_kg_per_m3"),
-            f"{density:g} kg/m^3 looks wrong for a solid; if it is in g/cm^3, write {density * 1e3:.4g}",
+            f"{density:g} kg/m³ looks wrong for a solid; if it is in g/cm³, write {density * 1e3:.4g}",
         )
 
 

@@ -176,7 +176,7 @@ class Device:
         load        force of the hand on the handle (2,) or (3,) [N], about an axis its moment [N m], or a `Load`:
                     the device is linearised about the haptic equilibrium under it, see `docs/equilibrium.md`. Left
                     out: as the file says
-        gravity     (2,) or (3,) [m/s^2], with a load or without; left out: as the file says
+        gravity     (2,) or (3,) [m/s²], with a load or without; left out: as the file says
         Raises  DeviceError   with what cannot be meant for this device, or a mechanism that cannot be assembled or
                               driven as the file says
                 ArgumentError   (loop.wall_matrices) for what is no matrix of a wall law
@@ -282,7 +282,7 @@ class Device:
             device.under((0.0, -5.0)).chart()
 
         load     force of the hand on the handle (2,) or (3,) [N], or a `Load`; None: as it is
-        gravity  (2,) or (3,) [m/s^2]; None: as it is
+        gravity  (2,) or (3,) [m/s²]; None: as it is
         moment   whether three numbers are a moment [N m], of a wall about an axis
         Raises   DeviceError  for what is no load, and for a device without a mechanism
         """

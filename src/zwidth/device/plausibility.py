@@ -2,7 +2,7 @@
 
 Nothing is changed or refused; loading the device gives a warning. A number is named where it lies far
 outside what haptic devices have, by more than design can explain and by less than the usual slips: grams for
-kilograms and millimetres for metres (1000), degrees for radians (57.3), g cm^2 for kg m^2 (1e7), milliseconds for
+kilograms and millimetres for metres (1000), degrees for radians (57.3), g cm² for kg m² (1e7), milliseconds for
 seconds. Lengths are judged by themselves; masses, inertias and torques by the size of the device that has them.
 """
 
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
 LONGEST: Final = 5.0  # m, of a link or a position
 FULL_TURN: Final = 2.0 * math.pi
-DENSEST: Final = 23_000.0  # kg/m^3; osmium has 22 590
+DENSEST: Final = 23_000.0  # kg/m³; osmium has 22 590
 HEAVY: Final = 1.0  # kg, from which a mass is held against its inertia: lighter ones stand for points
-SOLID: Final = 8000.0 / 4.0  # kg/m^3, of a quarter of a cube of steel as large as the device
+SOLID: Final = 8000.0 / 4.0  # kg/m³, of a quarter of a cube of steel as large as the device
 MASSIVE: Final = 3.0  # kg, from which a link is held against that cube
 HEAVIEST: Final = 1000.0  # kg, of a plant's coordinate
 HEAVIEST_ARM: Final = 50.0  # kg, of an operator
 GYRATION: Final = 3.0  # times the size of the device
-HEAVIEST_ROTOR: Final = 0.5  # kg m^2
+HEAVIEST_ROTOR: Final = 0.5  # kg m²
 STEP_UP: Final = 0.1  # motor turns per joint turn
 STRONGEST: Final = 5000.0  # N at the handle, of a drive
 STICKIEST: Final = 500.0  # N at the handle, of a drive's dry friction
@@ -44,7 +44,7 @@ FEWEST_COUNTS: Final = 10.0  # per revolution
 COARSEST: Final = 2e-3  # m, of an encoder at the handle
 SLOWEST: Final = 0.1  # s, between samples
 LIGHTEST: Final = 1e-3  # kg, that a measured response shows at a tenth of its frequencies
-UNITS: Final = (("kg cm^2", 1e-4), ("kg mm^2", 1e-6), ("g cm^2", 1e-7), ("g mm^2", 1e-9))
+UNITS: Final = (("kg cm²", 1e-4), ("kg mm²", 1e-6), ("g cm²", 1e-7), ("g mm²", 1e-9))
 
 
 class ImplausibleNumber(UserWarning):
@@ -164,7 +164,7 @@ def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
         if dense:
             yield (
                 ("mechanism", *path, "mass_kg"),
-                f"{mass:g} kg looks wrong beside a moment of inertia of {inertia:g} kg m^2, a radius of gyration "
+                f"{mass:g} kg looks wrong beside a moment of inertia of {inertia:g} kg m², a radius of gyration "
                 f"of {_length(gyration)}: no metal is so dense; {_thousandth(mass, 'g')}",
             )
         too_heavy = mass > max(MASSIVE, SOLID * size**3)
@@ -176,7 +176,7 @@ def _links(mechanism: dict[str, Any], size: float) -> KeyMessages:
         if size > 0.0 and gyration > GYRATION * size and not wrist:
             yield (
                 ("mechanism", *path, "inertia_kg_m2"),
-                f"{inertia:g} kg m^2 looks wrong for {mass:g} kg, a radius of gyration of {_length(gyration)} on "
+                f"{inertia:g} kg m² looks wrong for {mass:g} kg, a radius of gyration of {_length(gyration)} on "
                 f"a device of {_length(size)}; {_inertia_units(inertia, mass / 1e3 if too_heavy else mass, size)}",
             )
 
@@ -187,7 +187,7 @@ def _largest_moment(inertia: Any) -> float:
 
 
 def _least_density(mass: float, gyration: float) -> float:
-    """Of all bodies with this mass and largest radius of gyration a ball is the largest; its density [kg/m^3].
+    """Of all bodies with this mass and largest radius of gyration a ball is the largest; its density [kg/m³].
 
     0 for a point: its inertia was left out.
     """
@@ -200,7 +200,7 @@ def _inertia_units(inertia: float, mass: float, size: float) -> str:
     for name, unit in UNITS:
         if 0.05 * size < math.sqrt(inertia * unit / mass) < size:
             return f"if it is in {name}, write {inertia * unit:.4g}"
-    return "1 kg cm^2 is 1e-4 kg m^2, 1 g cm^2 is 1e-7"
+    return "1 kg cm² is 1e-4 kg m², 1 g cm² is 1e-7"
 
 
 def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
@@ -210,7 +210,7 @@ def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
         if rotor > HEAVIEST_ROTOR:
             yield (
                 (*path, "motor_inertia_kg_m2"),
-                f"{rotor:g} kg m^2 looks wrong for a rotor; if it is in g cm^2, write {1e-7 * rotor:.4g}",
+                f"{rotor:g} kg m² looks wrong for a rotor; if it is in g cm², write {1e-7 * rotor:.4g}",
             )
         if ratio < STEP_UP:
             yield (

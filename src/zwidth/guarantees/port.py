@@ -20,7 +20,7 @@ AT_ONCE = 2**22
 class Port:
     """Plant M x'' + B x' + K x = a u + h f in modal coordinates; u acts at the actuator, f at the port.
 
-    squared  (n,)    squared natural frequencies, rigid ones exactly 0 [1/s^2]
+    squared  (n,)    squared natural frequencies, rigid ones exactly 0 [1/s²]
     damping  (n, n)  modal damping, symmetric [1/s]
     modal_actuator, modal_sensor, modal_port  (n,)  participation of actuator, sensor and port
     lagged   dampers with a lag, in modal coordinates

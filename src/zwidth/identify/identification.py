@@ -9,6 +9,7 @@ from typing import Any
 
 from zwidth.errors import NoAnswerError
 from zwidth.result import Result
+from zwidth.unit_text import unit_text
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,9 @@ class Identification(Result):
             if one.told == "no":
                 lines.append(f"  {one.path or one.name} is not told: {one.reason}")
                 continue
-            lines.append(f"  {one.path or one.name} = {estimate_text(one)}, {interval(one)} {one.unit}".rstrip())
+            lines.append(
+                f"  {one.path or one.name} = {estimate_text(one)}, {interval(one)} {unit_text(one.unit)}".rstrip()
+            )
         lines += [f"  {text}" for text in self.left_out]
         return "\n".join([*lines, f"  validation {self.validation:.4g} ({self.validated_on})"])
 

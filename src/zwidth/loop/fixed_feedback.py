@@ -19,7 +19,7 @@ from zwidth.model.design_axes import Number
 
 ForceLaw = Literal["force-feedforward", "force-error"]
 UNITS_ALONG_A_DIRECTION: Final = ("N/m", "N s/m", "kg", "N")  # of stiffness, damping, mass and force
-UNITS_ABOUT_AN_AXIS: Final = ("N m/rad", "N m s/rad", "kg m^2", "N m")
+UNITS_ABOUT_AN_AXIS: Final = ("N m/rad", "N m s/rad", "kg m²", "N m")
 MOST_FAST_SAMPLES: Final = 200  # of a local loop in a period of the wall's
 
 
@@ -153,7 +153,7 @@ def feedback_name(feedback: FixedFeedback) -> str:
 def describe_feedback(feedback: FixedFeedback, moments: bool = False) -> str:
     """A feedback in words, with the numbers that are not 0; several designs' numbers as "several".
 
-    moments  whether moments about an axis are rendered, so that its numbers are in N m/rad, N m s/rad and kg m^2
+    moments  whether moments about an axis are rendered, so that its numbers are in N m/rad, N m s/rad and kg m²
     """
     stiffness, damping, mass, force = UNITS_ABOUT_AN_AXIS if moments else UNITS_ALONG_A_DIRECTION
     match feedback:

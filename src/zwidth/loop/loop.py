@@ -379,7 +379,7 @@ def held_motions(plant: Plant) -> tuple[str, ...]:
 
 def _squared(plant: Plant) -> tuple[Floats, Floats, Floats]:
     """Squared frequencies of the free motions of a plant, and of the others with how they decay, dampers that
-    couple them left out [1/s^2], [1/s]."""
+    couple them left out [1/s²], [1/s]."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     decay = 0.5 * np.einsum("ik,ij,jk->k", shapes, plant.damping, shapes)
     free = squared == 0.0

@@ -19,7 +19,7 @@ SIDEWAYS: Final = re.compile(
 def motion_name(squared: float, decay: float) -> str:
     """Name of a motion by its natural frequency and damping.
 
-    squared  natural frequency squared [1/s^2]; negative for a negative stiffness
+    squared  natural frequency squared [1/s²]; negative for a negative stiffness
     decay    rate at which it decays [1/s], the damping ratio times the natural frequency
     """
     if squared <= 0.0:

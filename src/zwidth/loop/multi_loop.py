@@ -451,7 +451,7 @@ def continuous_plant(plant: MultiPlant, period: float, fraction: float) -> Conti
 def _groups(
     squared: Floats, drag: Floats, members: Ints, tolerance: Floats, drag_tolerance: float
 ) -> list[list[int]]:
-    """Modes in groups of equal frequency squared and damping, within tolerances (n,) [1/s^2] and [1/s]."""
+    """Modes in groups of equal frequency squared and damping, within tolerances (n,) [1/s²] and [1/s]."""
     groups: list[list[int]] = []
     for k in members.tolist():
         for group in groups:

@@ -272,7 +272,7 @@ class PosedDevice:
 
     @property
     def mass_matrix(self) -> Floats:
-        """M (..., c, c) of the links in the independent coordinates [kg m^2]. Raises NoMechanismError as
+        """M (..., c, c) of the links in the independent coordinates [kg m²]. Raises NoMechanismError as
         `jacobian`, MissingNumbersError where masses are not known."""
         self.require("dynamics")
         return self._posture.mass_matrix
@@ -287,7 +287,7 @@ class PosedDevice:
 
     @property
     def whole_mass_matrix(self) -> Floats:
-        """M (..., c, c) of links and rotors, all drives rigid, in the independent coordinates [kg m^2]. Raises
+        """M (..., c, c) of links and rotors, all drives rigid, in the independent coordinates [kg m²]. Raises
         NoMechanismError as `jacobian`."""
         return self.drive_side.with_rotors(self.mass_matrix, self.drives)
 

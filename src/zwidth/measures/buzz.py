@@ -1,6 +1,6 @@
 """The vibration that friction, encoder steps or limits keep up at a wanted wall, and the least that is felt.
 
-On the skin of the hand, by contactors of 2.9 cm^2 and more, the threshold is flat up to 40 Hz, falls by 12 dB an
+On the skin of the hand, by contactors of 2.9 cm² and more, the threshold is flat up to 40 Hz, falls by 12 dB an
 octave to its least at about 250 Hz (Gescheider and Verrillo, in Sensory Functions of the Skin of Humans, 1979: the
 abstract was read), and rises again above, the curve being U-shaped. Its level at 250 Hz is commonly given as 20 dB
 below a micrometre (Verrillo 1963; Bolanowski, Gescheider, Verrillo and Checkosky 1988; both known at second hand).

@@ -14,8 +14,8 @@ from importlib import import_module
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from zwidth.measures.unit_text import unit_of_moments
 from zwidth.result import Result
+from zwidth.unit_text import unit_of_moments
 
 if TYPE_CHECKING:
     import numpy as np

@@ -59,7 +59,7 @@ class Description(Result):
     joints               angle of each joint by its link [rad], of a prismatic one the way [m], a list of those of
                          a joint with several; None for a device without a mechanism, as all below
     jacobian             (3, c)  [m/rad];   angular_jacobian  (3, c)  of the handle's orientation [rad/rad]
-    mass_matrix          (c, c)  of the links [kg m^2]
+    mass_matrix          (c, c)  of the links [kg m²]
     manipulability, dynamic_manipulability, isotropy   see `measures.dexterity`
     beams                of the links that bend
     """

@@ -64,7 +64,7 @@ def dynamic_manipulability(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms
         w_d = sqrt(det(J (M^T M)^-1 J^T))           (Yoshikawa 1985; thesis eq. 5.3)
 
     jacobian     (..., 3, d)  J [m/rad]
-    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m^2]
+    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m²]
     freedoms     as for `manipulability`
     Returns      (...)        [1/(kg m)^r], r the freedoms
     Raises       LinAlgError  where M is singular
@@ -129,7 +129,7 @@ def dynamic_isotropy(mass_matrix: ArrayLike) -> Floats:
     A dynamically isotropic mechanism has inertia torques that do not couple its drives, and answers alike to each.
     The source could only be read second-hand (thesis section 5.1; abstracts).
 
-    mass_matrix  (..., d, d)  M in the driven coordinates, links and rotors [kg m^2]
+    mass_matrix  (..., d, d)  M in the driven coordinates, links and rotors [kg m²]
     Returns      (...)        inf where a motion has no mass, nan where M is nan
 
     >>> float(dynamic_isotropy([[0.02, 0.0], [0.0, 0.01]]))
@@ -151,7 +151,7 @@ def handle_mass_isotropy(jacobian: ArrayLike, mass_matrix: ArrayLike, freedoms: 
     J A^-T, and is computed so: J M^-1 J^T would lose half of the digits near a singularity.
 
     jacobian     (..., 3, d)  J [m/rad]
-    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m^2]
+    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m²]
     freedoms     as for `manipulability`
     Returns      (...)        inf where singular, or where a motion has no mass; nan where J or M is nan
 

@@ -92,10 +92,10 @@ def acceleration_along(
     accelerations make collisions sharp (Lawrence and Chapel 1994; second-hand).
 
     jacobian     (..., 3, d)  J [m/rad], of rank d
-    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m^2]
+    mass_matrix  (..., d, d)  M in the same coordinates, links and rotors [kg m²]
     direction    (..., 3)     u, unit vectors
     torques      (..., d)     t, each drive's limit at the joint [N m]; inf: none
-    Returns      (...)        [m/s^2]; 0 where the handle cannot move along u, nan where J or M is nan
+    Returns      (...)        [m/s²]; 0 where the handle cannot move along u, nan where J or M is nan
     Raises       ValueError   if a direction is not of unit length
 
     >>> J, M = [[0.0, -0.2], [0.4, 0.0], [0.0, 0.0]], [[0.04, 0.0], [0.0, 0.02]]
@@ -224,7 +224,7 @@ def continuous_force_at(point: OperatingPoint) -> Floats:
 
 
 def acceleration_max_at(point: OperatingPoint) -> Floats:
-    """Largest acceleration exactly along the rendered direction, from rest, within the torque limits [m/s^2].
+    """Largest acceleration exactly along the rendered direction, from rest, within the torque limits [m/s²].
 
     Drives count as rigid.
     """

@@ -26,7 +26,7 @@ from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.posture import Posture, link_points
 
 SAME_POINT: Final = 1e-9  # m, within which two points are one
-SHORT: Final = 1e-30  # squared length [m^2] below which a rod is a point
+SHORT: Final = 1e-30  # squared length [m²] below which a rod is a point
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ class ImpedanceRange:
     stiffness_max             (...)  supremum of K over stable walls with K > 0, B >= 0 [N/m]; nan if there is none
     damping_at_stiffness_max  (...)  its damping [N s/m]; nan if there is none
     damping_max               (...)  supremum of B >= 0 stable for K -> 0 [N s/m]; 0 if there is none
-    stable_area               (...)  of the stable set in K >= 0, B >= 0 [N^2 s/m^2]; 0 if there is none
+    stable_area               (...)  of the stable set in K >= 0, B >= 0 [N² s/m²]; 0 if there is none
     """
 
     stiffness_max: Floats
@@ -226,7 +226,7 @@ def damping_max_at(point: OperatingPoint) -> MeasureValues:
 
 
 def stable_area_at(point: OperatingPoint) -> MeasureValues:
-    """Area of the stable walls with K >= 0, B >= 0 of the points [N^2 s/m^2]."""
+    """Area of the stable walls with K >= 0, B >= 0 of the points [N² s/m²]."""
     return _computed(point, ALL_NUMBERS, "area", _stable_area_at)
 
 

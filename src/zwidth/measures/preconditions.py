@@ -14,6 +14,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import WANTED_BY_NAME, WantedWall, WantedWalls
 from zwidth.measures.handle_impedance import handle_of
 from zwidth.model.plant import Plant
+from zwidth.unit_text import unit_text
 
 # One mass in place of a mechanism, where only the computer matters.
 UNIT: Final = Plant(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(1))
@@ -48,7 +49,7 @@ def numbers_of(
         number = WANTED_BY_NAME[name]
         wrong = [float(one) for one in np.ravel(value) if not number.allows(one)]
         if wrong and number.checked:
-            unit = f" {number.unit}" if number.unit else ""
+            unit = f" {unit_text(number.unit)}" if number.unit else ""
             raise MeasureError(f"needs {name} {number.allowed}{unit}, got {wrong[0]:g}{unit}")
     return tuple(np.array(np.broadcast_to(value, shape), dtype=np.float64) for value in values)
 

@@ -2,7 +2,7 @@
 
     from zwidth import measure
 
-    @measure(unit="N", title="Force for an acceleration of 10 m/s^2", better="lower")
+    @measure(unit="N", title="Force for an acceleration of 10 m/s²", better="lower")
     def inertial_force(point):
         return 10.0 * point.effective.rigid_mass
 

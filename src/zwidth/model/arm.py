@@ -54,7 +54,7 @@ def attach_arm(plant: Plant, arm: Arm, handle: Floats, place: Floats, force: Flo
 
     handle   (3, n)  motion of the handle per coordinate of the plant
     place    (3,)    of the handle [m]
-    force    (3,)    of the hand on the handle [N], 0 without load;   gravity (3,) on the arm [m/s^2]
+    force    (3,)    of the hand on the handle [N], 0 without load;   gravity (3,) on the arm [m/s²]
     Returns  Plant, the arm's joints among its last coordinates
     Raises   OperatorError  where the arm cannot reach the handle, or cannot move with it
     """

@@ -324,7 +324,7 @@ def flexible_link(
 def carried_body(
     mechanism: Mechanism, link: int, beam: BeamProperties, planar: Floats | None = None
 ) -> tuple[float, Floats, Floats]:
-    """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m^2] of what a link has beside a beam; arguments and
+    """Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m²] of what a link has beside a beam; arguments and
     errors are those of `flexible_body`."""
     links = mechanism.links
     mass, centre, inertia = (np.asarray(each)[link] for each in (links.mass, links.center_of_mass, links.inertia))
@@ -350,8 +350,8 @@ def carried_body(
         raise BeamError(
             links.names[link],
             "inertia_kg_m2",
-            f"leaves {least:.4g} kg m^2 for what the beam carries, whose own moment is {float(np.max(own)):.4g} "
-            "kg m^2 about its centre; give the inertia of the whole link, or another section or material",
+            f"leaves {least:.4g} kg m² for what the beam carries, whose own moment is {float(np.max(own)):.4g} "
+            "kg m² about its centre; give the inertia of the whole link, or another section or material",
         )
     return left, carried, rest
 

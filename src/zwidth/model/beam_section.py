@@ -28,10 +28,10 @@ ROUNDING: Final = 1e-12
 class CrossSection:
     """A cross section with two axes of symmetry, y and z.
 
-    area             A [m^2]
-    second_moment_y  I_y [m^4]
-    second_moment_z  I_z [m^4]
-    torsion_constant J [m^4]
+    area             A [m²]
+    second_moment_y  I_y [m⁴]
+    second_moment_z  I_z [m⁴]
+    torsion_constant J [m⁴]
     Raises           ValueError  for what is not a finite number greater than 0
     """
 
@@ -41,13 +41,13 @@ class CrossSection:
     torsion_constant: float
 
     def __post_init__(self) -> None:
-        check_number("area", self.area, "m^2", above=0.0, hint="a beam needs a section with material in it")
+        check_number("area", self.area, "m²", above=0.0, hint="a beam needs a section with material in it")
         for name in ("second_moment_y", "second_moment_z", "torsion_constant"):
-            check_number(name, getattr(self, name), "m^4", above=0.0)
+            check_number(name, getattr(self, name), "m⁴", above=0.0)
 
     @property
     def polar_moment(self) -> float:
-        """I_p = I_y + I_z [m^4]."""
+        """I_p = I_y + I_z [m⁴]."""
         return self.second_moment_y + self.second_moment_z
 
 
@@ -137,7 +137,7 @@ class Material:
 
     youngs_modulus  E along the beam [Pa]
     shear_modulus   G of twist about it [Pa]; E and G are independent, for the sake of fibres
-    density         rho [kg/m^3]
+    density         rho [kg/m³]
     Raises          ValueError  for what is not a finite number greater than 0
     """
 
@@ -148,7 +148,7 @@ class Material:
     def __post_init__(self) -> None:
         check_number("youngs_modulus", self.youngs_modulus, "Pa", above=0.0)
         check_number("shear_modulus", self.shear_modulus, "Pa", above=0.0)
-        check_number("density", self.density, "kg/m^3", above=0.0)
+        check_number("density", self.density, "kg/m³", above=0.0)
 
 
 # Typical values at room temperature, rounded, as tables of mechanics of materials give them; a particular alloy,
@@ -187,8 +187,8 @@ class BeamProperties:
     """A straight uniform beam along x.
 
     length                        L [m]
-    EI_y, EI_z                    bending stiffness in the x-z and in the x-y plane [N m^2]
-    GJ                            torsion stiffness [N m^2/rad]
+    EI_y, EI_z                    bending stiffness in the x-z and in the x-y plane [N m²]
+    GJ                            torsion stiffness [N m²/rad]
     EA                            stiffness along the beam [N]
     mass_per_length               rho A [kg/m]
     torsional_inertia_per_length  rho I_p, about x [kg m]
@@ -210,7 +210,7 @@ class BeamProperties:
     def __post_init__(self) -> None:
         hint = "leave the link rigid if it has no length"
         check_number("length", self.length, "m", above=0.0, hint=hint)
-        for name, unit in (("EI_y", "N m^2"), ("EI_z", "N m^2"), ("GJ", "N m^2/rad"), ("EA", "N")):
+        for name, unit in (("EI_y", "N m²"), ("EI_z", "N m²"), ("GJ", "N m²/rad"), ("EA", "N")):
             hint = "give a large number for what hardly bends, twists or stretches"
             check_number(name, getattr(self, name), unit, above=0.0, hint=hint)
         check_number("mass_per_length", self.mass_per_length, "kg/m", above=0.0)
@@ -223,8 +223,8 @@ def beam_properties(length: float, section: CrossSection, material: Material) ->
     Raises  ValueError  unless the length is a finite number greater than 0
 
     >>> beam = beam_properties(0.2, tube(0.01, 0.001), typical_material("aluminium-6061"))
-    >>> f"{beam.EI_y:.2f} N m^2, {1e3 * beam.length * beam.mass_per_length:.2f} g"
-    '19.97 N m^2, 15.27 g'
+    >>> f"{beam.EI_y:.2f} N m², {1e3 * beam.length * beam.mass_per_length:.2f} g"
+    '19.97 N m², 15.27 g'
     """
     E, G, rho = material.youngs_modulus, material.shear_modulus, material.density
     return BeamProperties(

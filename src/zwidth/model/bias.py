@@ -103,7 +103,7 @@ def point_acceleration(
     design: int,
     index: int,
 ) -> tuple[float, float, float]:
-    """Acceleration of the link's point local[design, index], less gravity [m/s^2]."""
+    """Acceleration of the link's point local[design, index], less gravity [m/s²]."""
     if link < 0:
         return -gravity[0], -gravity[1], -gravity[2]
     w, b, a, o = flow.angular_velocity, flow.angular_acceleration, flow.acceleration, work.origin

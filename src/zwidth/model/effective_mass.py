@@ -41,7 +41,7 @@ class EffectiveParameters:
 
 
 def effective_parameters(mechanism: Mechanism, posture: Posture, direction: ArrayLike) -> EffectiveParameters:
-    """Effective masses and stiffness of a mechanism along a direction, or about an axis (then inertias [kg m^2]
+    """Effective masses and stiffness of a mechanism along a direction, or about an axis (then inertias [kg m²]
     and N m/rad).
 
     With drives that are no coordinates of their own (`drive_side`): motor_side_mass 1 / (t^T M_theta^-1 t);

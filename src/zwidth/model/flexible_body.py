@@ -41,7 +41,7 @@ class FlexibleBody:
     """A beam with e elastic coordinates eps, at eps = 0, all in its own frame; S stations.
 
     mass             (6+e, 6+e)    kinetic energy is 1/2 u^T M u for u = (velocity of the base's origin, angular
-                                   velocity of the base, eps') [kg, kg m, kg m^2, and per unit of eps]
+                                   velocity of the base, eps') [kg, kg m, kg m², and per unit of eps]
     stiffness        (e, e)        K, of eps
     stations         (S,)          places s along the beam [m]
     displacement     (S, 3, e)     Phi: r = s e_x + Phi eps + 1/2 eps^T D2 eps [m]
@@ -144,7 +144,7 @@ class FlexibleLink:
     method         by which it is modelled;   modes  that it keeps beside its static deflections, as asked for
     damping_time   damping of the beam's own, this times its stiffness [s]
     carried_mass, carried_center (3,), carried_inertia (3, 3)  of the rest of the link, in its frame, the inertia
-                   about the centre [kg], [m], [kg m^2]
+                   about the centre [kg], [m], [kg m²]
     """
 
     link: int

@@ -46,7 +46,7 @@ def inertia_regressor(
     start           (n,)    joint coordinates of a closed posture near the first state; each state is reached from
                             the one before
     coordinates, rates, accelerations  (N, c)  of the independent coordinates, drives and then free joints
-    gravity         (3,)    [m/s^2]
+    gravity         (3,)    [m/s²]
     Returns  Y; the joint coordinates (N, n) of each state; and the number of states that were reached: a loop
              does not close at the next one, and Y and the coordinates are nan from there on
     """

@@ -27,7 +27,7 @@ class Load:
     moment        (3,)  of the hand instead, where moments about an axis are rendered [N m]
     push          instead of either: its part along the rendered direction, whichever that is, of either sign [N].
                   With none of the three the wall is at rest, without force, and the hand only holds the device
-    gravity       (3,)  [m/s^2]
+    gravity       (3,)  [m/s²]
     hand          "dead": the hand's force keeps its direction in space as the device moves; "follower": it turns
                   with the handle's link; "neglected": that it turns against the links as these move is left out,
                   as in thesis 2.1, which is another device
@@ -59,7 +59,7 @@ class Load:
 
     def __post_init__(self) -> None:
         """Make lists arrays (3,) and check them."""
-        for name, unit in (("force", "N"), ("moment", "N m"), ("gravity", "m/s^2")):
+        for name, unit in (("force", "N"), ("moment", "N m"), ("gravity", "m/s²")):
             given = getattr(self, name)
             if given is None:
                 continue
@@ -108,7 +108,7 @@ class Load:
 
     @property
     def weight(self) -> Floats:
-        """Gravity (3,), 0 where there is none [m/s^2]."""
+        """Gravity (3,), 0 where there is none [m/s²]."""
         return np.zeros(3) if self.gravity is None else self.gravity
 
     @property
@@ -167,7 +167,7 @@ class Load:
         return replace(self, force=None, push=float(np.linalg.norm(self.force)), settle=False)
 
     def with_gravity(self, gravity: ArrayLike) -> Load:
-        """The same load under another gravity, (2,) or (3,) [m/s^2]. Raises LoadError for another one."""
+        """The same load under another gravity, (2,) or (3,) [m/s²]. Raises LoadError for another one."""
         return replace(self, gravity=cast(Floats, gravity))
 
 

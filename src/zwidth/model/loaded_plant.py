@@ -207,7 +207,7 @@ def _on(plants: LoadedPlants, motions: ModalMotions) -> Plant:
 
 
 class ModalMotions(NamedTuple):
-    """Mass-normalised motions: shapes (n, m), each within one natural frequency, and its square (m,) [1/s^2]."""
+    """Mass-normalised motions: shapes (n, m), each within one natural frequency, and its square (m,) [1/s²]."""
 
     shapes: Floats
     squared: Floats

@@ -62,7 +62,7 @@ class Links:
     axis       (..., n, 3)  unit joint axis in the link's frame; of a ball joint x, y and z
     mass       (..., n)     [kg]
     center_of_mass (..., n, 3)  in the link's frame [m]
-    inertia    (..., n, 3, 3)  about the centre of mass, link axes [kg m^2]
+    inertia    (..., n, 3, 3)  about the centre of mass, link axes [kg m²]
     tip        (..., n, 3)  the link's tip in its own frame, (length, 0, 0) [m]; drawn, and default for points
     lower, upper  (..., n)  limits of each revolute joint [rad] and prismatic one [m], infinite where there is
                             none; None: no limits
@@ -121,7 +121,7 @@ class DriveNonlinearity:
     bristle_stiffness   of dahl and lugre [N m/rad]
     bristle_damping     of lugre [N m s/rad]
     stribeck_velocity   of lugre [rad/s]
-    hardening           (..., d)  k_3 of the transmission's torque k d + k_3 d^3 [N m/rad^3]
+    hardening           (..., d)  k_3 of the transmission's torque k d + k_3 d^3 [N m/rad³]
     backward_stiffness  (..., d)  its stiffness where the motor lags behind the joint [N m/rad]; nan: the same
     preload             (..., d)  torque beyond which it has that stiffness [N m]
     brake_damping       (..., d)  largest damping of a programmable brake on the rotor [N m s/rad]
@@ -151,7 +151,7 @@ class Drives:
     or that and what other joints add to it (`coupling`).
 
     joint            (d,)      index of the driven link (its joint)
-    motor_inertia    (..., d)  rotor [kg m^2], at the motor
+    motor_inertia    (..., d)  rotor [kg m²], at the motor
     transmission     (..., d)  motor turns per joint turn; nan of a drive with a table
     stiffness        (..., d)  at the motor shaft [N m/rad]; inf: rigid
     damping          (..., d)  parallel to that stiffness, at the motor shaft [N m s/rad]

@@ -50,7 +50,7 @@ class RealModes:
     """Second-order modes  xi'' + 2 a xi' + w^2 xi = input * f,  y = sum output * xi.
 
     decay            (n,)    a [1/s]
-    frequency_squared (n,)   w^2 [1/s^2]; exactly 0 for a rigid mode; negative for a negative stiffness
+    frequency_squared (n,)   w^2 [1/s²]; exactly 0 for a rigid mode; negative for a negative stiffness
     input, output    (n,)    participation of the wall force and of the reading [kg^-1/2]
     shapes           (n, n)  mass-normalised columns
     """

@@ -224,7 +224,7 @@ class Motions:
         return beam.carried_mass, beam.carried_center, beam.carried_inertia
 
     def weight(self, gravity: Floats) -> tuple[Floats, Floats]:
-        """Generalised forces (c,) of gravity (3,) [m/s^2] on the links, and their derivative (c, c)."""
+        """Generalised forces (c,) of gravity (3,) [m/s²] on the links, and their derivative (c, c)."""
         force, derivative = np.zeros(self.count), np.zeros((self.count, self.count))
         for link in self.mech.bodies if np.any(gravity) else ():
             mass, place, _ = self._rigid_body(int(link))

@@ -84,7 +84,7 @@ class Spring:
     Under load it is bent already, by an offset d0, and its tangent there is in the plant's stiffness: then the
     force is that at d0 + d, less that at d0 and less the tangent's.
 
-    cubic            hardening, or softening where negative [N/m^3]
+    cubic            hardening, or softening where negative [N/m³]
     backward_excess  how much stiffer it is for d < kink [N/m];   kink  not positive [m]
     offset           d0 [m];   backward  whether the tangent at d0 is that of d < kink
     """

@@ -15,7 +15,7 @@ from zwidth.model.plant import Plant
 
 ABOUT_AN_AXIS: Final = (
     "is a hand in N/m, N s/m and kg, which holds the handle along a direction; about an axis it would have to be "
-    'in N m/rad, N m s/rad and kg m^2, which an operator cannot be given in. Name "none" as the '
+    'in N m/rad, N m s/rad and kg m², which an operator cannot be given in. Name "none" as the '
     "operator, or render a direction"
 )
 

@@ -87,7 +87,7 @@ class Posture:
     status            (...)        OK, OUT_OF_REACH, SINGULAR, BEYOND_LIMIT or NO_EQUILIBRIUM; where not OK the
                       numbers below are nan
     angles            (..., n)     joint coordinates, 0 for fixed joints [rad], of prismatic joints [m]
-    mass_matrix       (..., c, c)  M of the links in the independent coordinates [kg m^2]: the driven joints, then
+    mass_matrix       (..., c, c)  M of the links in the independent coordinates [kg m²]: the driven joints, then
                                    the free ones
     jacobian          (..., 3, c)  J: handle velocity = J p' with the rates p' of these coordinates [m/rad]
     angular_jacobian  (..., 3, c)  the same of the handle's angular velocity [1]

@@ -36,7 +36,7 @@ class RenderedModes:
     """Modes xi'' + 2 a xi' + w^2 xi = input f,  y = sum output xi, as in `modes.RealModes`; N postures, m modes.
 
     decay              (N, m)  a [1/s]
-    frequency_squared  (N, m)  w^2 [1/s^2]; 0 for the free motion
+    frequency_squared  (N, m)  w^2 [1/s²]; 0 for the free motion
     input, output, handle  (N, m)  participation of the wall force, of the reading and of the handle along the
                            direction [kg^-1/2]; input is nan where a posture is not OK or the handle cannot move
                            along the direction, handle where there is none
@@ -329,7 +329,7 @@ class PolePairs:
     """Parts xi'' + 2 a xi' + w^2 xi = f,  y = sum of position xi + velocity xi'; N plants of at most m parts.
 
     decay              (N, m)  a [1/s]
-    frequency_squared  (N, m)  w^2 [1/s^2]; 0 for a free motion
+    frequency_squared  (N, m)  w^2 [1/s²]; 0 for a free motion
     position, velocity (N, m)  share of each part in the reading [1/kg], [s/kg]; velocity 0 for undamped shapes
     reach              (N,)    the reading that all participations together could have [1/kg], by which rounding is
                                told; nan for a plant that is to be looked at alone

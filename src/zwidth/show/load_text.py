@@ -36,7 +36,7 @@ def balance_rows(point: OperatingPoint, stiffness_max: float | None = None) -> I
 def balance_text(found: Equilibrium) -> str:
     """Who pushes how hard."""
     turns = not np.any(found.screw[:3])
-    force, unit = (found.hand_moment, "Nm") if turns else (found.hand_force, "N")
+    force, unit = (found.hand_moment, "N m") if turns else (found.hand_force, "N")
     text = f"wall {amount(found.wall_force, 'N')}, hand {vector(force, unit)}"
     if has_sideways_force(found):
         across = vector(found.sideways_force, unit)
@@ -60,7 +60,7 @@ def drive_rows(point: OperatingPoint) -> Iterator[Row]:
     torques = motor_torques(found)
     for name, torque, bent, way in zip(drives.names, torques, found.deflections.tolist(), slides, strict=True):
         flexible = f", its drive bent by {amount(bent, 'm' if way else 'rad')}" if bent else ""
-        yield f"motor {name}", f"{amount(torque, 'Nm')}{flexible}"
+        yield f"motor {name}", f"{amount(torque, 'N m')}{flexible}"
 
 
 def motor_torques(found: Equilibrium) -> list[float]:

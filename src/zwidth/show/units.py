@@ -25,14 +25,14 @@ from contextvars import ContextVar
 from math import floor, isfinite, isnan, log10
 from typing import Any, Final
 
-from zwidth.measures.unit_text import unit_of_moments, unit_text
+from zwidth.unit_text import unit_of_moments, unit_text
 
 PREFIXES: Final = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Prefixes, as powers of ten, that a unit may take; one that is not named takes none: kg has a prefix already, one
-# before a square would be squared with it, and mNs/m reads as a metre-newton.
+# before a square would be squared with it, and mN s/m reads as a metre-newton.
 _TAKES: Final = {
     "N/m": (0, 3, 6),
-    "Nm/rad": (0, 3, 6),
+    "N m/rad": (0, 3, 6),
     **dict.fromkeys(("Hz", "s", "m", "N", "J"), tuple(PREFIXES)),
 }
 DIGITS: Final = 4  # of whatever is computed
@@ -57,8 +57,8 @@ def exponent_of(value: float) -> int:
 def scaled(exponent: int, unit: str) -> str:
     """A unit under a power of ten: the prefix where the unit may take it, else the power itself.
 
-    >>> scaled(3, "N/m"), scaled(3, "Ns/m"), scaled(0, "Ns/m")
-    ('kN/m', '10³\xa0Ns/m', 'Ns/m')
+    >>> scaled(3, "N/m"), scaled(3, "N s/m"), scaled(0, "N s/m")
+    ('kN/m', '10³\xa0N s/m', 'N s/m')
     """
     unit = spoken_unit(unit)
     if exponent == 0 or exponent in _TAKES.get(unit, ()):
@@ -137,20 +137,24 @@ def _rounded(value: float, digits: int) -> str:
     return text.replace("-", MINUS)
 
 
+def _unbroken(unit: str) -> str:
+    return (SPACE + unit.replace(" ", SPACE)) if unit else ""
+
+
 def quantity(value: float, unit: str) -> str:
     """A value with its unit and the prefix that suits it; a dash where the value is not known (nan).
 
-    >>> quantity(7849.44, "N/m"), quantity(0.02, "Ns/m"), quantity(0.2616, "kg")
-    ('7.849\xa0kN/m', '0.02000\xa0Ns/m', '0.2616\xa0kg')
+    >>> quantity(7849.44, "N/m"), quantity(0.02, "N s/m"), quantity(0.2616, "kg")
+    ('7.849\xa0kN/m', '0.02000\xa0N\xa0s/m', '0.2616\xa0kg')
     """
     unit = spoken_unit(unit)
     if isnan(value):
         return UNKNOWN
     if not isfinite(value):
-        return f"{number(value)}{SPACE}{unit}".strip()
+        return f"{number(value)}{_unbroken(unit)}"
     rounded = float(f"{value:.{DIGITS - 1}e}")  # so that 999.996 becomes 1.000 k, not 1000
     exponent = _prefixed(rounded, unit)
-    return f"{number(rounded / 10.0**exponent)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
+    return f"{number(rounded / 10.0**exponent)}{_unbroken(PREFIXES[exponent] + unit)}"
 
 
 def seconds(time: float) -> str:
@@ -170,16 +174,7 @@ def as_written(value: float, unit: str = "") -> str:
     if "e" in shown:
         mantissa, power = shown.split("e")
         shown = f"{mantissa}{THIN}×{THIN}10{str(int(power)).translate(_RAISED)}"
-    return f"{shown.replace('-', MINUS)}{SPACE}{PREFIXES[exponent]}{unit}".strip()
-
-
-def printed(unit: str) -> str:
-    """A measure's unit as it is printed: powers raised, products without a blank before s.
-
-    >>> printed("N^2 s/m^2"), printed("m^2/rad^2")
-    ('N²s/m²', 'm²/rad²')
-    """
-    return unit_text(spoken_unit(unit))
+    return f"{shown.replace('-', MINUS)}{_unbroken(PREFIXES[exponent] + unit)}"
 
 
 def area_text(square_metres: float) -> str:
@@ -337,5 +332,9 @@ def speaks_of_moments() -> bool:
 
 
 def spoken_unit(unit: str) -> str:
-    """A unit as texts and figures write it now."""
-    return unit_of_moments(unit) if _moments.get() else unit
+    """A unit of data as texts and figures write it now: of a moment where they speak of one, powers raised.
+
+    >>> spoken_unit("N^2 s/m^2"), spoken_unit("m^2/rad^2")
+    ('N² s/m²', 'm²/rad²')
+    """
+    return unit_text(unit_of_moments(unit) if _moments.get() else unit)

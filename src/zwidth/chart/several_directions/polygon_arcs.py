@@ -283,7 +283,7 @@ class Branch:
         return angles, K, B
 
     def integral(self, arc: Arc) -> float:
-        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N^2 s/m^2], by Gauss's rule."""
+        """Integral of K dB over the part of an arc with K > 0 and B > 0 [N² s/m²], by Gauss's rule."""
         inside = self.curve.regular(arc.angles)
         inner = arc.angles[inside]
         if len(inner) < 2:
@@ -318,5 +318,5 @@ def sign_change_places(curve: WallCurve, places: Floats, component: int) -> Floa
 
 
 def _straight_integral(first: Floats | tuple[float, float], last: Floats | tuple[float, float]) -> float:
-    """Integral of K dB over the part with K > 0 and B > 0 of a straight edge [N^2 s/m^2]."""
+    """Integral of K dB over the part with K > 0 and B > 0 of a straight edge [N² s/m²]."""
     return float(straight_integrals(np.array([first]), np.array([last]))[0])

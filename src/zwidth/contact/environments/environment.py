@@ -27,6 +27,7 @@ from numba.extending import intrinsic
 from zwidth import _verbs
 from zwidth.arrays import Floats
 from zwidth.compiled import compiled_for
+from zwidth.unit_text import unit_text
 
 
 def address_of(dispatcher: Any) -> int:
@@ -194,7 +195,7 @@ class Environment:
         return f"{self.name} has no parameter {name}; {hint}"
 
     def _faults(self, parameter: Parameter, value: object) -> list[str]:
-        unit = f" [{parameter.unit}]" if parameter.unit else ""
+        unit = f" [{unit_text(parameter.unit)}]" if parameter.unit else ""
         what = f"{parameter.name} of {self.name}"
         if not isinstance(value, (int, float, np.integer, np.floating, np.bool_)):
             return [f"{what} must be a number{unit}, got {value!r}"]

@@ -31,7 +31,7 @@ class MechanismMotion(Result):
     environment      what is rendered at the surface;   values (P,) of its parameters. None without a surface
     start_velocity   (3,) of the handle [m/s]
     push             (1, 3) force at the handle, or one for each sampling period, held throughout it [N]
-    gravity          (3,) [m/s^2]
+    gravity          (3,) [m/s²]
     duration         requested [s];   substeps between samples;   seed of the encoders' noise
     counted          are the encoders read in counts, with noise?
     torque_limits    "each" or "together", as simulated

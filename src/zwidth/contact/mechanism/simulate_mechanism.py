@@ -79,7 +79,7 @@ def simulate_mechanism(
     duration        [s]
     start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
     push            (3,) force at the handle [N], or (samples, 3), each held for one period
-    gravity         (3,) [m/s^2]; None: none
+    gravity         (3,) [m/s²]; None: none
     substeps        steps per sampling period; each is of fourth order
     counted         False: the encoders are read as finely as you like
     torque_limits   "each": every motor's torque is cut at its own limit; "together": all are scaled alike, so that
@@ -446,7 +446,7 @@ MOST_SUBSTEPS: Final = 100_000
 
 @dataclass(frozen=True)
 class MotionInputs:
-    """samples: periods that the motion lasts;   push (1 or samples, 3) [N];   gravity (3,) [m/s^2]"""
+    """samples: periods that the motion lasts;   push (1 or samples, 3) [N];   gravity (3,) [m/s²]"""
 
     samples: int
     push: Floats
@@ -555,7 +555,7 @@ def _push(push: ArrayLike | None, samples: int) -> Floats:
 
 
 def _gravity(gravity: ArrayLike | None) -> Floats:
-    return np.zeros(3) if gravity is None else _vector("gravity", gravity, "m/s^2")
+    return np.zeros(3) if gravity is None else _vector("gravity", gravity, "m/s²")
 
 
 def _vector(what: str, value: ArrayLike, unit: str) -> Floats:

@@ -33,10 +33,10 @@ class System(NamedTuple):
 
     mech     the links
     motor    (d,)    coordinate of each motor; i itself where drive i is rigid
-    rotor    (d,)    n^2 I [kg m^2];   spring (d,)  n^2 k [N m/rad], 0 where rigid
-    cubic, excess, kink  (d,)  of a bent spring [N m/rad^3], [N m/rad], [rad]
+    rotor    (d,)    n^2 I [kg m²];   spring (d,)  n^2 k [N m/rad], 0 where rigid
+    cubic, excess, kink  (d,)  of a bent spring [N m/rad³], [N m/rad], [rad]
     damping  (n, n)  B [N m s/rad]
-    gravity  (3,)    [m/s^2]
+    gravity  (3,)    [m/s²]
     lag_along (l, n), lag_damping (l,), lag_time (l,), lag_command (l,)  lagged torques; the motor whose command
                      a lagged torque follows, -1 for a damper's
     friction (d, 5)  C, F_s, v_s, sigma_0, sigma_1 at the joint;   friction_model (d,)  0, DRY or BRISTLES

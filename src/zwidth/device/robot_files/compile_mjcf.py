@@ -183,7 +183,7 @@ def _possible_moments(spec: Any, label: str) -> list[Finding]:
             moments, axes = np.linalg.eigh(matrix_of_six(body.fullinertia))
         place, rest = int(np.argmax(moments)), float(moments.sum() - moments.max())
         listed = ", ".join(f"{moment:.6g}" for moment in sorted(moments))
-        where, what = f"body '{body.name}'", f"has the principal moments of inertia {listed} kg m^2"
+        where, what = f"body '{body.name}'", f"has the principal moments of inertia {listed} kg m²"
         if moments.min() < -ROUNDED * moments.max():
             faults.append(Fault(label, where, f"{what}; no body has a negative one: correct its inertia"))
         elif moments[place] > rest:

@@ -69,7 +69,7 @@ class RobotJoint:
             joint way and rotation vector (6,), in the axes of the body at rest
     limits  lower, upper, or None
     stiffness, damping, coulomb   of the joint itself
-    armature  inertia that is added at the joint [kg m^2], of a prismatic one [kg]
+    armature  inertia that is added at the joint [kg m²], of a prismatic one [kg]
     effort  largest force or torque at the joint; None: not given
     rest    coordinate in the file where the device's is 0
     second  second axis of a joint of the kind "universal", two joints in one place that nobody drives
@@ -135,7 +135,7 @@ class Motor:
 
     turns    joint name -> motor turns per joint turn, of a prismatic joint per metre; empty: not given
     joint    the joint that it drives
-    inertia  of the rotor, at the motor [kg m^2]; None: not given
+    inertia  of the rotor, at the motor [kg m²]; None: not given
     torque   largest, at the motor [N m]; None: not given
     """
 

@@ -17,7 +17,7 @@ MassPerLength = Annotated[Positive, magnitudes.within(magnitudes.LIGHTEST, magni
 InertiaPerLength = Annotated[
     Positive, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m")
 ]
-Density = Annotated[Positive, magnitudes.within(magnitudes.LEAST_DENSITY, magnitudes.LARGEST_DENSITY, "kg/m^3")]
+Density = Annotated[Positive, magnitudes.within(magnitudes.LEAST_DENSITY, magnitudes.LARGEST_DENSITY, "kg/m³")]
 
 
 class RodShape(Section):

@@ -26,6 +26,7 @@ from zwidth.device.schema.value_types import (
     WholeNumber,
     documented_key,
 )
+from zwidth.unit_text import unit_text
 
 TAGS: Final = ("type", "method", "shape")  # of a filter, of a velocity's estimate, of a cross section
 
@@ -129,7 +130,7 @@ def key_sentence(path: tuple[str | int, ...]) -> str:
 def key_description(path: tuple[str | int, ...]) -> str:
     """What the key at a path means, with its unit; "" if the schema says nothing."""
     sentence, unit = key_sentence(path), key_unit(path)
-    return f"{sentence} [{unit}]" if sentence and unit else sentence
+    return f"{sentence} [{unit_text(unit)}]" if sentence and unit else sentence
 
 
 @cache

@@ -16,8 +16,8 @@ Rows = tuple[tuple[float, ...], ...]
 
 LIGHTEST: Final = 1e-12  # kg
 HEAVIEST: Final = 1e12  # kg
-LEAST_INERTIA: Final = 1e-18  # kg m^2
-LARGEST_INERTIA: Final = 1e12  # kg m^2
+LEAST_INERTIA: Final = 1e-18  # kg m²
+LARGEST_INERTIA: Final = 1e12  # kg m²
 SOFTEST: Final = 1e-12  # N/m or N m/rad, of a spring there is
 STIFFEST: Final = 1e15  # N/m or N m/rad, of a spring there is
 STRONGEST_DAMPING: Final = 1e15  # N s/m or N m s/rad
@@ -42,9 +42,9 @@ THINNEST: Final = 1e-9  # m, of a section
 THICKEST: Final = 1e3  # m, of a section
 LEAST_MODULUS: Final = 1e-3  # Pa
 LARGEST_MODULUS: Final = 1e24  # Pa
-LEAST_DENSITY: Final = 1e-6  # kg/m^3
-LARGEST_DENSITY: Final = 1e9  # kg/m^3
-HARDEST: Final = 1e30  # N/m^3 or N m/rad^3, in either sign
+LEAST_DENSITY: Final = 1e-6  # kg/m³
+LARGEST_DENSITY: Final = 1e9  # kg/m³
+HARDEST: Final = 1e30  # N/m³ or N m/rad³, in either sign
 LEAST_SHARE: Final = 1e-9  # of a coordinate in what is driven or read
 LARGEST_SHARE: Final = 1e9  # of a coordinate in what is driven or read
 

@@ -197,7 +197,7 @@ _THREE_BY_THREE: Final[dict[str, Any]] = {"type": "array", "items": _THREE, "min
 Number = Annotated[float, Strict(), AllowInfNan(False), AfterValidator(_thinkable)]
 Mass = Annotated[Number, magnitudes.within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg", "0 (massless) or ")]
 RotorInertia = Annotated[
-    Number, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m^2", "0 (no inertia) or ")
+    Number, magnitudes.within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m²", "0 (no inertia) or ")
 ]
 Ratio = Annotated[
     Number, magnitudes.within(magnitudes.LEAST_RATIO, magnitudes.LARGEST_RATIO, "motor turns per joint turn")
@@ -279,8 +279,6 @@ Inertia = Annotated[
     AfterValidator(_square),
     AfterValidator(_symmetric),
     AfterValidator(_possible_body),
-    magnitudes.largest_within(
-        magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m^2", "0 (no inertia) or "
-    ),
+    magnitudes.largest_within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m²", "0 (no inertia) or "),
     WithJsonSchema({"anyOf": [_NUMBER, _THREE, _THREE_BY_THREE]}),
 ]

@@ -209,7 +209,7 @@ class EffectiveMass:
 
     kind       "rigid_mass", "link_side_mass" or "motor_side_mass"
     direction  number of the rendered direction
-    turns      whether it is an inertia about an axis [kg m^2]
+    turns      whether it is an inertia about an axis [kg m²]
     value      [kg]; nan where the parameters' mass matrix is not positive definite
     gradient   (P,) by all parameters; None: it hangs on none of them
     """
@@ -228,7 +228,7 @@ def effective_masses(
 
     values        (P,) of all parameters, or the base ones and 0 for the others: what the base parameters determine
                   is the same
-    known_rotors  (d,) inertias at the joints, n^2 J, of the rotors that are no parameters, others 0 [kg m^2]
+    known_rotors  (d,) inertias at the joints, n^2 J, of the rotors that are no parameters, others 0 [kg m²]
     """
     posture = point.posture
     assert posture is not None
@@ -366,7 +366,7 @@ def _all_parameters(parameters: Parameters, roots: Floats, rotors: Floats, x: Fl
     """Compute the parameters (P,) of links, friction being 0, and their derivatives (P, count) by x (count,).
 
     roots   (w, 4, 4) lower triangles of the file's pseudo-inertias
-    rotors  (r,) inertias of the fitted rotors in the file [kg m^2]
+    rotors  (r,) inertias of the fitted rotors in the file [kg m²]
     x       ten coordinates of each link, and the logarithm of each rotor's inertia over the file's
     """
     count = parameters.inertial + len(rotors)

@@ -226,7 +226,7 @@ class TorqueComparison:
 
     base          the parameters
     band          what is analysed
-    gravity       (3,) [m/s^2]
+    gravity       (3,) [m/s²]
     known_rotors  (d,) inertias at the joints of the rotors that are no parameters
     start         (n,) joint coordinates of a posture in the assembly meant
     """

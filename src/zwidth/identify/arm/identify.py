@@ -135,7 +135,7 @@ def identify_arm(
     records   of one sampling period, in the columns `COLUMNS`; the last of several is not fitted but predicted, of
               a single one its last 30 %
     point     posture and directions of the effective masses; None: the device's reference
-    gravity   (2,) or (3,) [m/s^2]; None: that of the file's [load], or none
+    gravity   (2,) or (3,) [m/s²]; None: that of the file's [load], or none
     side      "joint": coordinates of the links' joints and torques at the joints; "motor": angles and torques of
               the motors. Either way the torques are the motors', which accelerate the rotors too
     torque    "measured": it acts when it is recorded; "commanded": the computer's command, which acts after the
@@ -166,12 +166,12 @@ def identify_arm(
 
 
 def _gravity(device: Device, gravity: ArrayLike | None) -> Floats:
-    """Gravity (3,) [m/s^2]: as given, or the file's."""
+    """Gravity (3,) [m/s²]: as given, or the file's."""
     if gravity is None:
         return np.zeros(3) if device.load is None else np.asarray(device.load.weight, dtype=np.float64)
     given = np.asarray(gravity, dtype=np.float64)
     if given.shape not in ((2,), (3,)) or not np.isfinite(given).all():
-        raise fail(device.label, "gravity", f"must be two or three finite numbers [m/s^2], got {given.tolist()}")
+        raise fail(device.label, "gravity", f"must be two or three finite numbers [m/s²], got {given.tolist()}")
     return np.append(given, np.zeros(3 - len(given)))
 
 

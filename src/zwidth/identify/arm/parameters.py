@@ -158,7 +158,7 @@ class BaseParameters:
 def base_parameters(parameters: Parameters, start: Floats, gravity: Floats) -> BaseParameters:
     """The base parameters of a mechanism, over random states about a posture.
 
-    start    (n,) joint coordinates of the posture;   gravity  (3,) [m/s^2]
+    start    (n,) joint coordinates of the posture;   gravity  (3,) [m/s²]
     """
     W = _random_columns(parameters, start, gravity)
     size = np.sqrt(np.einsum("rp,rp->p", W, W))

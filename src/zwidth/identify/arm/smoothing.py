@@ -88,7 +88,7 @@ class Kernel:
 
 def _exact_for_powers(taps: Floats, g: Floats, t: Floats, derivative: int) -> Floats:
     """Taps that differentiate 1, t and t^2 without error, which ends and rounding would leave on them: a joint
-    that stands at 1 rad would seem to accelerate by 1e-3 rad/s^2."""
+    that stands at 1 rad would seem to accelerate by 1e-3 rad/s²."""
     powers = ((0,), (1,), (0, 2))[derivative]
     wanted = ((1.0,), (-1.0,), (0.0, 2.0))[derivative]
     bumps = np.stack([g * t**power for power in powers])
@@ -103,7 +103,7 @@ class TorqueBand:
 
     edge    of the analysed band [Hz]
     period  of the record [s];   stride  its samples for one of the smoothed positions
-    noise   (d,) one-sided density of the positions' floor [rad^2/Hz], [m^2/Hz]
+    noise   (d,) one-sided density of the positions' floor [rad²/Hz], [m²/Hz]
     motion  edge of the motion's band as seen in the spectrum [Hz]
     """
 

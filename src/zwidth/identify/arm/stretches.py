@@ -47,7 +47,7 @@ STRETCH: Final = ("time", "coordinates", "rates", "accelerations", "signs", "for
 
 @dataclass(frozen=True)
 class TorqueTiming:
-    """When a recorded torque acts: `shift` later [s], with `spread` [s^2], half its second moment about then.
+    """When a recorded torque acts: `shift` later [s], with `spread` [s²], half its second moment about then.
 
     hold and delay of a command: shift = delay + T/2 + lag, spread = T^2/24 + lag^2/2
     """

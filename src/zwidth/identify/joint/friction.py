@@ -25,6 +25,7 @@ from zwidth.identify.joint.start import SHORTEST, weighted_balance, weighting
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import check_mass_in_file
 from zwidth.progress import Progress
+from zwidth.unit_text import unit_text
 
 ALIKE_SPEEDS: Final = 0.98  # correlation of dry and viscous friction from which one speed is seen
 UNKNOWN_MASS: Final = 0.5  # half the interval over the mass, from which the mass is not known
@@ -251,7 +252,7 @@ def check_mass(fitted: FittedJoint, *, needed: bool = False) -> Check:
     value, low, high = fitted.interval(ONE[MASS])
     if isfinite(high) and high - value < UNKNOWN_MASS * value:
         return Check("acceleration", True, f"{name} is told to {100.0 * (high - value) / value:.2g} %")
-    upper = f"only below {high:.3g} {unit}" if isfinite(high) else "not at all"
+    upper = f"only below {high:.3g} {unit_text(unit)}" if isfinite(high) else "not at all"
     useless = not (isfinite(high) and low > 0.0)
     return Check(
         "acceleration",
@@ -275,7 +276,7 @@ def check_drift(fitted: FittedJoint) -> list[Check]:
     if not {*DRIFTS} & {*fitted.fit.numbers.free}:
         return []
     value, low, high = fitted.fit.interval(ONE[DRIFTS[0]] + 2.0 * ONE[DRIFTS[2]])
-    unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s^2"
+    unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s²"
     ends = f"{low:.3g} to {high:.3g}" if isfinite(high) else "without bounds"
     return [
         Check(
@@ -335,7 +336,8 @@ def remarks_of(fitted: FittedJoint) -> tuple[list[str], dict[str, Any]]:
         low, high = MASS_IN_FILE
         agrees = "agrees with" if low < ratio < high else "is far from"
         remarks.append(
-            f"{joint.mass_name} {agrees} the {joint.mass:.4g} {joint.unit('mass')} of the file, {ratio:.3g} of it"
+            f"{joint.mass_name} {agrees} the {joint.mass:.4g} {unit_text(joint.unit('mass'))} of the file, "
+            f"{ratio:.3g} of it"
         )
     seen = compare_with_command(motion)
     if seen is not None:

@@ -201,7 +201,7 @@ def _read_motion(
 
 
 def _assumed_mass(device: Device, joint: Joint, motion: JointMotion, mass_from_file: bool) -> float:
-    """Choose the mass with which the fit begins: the file's [kg or kg m^2] for free motion, where it is asked for;
+    """Choose the mass with which the fit begins: the file's [kg or kg m²] for free motion, where it is asked for;
     else 1. Raises DeviceError where the file has none."""
     mass = 1.0
     if mass_from_file and not motion.driven:

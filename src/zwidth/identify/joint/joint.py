@@ -280,7 +280,7 @@ def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMe
 
 
 def _moved(device: Device, index: int) -> float:
-    """Inertia at the shaft of a motor by the file, all other drives standing [kg m^2]; nan where it gives none."""
+    """Inertia at the shaft of a motor by the file, all other drives standing [kg m²]; nan where it gives none."""
     from zwidth.errors import PostureError
 
     assert device.mechanism is not None

@@ -44,7 +44,7 @@ class ModalFit:
     w^2)
 
     coupled      dampers couple the modes, so that each has a second residue, q_i s beside r_i, all q_i together 0
-    base         "free": H_0 of 1/s^2; "free, braked": of 1/(s (s + a)); "grounded": none
+    base         "free": H_0 of 1/s²; "free, braked": of 1/(s (s + a)); "grounded": none
     damping      "viscous"; "hysteretic": of 1/(w^2 (1 + i eta) - w^2), eta = 2 zeta
     period       T [s]
     vector       (1 + braked + 2 m,) delay [samples], ln a, then ln w and ln zeta of each mode

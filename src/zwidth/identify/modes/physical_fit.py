@@ -23,6 +23,7 @@ from zwidth.identify.modes.modal_fit import FOLDED, ModalFit
 from zwidth.identify.modes.model import DELAYS, LAG, SampledModel
 from zwidth.identify.profile_likelihood import Fit, fit_least_squares
 from zwidth.model.modes import undamped_modes
+from zwidth.unit_text import unit_text
 
 HOPELESS: Final = 100.0  # times the number of residuals: where no modes explain them, no start does
 SPREAD: Final = np.log(6.0)  # about the file's numbers, within which a start is looked for
@@ -286,7 +287,7 @@ def device_estimates(
         timing = bool(one.entries) and one.entries[0][0] in DELAYS
         if not told[k]:
             estimates.append(Estimate(one.name, value, low, high, one.unit))
-            remarks.append(_not_told(one.name, low, high, one.unit, model.hand))
+            remarks.append(_not_told(one.name, low, high, unit_text(one.unit), model.hand))
             continue
         # no number of the file by itself: it makes several, or a part of one
         composed = timing or len(one.entries) != 1 or len(paths[one.entries[0][0]]) > 1
@@ -294,7 +295,9 @@ def device_estimates(
         if composed:
             estimates.append(Estimate(one.name, value, low, high, one.unit, within=within))
         if not one.entries:
-            remarks.append(f"{one.name}: the file has no such number; write {value:.5g} {one.unit} there by hand")
+            remarks.append(
+                f"{one.name}: the file has no such number; write {value:.5g} {unit_text(one.unit)} there by hand"
+            )
         for path, _, _ in one.entries:
             if path in seen or not all(told[j] for j, _, _ in paths[path]):
                 continue

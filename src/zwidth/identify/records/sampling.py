@@ -17,6 +17,7 @@ from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import plural
 from zwidth.identify.identification import Check
 from zwidth.identify.records.record import Piece, Record
+from zwidth.unit_text import unit_text
 
 UNEVEN: Final = 0.2  # share of the period by which a step may be longer or shorter
 MOST_UNEVEN: Final = 0.01  # share of the steps that may be so
@@ -256,12 +257,12 @@ def check_mass_in_file(name: str, value: float, known: float, unit: str, *, turn
     """Whether the mass found is of the size that the file gives; [] where the file gives none.
 
     name, unit    of the mass, for messages
-    value, known  found, and in the file [kg] or [kg m^2]
+    value, known  found, and in the file [kg] or [kg m²]
     turns         whether the motion is a turn, in radians
     """
     if not (isfinite(known) and known > 0.0 and value > 0.0):
         return []
-    times = value / known
+    times, unit = value / known, unit_text(unit)
     text = f"{name} is about {value:.3g} {unit}, {times:.3g} times the {known:.4g} {unit} of the device file"
     for factor, slip in (TURNING_SLIPS if turns else LINEAR_SLIPS).items():
         if 1.0 / NEAR < times / factor < NEAR:

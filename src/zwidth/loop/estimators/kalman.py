@@ -31,7 +31,7 @@ class Kalman:
     A large index trusts the encoder: w(z) tends to the trapezoidal rule (2/T) (z - 1)/(z + 1), which rings at half
     the sampling rate. A small one trusts the model: the delay tends to sqrt(2 sigma_n/sigma_a), whatever T.
 
-    acceleration_noise  sigma_a, standard deviation of the accelerations to expect [m/s^2]
+    acceleration_noise  sigma_a, standard deviation of the accelerations to expect [m/s²]
     position_noise      sigma_n, standard deviation of the encoder's error [m]; `Kalman.of_encoder` takes its step
     Raises              ValueError  unless both are positive and finite; from the methods, where Lambda is outside
                         3e-6 to 1e8
@@ -45,7 +45,7 @@ class Kalman:
     position_noise: Number
 
     def __post_init__(self) -> None:
-        check_positive("acceleration_noise", self.acceleration_noise, "m/s^2")
+        check_positive("acceleration_noise", self.acceleration_noise, "m/s²")
         check_positive("position_noise", self.position_noise, "m")
 
     @classmethod
@@ -82,7 +82,7 @@ class Kalman:
             raise ValueError(
                 f"acceleration_noise T^2 / position_noise must be from {low:g} to {high:g}, got {index:g}: too "
                 f"{much} motion within a period of {period:g} s for the encoder's noise; {change} "
-                f"acceleration_noise = {self.acceleration_noise!r} m/s^2 or change position_noise = "
+                f"acceleration_noise = {self.acceleration_noise!r} m/s² or change position_noise = "
                 f"{self.position_noise!r} m"
             )
         return 2.0 * index / (index + sqrt(index * (index + 8.0)))

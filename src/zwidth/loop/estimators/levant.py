@@ -43,7 +43,7 @@ class Levant:
     ramps, late by T/2. In any period it changes by lambda1 T at most. An encoder's step above lambda1 T^2 is
     therefore smoothed; with L beyond step/(1.1 T^2) the steps of a steady motion pass whole.
 
-    acceleration_max  L, largest acceleration to expect [m/s^2]
+    acceleration_max  L, largest acceleration to expect [m/s²]
     Raises            ValueError      unless it is positive and finite
                       NonlinearError  from `estimator`: it has no w(z)
 
@@ -55,7 +55,7 @@ class Levant:
     acceleration_max: float
 
     def __post_init__(self) -> None:
-        check_positive("acceleration_max", self.acceleration_max, "m/s^2")
+        check_positive("acceleration_max", self.acceleration_max, "m/s²")
 
     def estimator(self, period: float) -> Estimator:
         """Nothing: a sliding mode has no w(z).

@@ -41,7 +41,7 @@ WORST: Final = 0.1  # relative misfit, beyond that of noise, from which no plant
 class ModalModel:
     """squared (n,) and damping (n, n) of the modes, per sample; actuator, sensor and handle (n,); delay [samples].
 
-    free  whether the first mode is 1/s^2, which no damper couples to others
+    free  whether the first mode is 1/s², which no damper couples to others
     """
 
     squared: Floats
@@ -81,7 +81,7 @@ class ModalModel:
         return poles.astype(complex), shapes[:n].astype(complex), into.astype(complex)
 
     def _residues(self, name: str) -> Complexes:
-        """Residues of a path, that of 1/s^2 first where it stands apart."""
+        """Residues of a path, that of 1/s² first where it stands apart."""
         read = self.sensor if name[0] == "s" else self.handle
         push = self.actuator if name[1] == "a" else self.handle
         first = int(self.free)

@@ -69,7 +69,7 @@ class PoleModel:
     modes        (n, 2) angle w and damping ratio; w = 0: of a mass on a dashpot, its rate of decay in place of the
                  ratio
     delay        of commands [samples]
-    free         whether there is a free mass without damping, 1/s^2, beside them
+    free         whether there is a free mass without damping, 1/s², beside them
     residues     by path, of the atoms of `atoms`
     misfit       root of the mean square of the weighted deviations
     delay_deviation  standard deviation of the delay [samples], 0 of a known one
@@ -97,7 +97,7 @@ class PoleModel:
         modes = self.modes.copy()
         modes[:, 0] *= ratio
         modes[modes[:, 0] == 0.0, 1] *= ratio
-        # atoms of 1/s^2 first, then those of 1/s
+        # atoms of 1/s² first, then those of 1/s
         squared = int(self.free) + len(modes)
         residues = {
             name: np.append(own[:squared] * ratio**2, own[squared:] * ratio) for name, own in self.residues.items()
@@ -161,8 +161,8 @@ def _refined(data: PathData, modes: Floats, delay: float) -> tuple[float, float,
 def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) -> Complexes:
     """Responses (k, 2 n - 1) of unit residue, and one more of the free mass.
 
-    First the free mass, 1/s^2, then each mode, 1/((s - s1)(s - s2)), then these times s, less that of the first:
-    all of them together fall like 1/s^2.
+    First the free mass, 1/s², then each mode, 1/((s - s1)(s - s2)), then these times s, less that of the first:
+    all of them together fall like 1/s².
 
     delay  of commands, sampled behind a hold; None: continuous
     """
@@ -303,7 +303,7 @@ def sampled_terms(poles: Complexes, theta: Floats, delay: float) -> Complexes:
 
 
 def sampled_free_mass(theta: Floats, delay: float) -> Complexes:
-    """1/s^2 behind hold and delay, as sampled (k,)."""
+    """1/s² behind hold and delay, as sampled (k,)."""
     whole = floor(delay)
     f = delay - whole
     z, d = np.exp(1j * theta), np.expm1(1j * theta)

@@ -29,6 +29,7 @@ from zwidth.model.reduction import MODELS
 from zwidth.show.app.opened import OpenedDevices
 from zwidth.show.app.request import State, Wall
 from zwidth.show.mechanism_scene import MassChain, as_chain, mechanism_scene, mode_strokes, stays_in_plane
+from zwidth.unit_text import unit_text
 
 LOWEST: Final = 1e-3  # rad, of the angles at which the Nyquist plot is computed
 ANGLES: Final = 1200
@@ -116,8 +117,8 @@ def opened_device(opened: OpenedDevices, state: State) -> Contents:
         "operator": device.operator_name,
         "operators": bundled_names(OPERATORS),
         "devices": [{"name": name, "description": about} for name, about, _ in bundled(DEVICES)],
-        "measures": [{"name": name, "unit": one.unit} for name, one in MEASURES.items()] if mechanism else [],
-        "numbers": [one.document() for one in device_numbers(device)],
+        "measures": [{"name": k, "unit": unit_text(one.unit)} for k, one in MEASURES.items()] if mechanism else [],
+        "numbers": [one.document() | {"unit": unit_text(one.unit)} for one in device_numbers(device)],
     }, {}
 
 

@@ -29,6 +29,7 @@ from zwidth.show.app.request import (
 )
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.mechanism_scene import mechanism_scene, stays_in_plane
+from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
     from zwidth.loop.operating_point import OperatingPoint
@@ -77,7 +78,7 @@ def workspace(opened: OpenedDevices, request: MapRequest, progress: Progress) ->
         "status": np.asarray(data[f"{request.measure}_status"]).astype(np.uint8),
     }
     arrays |= {"first": plane.first, "second": plane.second, "through": plane.through}
-    return {"measure": request.measure, "unit": str(values.attrs.get("units", ""))}, arrays
+    return {"measure": request.measure, "unit": unit_text(str(values.attrs.get("units", "")))}, arrays
 
 
 def what_to_change(opened: OpenedDevices, request: SensitivityRequest, progress: Progress) -> Contents:

@@ -48,8 +48,8 @@ class BoundsCommand(Command):
             "--damping",
             metavar="B",
             type=Finite(),
-            help="Damping at which the conditions are compared [Ns/m]. Default: that of the stiffest stable wall; "
-            "0 if there is none.",
+            help="Damping at which the conditions are compared [N s/m]. Default: that of the stiffest stable "
+            "wall; 0 if there is none.",
         ),
     )
     keys = (
@@ -73,7 +73,7 @@ class BoundsCommand(Command):
         headings = [
             "condition",
             "claims",
-            f"at {amount(result.damping, 'Ns/m')}",
+            f"at {amount(result.damping, 'N s/m')}",
             "ratio to exact",
             "largest",
             "not met",
@@ -92,8 +92,8 @@ def _exact(comparison: BoundsComparison) -> Iterator[tuple[str, str]]:
     if comparison.chart is None:
         yield "exact", f"undecided: {comparison.undecided}"
         return
-    yield f"exact, at {amount(comparison.damping, 'Ns/m')}", _stiffness(comparison.exact)
-    at = f" at {amount(comparison.damping_at_largest, 'Ns/m')}" if comparison.largest > 0.0 else ""
+    yield f"exact, at {amount(comparison.damping, 'N s/m')}", _stiffness(comparison.exact)
+    at = f" at {amount(comparison.damping_at_largest, 'N s/m')}" if comparison.largest > 0.0 else ""
     yield "exact, largest", _stiffness(comparison.largest) + at
 
 

@@ -130,7 +130,7 @@ def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
     found = " found" if getattr(chart, "doubt", "") else ""
     yield f"largest stiffness{found}", _stiffest(chart)
     yield f"largest damping{found}", _most_damped(chart)
-    yield f"stable area{found}", amount(chart.stable_area, "N²s/m²")
+    yield f"stable area{found}", amount(chart.stable_area, "N^2 s/m^2")
     yield from _decays(chart.fastest_decay_in_first_quadrant, chart.fastest_decay)
     if len(chart.regions) != 1:
         yield "stable regions", f"{len(chart.regions)}"
@@ -169,13 +169,13 @@ def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iter
     label = "fastest decay"
     for fastest in (buildable, None if of_all == buildable else of_all):
         if fastest:
-            wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'Ns/m')}"
+            wall = f"{amount(fastest.stiffness, 'N/m')} and {amount(fastest.damping, 'N s/m')}"
             yield label, f"at {wall}: spectral radius {radius(fastest.spectral_radius)}"
         label = "with K or B < 0"
 
 
 def _most_damped(chart: Chart) -> str:
-    damping = amount(chart.damping_max, "Ns/m")
+    damping = amount(chart.damping_max, "N s/m")
     if chart.damping_max > 0.0 or not chart.regions:
         return damping
     return f"{damping}, because walls of small stiffness are unstable at any damping"
@@ -186,7 +186,7 @@ def _stiffest(chart: Chart) -> str:
         return "none"
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     return (
-        f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
+        f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'N s/m')} of damping; "
         f"at this limit it oscillates at {frequencies}"
     )
 
@@ -242,7 +242,7 @@ def _nominal(chart: MeasuredChart) -> str:
         return "none"
     frequencies = " and ".join(amount(f, "Hz") for f in chart.frequencies_at_stiffness_max_nominal)
     stiffness, damping = chart.stiffness_max_nominal, chart.damping_at_stiffness_max_nominal
-    return f"{amount(stiffness, 'N/m')} at {amount(damping, 'Ns/m')} of damping, limited at {frequencies}"
+    return f"{amount(stiffness, 'N/m')} at {amount(damping, 'N s/m')} of damping, limited at {frequencies}"
 
 
 def stretch_text(stretch: UnusableRange) -> str:

@@ -38,7 +38,7 @@ class CheckCommand(Command):
             help="Walls: columns stiffness_N_per_m, damping_Ns_per_m.",
         ),
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of one wall [N/m]."),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of one wall [Ns/m]."),
+        click.option("--damping", metavar="B", type=Finite(), help="Damping of one wall [N s/m]."),
         *wall_law.OPTIONS,
     )
     outputs = DATA
@@ -61,7 +61,7 @@ class CheckCommand(Command):
         rows = [
             (
                 amount(point["stiffness_N_per_m"], "N/m"),
-                amount(point["damping_Ns_per_m"], "Ns/m"),
+                amount(point["damping_Ns_per_m"], "N s/m"),
                 point["verdict"],
                 NONE if point["spectral_radius"] is None else radius(point["spectral_radius"]),
                 amount(point["frequency_Hz"], "Hz"),

@@ -187,7 +187,7 @@ def wall_options() -> tuple[Callable[..., Any], ...]:
         click.option(
             "--stiffness", metavar="K", type=Finite(), required=True, help="Stiffness of the wall [N/m]."
         ),
-        click.option("--damping", metavar="B", type=Finite(), required=True, help="Damping of the wall [Ns/m]."),
+        click.option("--damping", metavar="B", type=Finite(), required=True, help="Damping of the wall [N s/m]."),
     )
 
 
@@ -199,7 +199,7 @@ def contact_options() -> tuple[Callable[..., Any], ...]:
 def _wall_and_environment_options() -> list[Callable[..., Any]]:
     return [
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall [N/m]."),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [Ns/m]."),
+        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [N s/m]."),
         click.option(
             "--wall",
             type=click.Choice(("two-sided", "one-sided")),

@@ -91,7 +91,7 @@ class ExperimentCommand(Command):
             "--damping",
             type=Numbers("BMIN,BMAX", (2,), "0,30"),
             callback=_check_range,
-            help="Range of damping to search [Ns/m].",
+            help="Range of damping to search [N s/m].",
         ),
         click.option(
             "--disturbance",
@@ -284,12 +284,12 @@ def point_rows(experiment: Experiment) -> tuple[list[str], list[list[str]]]:
     many, doubts = any(p.trials > 1 for p in experiment.points), any(p.unsure for p in experiment.points)
     rows = []
     for p in experiment.points:
-        unit = "N/m" if p.edge == "tip" else "Ns/m"
+        unit = "N/m" if p.edge == "tip" else "N s/m"
         rows.append(
             [
                 p.edge,
                 amount(p.stiffness, "N/m"),
-                amount(p.damping, "Ns/m"),
+                amount(p.damping, "N s/m"),
                 *([f"{amount(p.low, unit)} to {amount(p.high, unit)}", str(p.trials)] if many else []),
                 amount(p.exact, unit),
                 str(p.beyond),
@@ -312,8 +312,8 @@ def experiment_warning(experiment: Experiment) -> str | None:
     tip, stiffness, (low, high) = pairs[0]
     others = f" ({len(pairs)} tips lie below edges)" if len(pairs) > 1 else ""
     return (
-        f"an edge lies beyond a tip: at {amount(stiffness, 'N/m')} walls from {amount(low, 'Ns/m')} to "
-        f"{amount(high, 'Ns/m')} were stable, although the tip at {amount(tip.damping, 'Ns/m')} is "
+        f"an edge lies beyond a tip: at {amount(stiffness, 'N/m')} walls from {amount(low, 'N s/m')} to "
+        f"{amount(high, 'N s/m')} were stable, although the tip at {amount(tip.damping, 'N s/m')} is "
         f"{amount(tip.stiffness, 'N/m')}{others}; verdicts there depend on chance: repeat with --trials 8, or "
         "stay below with --stiffness and --damping"
     )
@@ -324,7 +324,7 @@ def experiment_sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
     best = experiment.stiffest
     if best is not None and best.edge == "tip":
         doubt = ", unsure" if best.unsure else ""
-        yield "stiffest", f"{amount(best.stiffness, 'N/m')} at {amount(best.damping, 'Ns/m')}{doubt}"
+        yield "stiffest", f"{amount(best.stiffness, 'N/m')} at {amount(best.damping, 'N s/m')}{doubt}"
     if experiment.plan.visible:
         yield "visible", f"vibrations above {amount(experiment.plan.visible, 'm')}"
     if experiment.not_found:
@@ -368,8 +368,8 @@ def _difference(experiment: Experiment) -> str:
         return f"measured and exact linear edges agree within {_gaps(compared)}"
     tip = worst.edge == "tip"
     larger = (worst.bisected_value > worst.exact) == (worst.edge != "lower")
-    at = amount(worst.damping, "Ns/m") if tip else amount(worst.stiffness, "N/m")
-    unit = "N/m" if tip else "Ns/m"
+    at = amount(worst.damping, "N s/m") if tip else amount(worst.stiffness, "N/m")
+    unit = "N/m" if tip else "N s/m"
     return (
         f"farthest from the exact linear edge is the {worst.edge}{'' if tip else ' one'} at {at}: "
         f"measured {amount(worst.bisected_value, unit)}, exact {amount(worst.exact, unit)}, "
@@ -382,7 +382,7 @@ def _gaps(points: list[MeasuredPoint]) -> str:
     """The largest distances of edges and of tips."""
     edges = [abs(p.damping - p.exact) for p in points if p.edge != "tip"]
     tips = [abs(p.stiffness - p.exact) for p in points if p.edge == "tip"]
-    gaps = [amount(max(edges), "Ns/m")] if edges else []
+    gaps = [amount(max(edges), "N s/m")] if edges else []
     gaps += [f"{amount(max(tips), 'N/m')}{' at the tips' if edges else ''}"] if tips else []
     return " and ".join(gaps)
 
@@ -399,7 +399,7 @@ def _cause(cause: Cause, width: float) -> str:
     holds = (point.damping > other) == (point.edge == "upper")
     return (
         f"without {cause.name} {'fewer' if holds else 'more'} walls are stable: the {point.edge} edge at "
-        f"{amount(point.stiffness, 'N/m')} moves from {amount(point.damping, 'Ns/m')} to {amount(other, 'Ns/m')}"
+        f"{amount(point.stiffness, 'N/m')} moves from {amount(point.damping, 'N s/m')} to {amount(other, 'N s/m')}"
     )
 
 
@@ -422,7 +422,7 @@ def _distances(points: Sequence[ComparedPoint]) -> list[float]:
 def _edges(points: Sequence[ComparedPoint]) -> Iterator[str]:
     beside = _distances([one for one in points if one.point.edge != "tip"])
     tips = _distances([one for one in points if one.point.edge == "tip"])
-    for apart, name, unit in ((beside, "edge point", "Ns/m"), (tips, "tip", "N/m")):
+    for apart, name, unit in ((beside, "edge point", "N s/m"), (tips, "tip", "N/m")):
         if apart:
             yield f"{_count(len(apart), name)}: {_average(apart, unit)} from the exact edge"
     nowhere = len(points) - len(beside) - len(tips)
@@ -444,7 +444,7 @@ def _tried_walls(points: Sequence[ComparedPoint], verdict: str) -> Iterator[str]
         worst = max(against, key=lambda one: inf if isnan(one.deviation) else abs(one.deviation))
         text += f", {len(against)} not; farthest off is the one at {_wall_text(worst)}"
         apart = _distances([worst])
-        text += f", {amount(apart[0], 'Ns/m')} from the exact edge" if apart else ""
+        text += f", {amount(apart[0], 'N s/m')} from the exact edge" if apart else ""
     yield text
 
 
@@ -453,7 +453,7 @@ def _unclassified_points(points: Sequence[ComparedPoint]) -> Iterator[str]:
         return
     inside = sum(one.exact_verdict == "stable" for one in points)
     apart = _distances(points)
-    far = f", {_average(apart, 'Ns/m')} from the nearest exact edge" if apart else ""
+    far = f", {_average(apart, 'N s/m')} from the nearest exact edge" if apart else ""
     yield (
         f"{_count(len(points), 'point')} without `edge` or `verdict`: {inside} inside the exact stable set, "
         f"{len(points) - inside} outside{far}; give each an edge (lower, upper, tip) or a verdict (stable, "
@@ -466,7 +466,7 @@ def _average(apart: list[float], unit: str) -> str:
 
 
 def _wall_text(one: ComparedPoint) -> str:
-    return f"{amount(one.point.stiffness, 'N/m')} and {amount(one.point.damping, 'Ns/m')}"
+    return f"{amount(one.point.stiffness, 'N/m')} and {amount(one.point.damping, 'N s/m')}"
 
 
 def _count(number: int, name: str) -> str:

@@ -111,8 +111,8 @@ class ExportCommand(Command):
             "--span",
             type=float,
             metavar="B",
-            help="Damping range that every cell offers at least [Ns/m]: the stiffest walls that have it. Default: "
-            "the walls whose rectangle is the largest.",
+            help="Damping range that every cell offers at least [N s/m]: the stiffest walls that have it. "
+            "Default: the walls whose rectangle is the largest.",
         ),
         click.option(
             "--size-limit",
@@ -334,7 +334,7 @@ def _rows(table: SafeWalls) -> Iterator[tuple[str, str]]:
     yield "largest stiffness", spread
     one = table.outside
     if one.stiffness > 0.0:
-        limits = f"{amount(one.low, 'Ns/m')} to {amount(one.high, 'Ns/m')}"
+        limits = f"{amount(one.low, 'N s/m')} to {amount(one.high, 'N s/m')}"
         yield "safe in all of them", f"stiffness up to {amount(one.stiffness, 'N/m')} with damping of {limits}"
     elif grid.dimensions:
         yield "safe in all of them", "no wall: outside the table there is no force"

@@ -78,7 +78,7 @@ class FeltCommand(Command):
 def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
     from zwidth.measures.felt import LIMIT_HEADINGS, LIMIT_WORDS
 
-    wall = f"{amount(felt_wall.wall_stiffness, 'N/m')}, {amount(felt_wall.wall_damping, 'Ns/m')}"
+    wall = f"{amount(felt_wall.wall_stiffness, 'N/m')}, {amount(felt_wall.wall_damping, 'N s/m')}"
     yield "wall", f"{wall}: {felt_wall.verdict}"
     if felt_wall.static_stiffness is not None:
         stiffness = felt_wall.wall_stiffness

@@ -49,7 +49,7 @@ class GuaranteesCommand(Command):
             "--damping",
             metavar="B",
             type=Finite(),
-            help="With --coupling: damping of the wall [Ns/m]. Default: 0.",
+            help="With --coupling: damping of the wall [N s/m]. Default: 0.",
         ),
     )
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the outlines, .json)."
@@ -112,7 +112,7 @@ def _largest(region: Region) -> str:
     if region.reason is not None:
         return f"none: {region.reason}"
     lacking = "" if region.warning is None else f"; {region.warning}"
-    stiffest = f"{amount(region.stiffness_max, 'N/m')} at {amount(region.damping_at_stiffness_max, 'Ns/m')}"
+    stiffest = f"{amount(region.stiffness_max, 'N/m')} at {amount(region.damping_at_stiffness_max, 'N s/m')}"
     return stiffest + lacking
 
 
@@ -121,5 +121,5 @@ def _limit(limit: Coupling) -> str:
         return "the wall needs no coupling: it is stable with every passive operator"
     return (
         f"the wall needs a coupling no stiffer than {amount(limit.stiffness, 'N/m')}, damped by "
-        f"{amount(limit.damping, 'Ns/m')}; the hand then feels {amount(limit.felt_stiffness, 'N/m')}"
+        f"{amount(limit.damping, 'N s/m')}; the hand then feels {amount(limit.felt_stiffness, 'N/m')}"
     )

@@ -22,6 +22,7 @@ from zwidth.show.cli.options import (
     with_settings_option,
 )
 from zwidth.show.output import destination, printable, write_text
+from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -173,7 +174,7 @@ class IdentifyCommand(Command):
 
         case.device.with_(result.settings)  # what they make must be a device
         sources = {
-            one.path: f"measured ({', '.join(case['files'])}): {interval(one)} {one.unit} with 95 %"
+            one.path: f"measured ({', '.join(case['files'])}): {interval(one)} {unit_text(one.unit)} with 95 %"
             for one in result.estimates
             if one.path in result.settings
         }
@@ -221,7 +222,7 @@ def _row(estimate: Estimate) -> tuple[str, ...]:
     from zwidth.identify.identification import estimate_text, interval
 
     path = (estimate.path or estimate.within).removeprefix("mechanism.")
-    return estimate.name, estimate_text(estimate), interval(estimate), estimate.unit or "1", path
+    return estimate.name, estimate_text(estimate), interval(estimate), unit_text(estimate.unit) or "1", path
 
 
 class StiffnessCommand(IdentifyCommand):
@@ -332,7 +333,7 @@ class ImpedanceCommand(IdentifyCommand):
     examples = ("zwidth identify impedance shaken.csv --device my-device.toml --stiffness 2000 --damping 5",)
     options = (
         click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall that was on [N/m]."),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall that was on [Ns/m]."),
+        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall that was on [N s/m]."),
         segment_option(64, "Samples of a segment of the transforms. Default: a third of the longest stretch."),
     )
     takes_point = True

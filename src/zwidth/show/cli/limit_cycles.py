@@ -159,7 +159,7 @@ def _plane(case: CommandLine) -> DevicePlane:
 
 
 def _circumstances(case: CommandLine, prediction: LimitCyclePrediction) -> Iterator[tuple[str, str]]:
-    wall = f"{amount(prediction.wall_stiffness, 'N/m')}, {amount(prediction.wall_damping, 'Ns/m')}"
+    wall = f"{amount(prediction.wall_stiffness, 'N/m')}, {amount(prediction.wall_damping, 'N s/m')}"
     yield "wall", f"{wall}: {prediction.verdict} if linear"
     yield "nonlinear parts", ", ".join(prediction.nonlinear)
     whose = "the handle moves" if case.device.mechanism else "taken to move"

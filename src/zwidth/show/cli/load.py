@@ -168,7 +168,7 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
         typed(as_written(step.push, "N")),
         amount(chart.stiffness_max, "N/m"),
         typed(f"{signed(change)} %") if step.push and change == change else "",
-        amount(chart.damping_at_stiffness_max, "Ns/m"),
+        amount(chart.damping_at_stiffness_max, "N s/m"),
         amount(min(chart.frequencies_at_stiffness_max), "Hz"),
         amount(step.hand_neglected, "N/m"),
         amount(step.fixed_surface, "N/m"),

@@ -30,6 +30,7 @@ from zwidth.show.cli.options import (
 from zwidth.show.cli.resumable import check_workers, report_kept_work, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.units import amount, area_text, percent, typed, vector
+from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,7 +93,7 @@ def _axis_range(name: str) -> Callable[[Callback], Callback]:
 
 
 def _wanted_number(number: WantedNumber) -> Callable[[Callback], Callback]:
-    unit = f" [{number.unit}]" if number.unit else ""
+    unit = f" [{unit_text(number.unit)}]" if number.unit else ""
     meaning = number.meaning[0].upper() + number.meaning[1:]
     name = number.name.replace("_", "-")
     return click.option(f"--{name}", type=Finite(), metavar="NUMBER", help=f"{meaning}{unit}.")
@@ -156,7 +157,7 @@ class MapCommand(Command):
             help="Stiffness of the wall, for measures of one wall [N/m].",
         ),
         click.option(
-            "--damping", type=Finite(), metavar="B", help="Damping of the wall, for measures of one wall [Ns/m]."
+            "--damping", type=Finite(), metavar="B", help="Damping of the wall, for measures of one wall [N s/m]."
         ),
         click.option(
             "--frequency",
@@ -185,7 +186,7 @@ class MapCommand(Command):
     def epilog(self) -> str:
         width = max(map(len, MEASURES))
         lines = [
-            f"  {name:{width}}  {one.title}{f' [{one.unit}]' if one.unit else ''}"
+            f"  {name:{width}}  {one.title}{f' [{unit_text(one.unit)}]' if one.unit else ''}"
             for name, one in MEASURES.items()
         ]
         return "\b\nMeasures:\n" + "\n".join(lines) + "\n\n" + super().epilog()
@@ -416,7 +417,7 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
 
 
 def _amount(value: float, unit: str) -> str:
-    return "infinite" if value == math.inf else amount(value, unit.replace("N s", "Ns"))
+    return "infinite" if value == math.inf else amount(value, unit)
 
 
 def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
@@ -426,4 +427,4 @@ def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
 
 
 def _area(area: float, share: float) -> str:
-    return f"{area_text(area).replace('²', '^2')}, {typed(percent(share))} of the reachable area"
+    return f"{typed(area_text(area))}, {typed(percent(share))} of the reachable area"

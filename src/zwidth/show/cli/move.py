@@ -188,7 +188,7 @@ def _surface_options() -> list[Callable[..., Any]]:
             type=BoundedNumber("N/m", 0.0, LARGEST_WALL),
             help="Stiffness of the wall [N/m].",
         ),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [Ns/m]."),
+        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [N s/m]."),
         *environment_options(),
         click.option("--no-pull", is_flag=True, help="The wall never pulls the handle in."),
     ]
@@ -442,7 +442,7 @@ def _surface(motion: MechanismMotion, named: bool) -> str:
     if named:
         return f"{place}; {environment_words(environment, parameters)}"
     pulls = ", never pulls" if parameters.get("no_pull") else ""
-    return f"{place}; {amount(parameters['stiffness'], 'N/m')}, {amount(parameters['damping'], 'Ns/m')}{pulls}"
+    return f"{place}; {amount(parameters['stiffness'], 'N/m')}, {amount(parameters['damping'], 'N s/m')}{pulls}"
 
 
 def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Row]:

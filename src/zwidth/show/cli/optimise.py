@@ -19,7 +19,7 @@ from zwidth.show.cli.options import Callback, check_not_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
 from zwidth.show.output import DATA, FIGURES, printable, write_text
-from zwidth.show.units import number, printed, typed
+from zwidth.show.units import number, spoken_unit, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -180,7 +180,7 @@ def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
 
     problem = found.problem
     headings = ["", *short_names([axis.key for axis in problem.variables])]
-    headings += [f"{one.name} [{printed(one.unit)}]" if one.unit else one.name for one in problem.columns]
+    headings += [f"{one.name} [{spoken_unit(one.unit)}]" if one.unit else one.name for one in problem.columns]
     rows = []
     if found.baseline is not None:
         own = [axis_value_text(value) for value in own_values(problem)]

@@ -108,7 +108,7 @@ def _rows(by_direction: ByDirection) -> Iterator[tuple[str, str]]:
             yield (
                 name,
                 f"{amount(by_direction.stiffness[k], 'N/m')} "
-                f"at {amount(by_direction.damping[k], 'Ns/m')} of damping, "
+                f"at {amount(by_direction.damping[k], 'N s/m')} of damping, "
                 f"along {typed(as_written(float(angles[k])))}° from {plane[0]} towards {plane[1]}",
             )
     for status in sorted(

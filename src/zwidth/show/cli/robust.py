@@ -223,7 +223,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
     of_whom = " (charted members)" if not study.holds_for_all else " (in doubt)" if study.doubt else ""
     yield (
         f"largest stiffness{of_whom}",
-        f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'Ns/m')} of damping; "
+        f"{amount(chart.stiffness_max, 'N/m')} at {amount(chart.damping_at_stiffness_max, 'N s/m')} of damping; "
         f"at this limit {members} oscillates at {frequencies}",
     )
     stiffest, widest = _member(study, chart.best_by_stiffness), _member(study, chart.best_by_area)
@@ -234,8 +234,8 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
             f"{typed(percent(chart.lost_share))} of its area ({widest})"
         ),
     )
-    yield f"largest damping{of_whom}", amount(chart.damping_max, "Ns/m")
-    yield f"stable area{of_whom}", amount(chart.stable_area, "N²s/m²")
+    yield f"largest damping{of_whom}", amount(chart.damping_max, "N s/m")
+    yield f"stable area{of_whom}", amount(chart.stable_area, "N^2 s/m^2")
     yield "members", _members_text(study)
     if chart.failed:
         first = next(iter(chart.failed))

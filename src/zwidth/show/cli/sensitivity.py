@@ -11,6 +11,7 @@ from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
 from zwidth.show.units import amount, as_written, signed, typed
+from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,7 +111,7 @@ class SensitivityCommand(Command):
         peak = result.peak
         if peak is None:
             return
-        stiffest = f"{amount(peak.stiffness, 'N/m')} at {amount(peak.damping, 'Ns/m')} of damping"
+        stiffest = f"{amount(peak.stiffness, 'N/m')} at {amount(peak.damping, 'N s/m')} of damping"
         yield f"largest stiffness {stiffest}{PLACES[result.kind]}"
         known = [number for number in result.numbers if number.logarithmic == number.logarithmic]
         shown = [number for number in known if number.logarithmic != 0.0][: case["top"]]
@@ -147,13 +148,13 @@ def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
         yield f"{more} more; show them with --top N, or get all with --json or --output"
     near = next((one for one in goal.numbers if one.status == "out of range"), None)
     if near is not None and near.value != near.now:
-        value = f"{typed(as_written(near.value))} {near.unit}".rstrip()
+        value = f"{typed(as_written(near.value))} {unit_text(near.unit)}".rstrip()
         reached = amount(near.stiffness_max, "N/m")
         yield f"of the others {near.path} comes nearest, {reached} with {value}"
 
 
 def _goal_row(number: GoalNumber) -> tuple[str, str, str, str]:
-    now, wanted = (f"{typed(as_written(v))} {number.unit}".rstrip() for v in (number.now, number.value))
+    now, wanted = (f"{typed(as_written(v))} {unit_text(number.unit)}".rstrip() for v in (number.now, number.value))
     return number.path, now, wanted, amount(number.factor) if number.factor == number.factor else ""
 
 
@@ -162,7 +163,7 @@ def _row(sensitivities: Sensitivities, number: Sensitivity) -> tuple[str, str, s
     gain = 0.01 * number.logarithmic * sensitivities.peak.stiffness
     return (
         number.path,
-        f"{typed(as_written(number.value))} {number.unit}".rstrip(),
+        f"{typed(as_written(number.value))} {unit_text(number.unit)}".rstrip(),
         typed(signed(number.logarithmic)),
         f"{'+' if gain > 0.0 else ''}{amount(gain, 'N/m')}",
     )

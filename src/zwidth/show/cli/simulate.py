@@ -100,8 +100,8 @@ class SimulateCommand(Command):
             "--passivity",
             "passivity_damping",
             metavar="B",
-            type=BoundedNumber("Ns/m", 0.0, 1e15, above=True),
-            help="Add a time-domain passivity controller, whose damper is at most B [Ns/m].",
+            type=BoundedNumber("N s/m", 0.0, 1e15, above=True),
+            help="Add a time-domain passivity controller, whose damper is at most B [N s/m].",
         ),
         click.option(
             "--sound-full-scale",
@@ -267,7 +267,7 @@ def _circumstances(simulation: ContactSimulation) -> Iterator[Row]:
 
 
 def environment_words(environment: Environment, values: Mapping[str, float]) -> str:
-    """An environment and its parameters: "slot: width 5 mm, stiffness 1 kN/m, damping 0 Ns/m"."""
+    """An environment and its parameters: "slot: width 5 mm, stiffness 1 kN/m, damping 0 N s/m"."""
     units = {p.name: p.unit for p in environment.parameters if not p.switch}
     texts = [f"{name.replace('_', ' ')} {_number(values[name], unit)}" for name, unit in units.items()]
     texts += [name.replace("_", " ") for name, on in values.items() if name not in units and on]
@@ -277,7 +277,7 @@ def environment_words(environment: Environment, values: Mapping[str, float]) -> 
 
 def _number(value: float, unit: str) -> str:
     """A parameter with its unit; inf is one, too."""
-    return amount(value, unit.replace("N s", "Ns")) if isfinite(value) else "inf"
+    return amount(value, unit) if isfinite(value) else "inf"
 
 
 def _start(simulation: ContactSimulation) -> str:

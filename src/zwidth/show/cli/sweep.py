@@ -17,7 +17,7 @@ from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import Question, check_not_empty, processor_option
 from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
-from zwidth.show.units import keys_of_moments, number, printed, typed
+from zwidth.show.units import keys_of_moments, number, spoken_unit, typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -234,7 +234,7 @@ def _lists_all(case: CommandLine) -> bool:
 
 
 def _heading(one: Column) -> str:
-    return f"{one.name} [{printed(one.unit)}]" if one.unit else one.name
+    return f"{one.name} [{spoken_unit(one.unit)}]" if one.unit else one.name
 
 
 def _design_texts(sweep: Sweep, design: int) -> list[str]:
@@ -259,7 +259,7 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
                 f"{axis.key} = {axis_value_text(v)}"
                 for axis, v in zip(sampling.axes, sampling.values(design), strict=True)
             )
-            yield name, f"{typed(quantity(value, printed(one.unit)))} at {where}"
+            yield name, f"{typed(quantity(value, one.unit))} at {where}"
     yield "designs", ", ".join(f"{n} {STATUS[kind]}" for kind, n in summary.by_status)
 
 

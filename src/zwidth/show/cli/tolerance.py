@@ -21,7 +21,8 @@ from zwidth.show.cli.options import Question, check_not_empty
 from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
 from zwidth.show.cli.sweep import circumstances_of_study
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
-from zwidth.show.units import amount, number, percent, printed, typed
+from zwidth.show.units import amount, number, percent, spoken_unit, typed
+from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -202,7 +203,7 @@ def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:
     texts = []
     for each in one.quantiles:
         interval = each.interval
-        unit = printed(one.unit)
+        unit = spoken_unit(one.unit)
         if interval.low == interval.high:
             texts.append(amount(interval.value, unit))
             continue
@@ -235,8 +236,8 @@ def tolerance_text(one: Tolerance) -> str:
     law = one.distribution
     if law.kind in ("uniform", "triangular"):
         ends = f"{_written(law.low)} to {_written(law.high)}"
-        return f"{law.kind}, {ends}{f' {one.unit}' if one.unit else ''}"
-    unit = f" {one.unit}" if one.unit else ""
+        return f"{law.kind}, {ends}{f' {unit_text(one.unit)}' if one.unit else ''}"
+    unit = f" {unit_text(one.unit)}" if one.unit else ""
     width = f"standard deviation {_written(law.spread)}{unit}"
     if law.kind == "lognormal":
         width = f"standard deviation {_written(100.0 * law.spread)} % of it"
@@ -254,7 +255,7 @@ def cut_sentences(tolerances: Sequence[Tolerance]) -> Iterator[str]:
         law = one.distribution
         if law.cut_off > MUCH_CUT:
             mean, deviation = law.moments
-            unit = f" {one.unit}" if one.unit else ""
+            unit = f" {unit_text(one.unit)}" if one.unit else ""
             yield (
                 f"{one.key}: {typed(percent(law.cut_off))} of its distribution is cut off; what is drawn has a "
                 f"mean of {mean:.3g}{unit} and a standard deviation of {deviation:.3g}{unit}"
@@ -268,7 +269,7 @@ def wall_sentence(result: ToleranceStudy) -> str:
         return (
             "no wall is wanted: give stiffness_N_per_m and damping_Ns_per_m for the probability that it is stable"
         )
-    shown = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    shown = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'N s/m')}"
     if result.undecided:
         return _undecided_sentence(result, shown, share)
     if share.value == 1.0:
@@ -326,7 +327,7 @@ def band_rows(result: ToleranceStudy) -> Iterator[list[str]]:
 def _tried(wall: BandWall | None) -> str:
     if wall is None:
         return "none"
-    place = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'Ns/m')}"
+    place = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'N s/m')}"
     return place if wall.share is None else f"{place}; {share_text(wall.share)} of {wall.unseen} further ones"
 
 

@@ -213,7 +213,7 @@ def _environment(facts: Mapping[str, Any]) -> str:
         return ""
     words = printable(str(environment))
     if {"stiffness", "damping"} <= set(values):
-        words += f" of {as_written(values['stiffness'], 'N/m')} and {as_written(values['damping'], 'Ns/m')}"
+        words += f" of {as_written(values['stiffness'], 'N/m')} and {as_written(values['damping'], 'N s/m')}"
         values = {name: values[name] for name in values if name not in ("stiffness", "damping", "no_pull")}
     given = ", ".join(f"{name} {as_written(float(value))}" for name, value in values.items())
     return f"{words} ({given})" if given else words

@@ -21,7 +21,7 @@ from zwidth.show.figures.style import (
     legend_above,
     number_logarithmic,
 )
-from zwidth.show.units import quantity
+from zwidth.show.units import quantity, spoken_unit
 
 
 def draw_impedance(
@@ -47,7 +47,7 @@ def draw_impedance(
     number_logarithmic(ax.xaxis, *ax.get_xlim())
     number_logarithmic(ax.yaxis, *ax.get_ylim())
     ax.set_xlabel("Frequency [Hz]")
-    ax.set_ylabel("Impedance, magnitude [Ns/m]")
+    ax.set_ylabel(f"Impedance, magnitude [{spoken_unit('N s/m')}]")
     legend_above(ax, columns=2)
 
 
@@ -72,7 +72,7 @@ def draw_felt_chart(ax: Axes, chart: FeltChart) -> None:
     if low < 0.0:
         ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.5)
     label(ax.xaxis, "Stiffness felt at rest", "N/m")
-    label(ax.yaxis, "Virtual damping B", "Ns/m")
+    label(ax.yaxis, "Virtual damping B", "N s/m")
     if not chart.regions:
         draw_empty(ax)
     legend_above(ax)

@@ -126,7 +126,7 @@ def draw_couplings(ax: Axes, couplings: Couplings) -> None:
     b0, b1 = float(walls[:, 1].min()), float(walls[:, 1].max())
     frame(ax, (0.0, 1.05 * (k1 or 1.0), b0 - 0.05 * (b1 - b0), b1 + 0.05 * (b1 - b0) or 1.0), empty=False)
     label(ax.xaxis, "Coupling stiffness k", "N/m")
-    label(ax.yaxis, "Coupling damping b", "Ns/m")
+    label(ax.yaxis, "Coupling damping b", "N s/m")
     legend_above(ax, columns=1)
 
 

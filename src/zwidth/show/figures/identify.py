@@ -44,7 +44,7 @@ from zwidth.show.figures.style import (
     legend_above,
     number_logarithmic,
 )
-from zwidth.show.units import quantity
+from zwidth.show.units import quantity, spoken_unit
 
 
 def draw_identification(ax: Axes, result: Identification) -> None:
@@ -82,7 +82,7 @@ def draw_arm(ax: Axes, identification: Identification) -> None:
     time = np.asarray(curves["time_s"])[some]
     for k, name in enumerate(measured):
         quantity, _, drive = name.removeprefix(MEASURED).partition(".")
-        unit = "N" if quantity == "force_N" else "Nm"
+        unit = "N" if quantity == "force_N" else "N m"
         torque = np.asarray(curves[name])[some]
         predicted = np.asarray(curves[name.replace(MEASURED, PREDICTED, 1)])[some]
         scale = float(np.max(np.abs(torque), initial=0.0)) or 1.0
@@ -256,7 +256,7 @@ def draw_identified_impedance(ax: Axes, identification: Identification) -> None:
     number_logarithmic(ax.xaxis, *ax.get_xlim())
     number_logarithmic(ax.yaxis, *ax.get_ylim())
     ax.set_xlabel("Frequency [Hz]")
-    ax.set_ylabel("Impedance, magnitude [Ns/m]")
+    ax.set_ylabel(f"Impedance, magnitude [{spoken_unit('N s/m')}]")
     legend_above(ax, columns=2)
 
 
@@ -361,7 +361,7 @@ def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
     ax.axhline(0.0, color=GREY, linewidth=0.6)
     ax.axvline(0.0, color=GREY, linewidth=0.6)
     label(ax.xaxis, "Angle at the motor's shaft", "rad")
-    label(ax.yaxis, "Torque", "Nm")
+    label(ax.yaxis, "Torque", "N m")
     legend_above(ax, columns=3)
 
 

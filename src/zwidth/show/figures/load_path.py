@@ -108,7 +108,7 @@ def draw_close_up(ax: Axes, path: LoadPath) -> None:
         ax.set_ylim(float(seen.min()) - margin, float(seen.max()) + margin)
     ax.xaxis.set_major_locator(_few_ticks())
     label(ax.xaxis, "K about the stiffest walls", "N/m")
-    label(ax.yaxis, "Virtual damping B", "Ns/m")
+    label(ax.yaxis, "Virtual damping B", "N s/m")
 
 
 def _few_ticks() -> Any:

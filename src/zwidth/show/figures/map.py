@@ -41,7 +41,7 @@ from zwidth.show.figures.style import (
     label,
 )
 from zwidth.show.mechanism_scene import drawn_links, joint_points, link_stroke
-from zwidth.show.units import area_text, as_written, percent, printed
+from zwidth.show.units import area_text, as_written, percent, spoken_unit
 from zwidth.study.workspace.map import continued, reach_outline
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def draw_map(
     """
     x, y = dataset["x_m"].values, dataset["y_m"].values
     about = dataset[name].attrs
-    unit = printed(str(about.get("unit", "")))
+    unit = spoken_unit(str(about.get("unit", "")))
     handles: list[Any] = []
     values = dataset[name].values
     outline = reach_outline(dataset, name)
@@ -237,7 +237,7 @@ def draw_areas(ax: Axes, area: CommonArea) -> list[Any]:
         hatch = HATCHES[n % len(HATCHES)]
         measure = requirement.measure
         sign = "\u2265" if requirement.at_least else "\u2264"
-        bound = as_written(requirement.value, printed(unit))
+        bound = as_written(requirement.value, unit)
         text = f"{measure.title} {sign} {bound}: {area_text(region.area)}"
         style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.3, "linestyle": dashes, "facecolor": "none"}
         for path in _paths(region.shape):
@@ -372,4 +372,4 @@ def _bands(ax: Axes, table: SafeWalls) -> None:
     )
     ax.autoscale_view()
     label(ax.xaxis, "Virtual stiffness", "N/m")
-    label(ax.yaxis, "Virtual damping", "Ns/m")
+    label(ax.yaxis, "Virtual damping", "N s/m")

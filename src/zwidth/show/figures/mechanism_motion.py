@@ -485,7 +485,7 @@ def _spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, dam
         cup = [y + 0.18, y + 0.18, y - 0.18, y - 0.18]
         ax.plot(sides, cup, color=GREY, linewidth=1.2)
         ax.plot([middle + 0.22, end], [y, y], color=GREY, linewidth=1.2)
-        ax.text(middle, y - 0.27, as_written(damping, "Ns/m"), ha="center", va="top", fontsize=8.0)
+        ax.text(middle, y - 0.27, as_written(damping, "N s/m"), ha="center", va="top", fontsize=8.0)
 
 
 def _ground(ax: Axes, x: float) -> None:

@@ -22,7 +22,6 @@ from zwidth.show.figures.style import (
     label,
     legend_above,
 )
-from zwidth.show.units import printed
 from zwidth.study.designs.column import Column
 from zwidth.study.optimisation.optimisation import Optimisation, undominated
 
@@ -123,6 +122,6 @@ def _draw_approach(ax: Axes, found: Optimisation) -> None:
 def _name(axis: Axis, one: Column) -> None:
     """Name an axis by a column, in its unit if it has one."""
     if one.unit:
-        label(axis, one.title, printed(one.unit))
+        label(axis, one.title, one.unit)
     else:
         axis.set_label_text(one.title)

@@ -151,7 +151,7 @@ def _verdicts(ax: Axes, verdicts: Any) -> None:
         if here.any():
             ax.scatter(K[here], B[here], s=16.0, label=name, **style)  # type: ignore[arg-type]
     label(ax.xaxis, "Virtual stiffness", "N/m")
-    label(ax.yaxis, "Virtual damping", "Ns/m")
+    label(ax.yaxis, "Virtual damping", "N s/m")
     ax.legend(frameon=False, fontsize=8.0)
 
 

@@ -115,7 +115,7 @@ def edges_of(rings: Sequence[Floats]) -> list[Floats]:
 
 def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
     """The stiffest wall, with its numbers in the legend."""
-    numbers = f"{quantity(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'Ns/m')}"
+    numbers = f"{quantity(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'N s/m')}"
     vibration = " and ".join(quantity(f, "Hz") for f in chart.frequencies_at_stiffness_max)
     ax.plot(
         [chart.stiffness_max],
@@ -140,7 +140,7 @@ def frame(ax: Axes, window: Window, *, empty: bool) -> None:
         if low < 0.0 < high:
             draw(0.0, color=GREY, linewidth=0.6, zorder=1.5)
     label(ax.xaxis, "Virtual stiffness K", "N/m")
-    label(ax.yaxis, "Virtual damping B", "Ns/m")
+    label(ax.yaxis, "Virtual damping B", "N s/m")
     if empty:
         draw_empty(ax)
 

@@ -50,7 +50,7 @@ from zwidth.show.figures.style import (
     label,
     number_logarithmic,
 )
-from zwidth.show.units import MINUS, exponent_of, printed, quantity, scaled
+from zwidth.show.units import MINUS, exponent_of, quantity, scaled, spoken_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -240,7 +240,7 @@ def _draw_missing(ax: Axes, x: NDArray[Any], missing: Sequence[tuple[str, NDArra
 
 def _name_column(ax: Axes, column: Any) -> None:
     title = "\n".join(wrap(str(column.attrs["title"]), LETTERS - 6, break_long_words=False))
-    unit = printed(str(column.attrs.get("unit", "")))
+    unit = spoken_unit(str(column.attrs.get("unit", "")))
     if unit:
         label(ax.yaxis, title, unit)
     else:
@@ -259,10 +259,10 @@ def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
     if coordinate.attrs.get("scale") == "log":
         (ax.set_xscale if which == "x" else ax.set_yscale)("log")
         unit = str(coordinate.attrs.get("units", ""))
-        axis.set_label_text(f"{key} [{printed(unit)}]" if unit else key)
+        axis.set_label_text(f"{key} [{spoken_unit(unit)}]" if unit else key)
         values = np.asarray(coordinate.values, dtype=float)
         number_logarithmic(axis, float(values.min()), float(values.max()))
-    elif unit := printed(str(coordinate.attrs.get("units", ""))):
+    elif unit := spoken_unit(str(coordinate.attrs.get("units", ""))):
         label(axis, key, unit, plain=True)
         axis.set_major_locator(MaxNLocator(nbins=MOST_TICKS, steps=[1, 2, 2.5, 5, 10]))
     else:
@@ -364,7 +364,7 @@ def draw_heat_map(
         levels, norm, colours = bands_of(scale)
         cells = np.ma.masked_where(np.isnan(values), values)
         ax.pcolormesh(x, y, cells, norm=norm, cmap=colours, linewidth=0.0, rasterized=True)
-        title, unit = str(column.attrs["title"]), printed(str(column.attrs.get("unit", "")))
+        title, unit = str(column.attrs["title"]), spoken_unit(str(column.attrs.get("unit", "")))
         colour_bar(ax, levels, norm, colours, title, unit)
     marked = [kind for kind in _HATCHES if (status == kind).any()]
     for kind in marked:
@@ -382,7 +382,7 @@ def constant_text(column: Any, values: Floats) -> str:
     if not len(finite) or np.isinf(values).any() or np.ptp(finite) > SAME * float(np.abs(finite).max()):
         return ""
     title = "\n".join(wrap(str(column.attrs["title"]), LETTERS, break_long_words=False))
-    return f"{title}\nconstant: {quantity(float(finite[0]), printed(str(column.attrs.get('unit', ''))))}"
+    return f"{title}\nconstant: {quantity(float(finite[0]), str(column.attrs.get('unit', '')))}"
 
 
 PAPER: Final = ListedColormap(["#F2F2F2"])
@@ -538,7 +538,7 @@ def _draw_uprights(ax: Axes, uprights: Sequence[ParallelAxis], keys: int) -> Non
 
 def _parallel_axis(column: Any, values: NDArray[Any]) -> ParallelAxis:
     name = str(column.attrs.get("title") or column.attrs.get("long_name") or column.name)
-    unit = printed(str(column.attrs.get("unit", column.attrs.get("units", ""))))
+    unit = spoken_unit(str(column.attrs.get("unit", column.attrs.get("units", ""))))
     if values.dtype.kind not in "ifu":
         kinds = list(dict.fromkeys(map(str, values)))
         at = {kind: (n + 0.5) / len(kinds) for n, kind in enumerate(kinds)}

@@ -138,7 +138,7 @@ def _mark(ax: Axes, stiffness: float, damping: float, marker: str, face: str, te
 
 def _stiffest_text(band: Band) -> str:
     assert band.stiffest is not None
-    place = f"{quantity(band.stiffest.stiffness, 'N/m')} at {quantity(band.stiffest.damping, 'Ns/m')}"
+    place = f"{quantity(band.stiffest.stiffness, 'N/m')} at {quantity(band.stiffest.damping, 'N s/m')}"
     return f"stiffest wall of {_percent(band.probability)}: {place}"
 
 

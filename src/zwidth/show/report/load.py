@@ -37,13 +37,13 @@ def carried(facts: Facts) -> str:
     assert facts.point.load is not None
     found = facts.point.equilibrium
     motors = ", ".join(
-        f"{name} {quantity(torque, 'Nm')}"
+        f"{name} {quantity(torque, 'N m')}"
         for name, torque in zip(facts.point.drives.names, motor_torques(found), strict=True)
     )
     if np.any(found.screw[:3]):
         hand, way = point(found.hand_force, "N"), "along the direction"
     else:
-        hand, way = point(found.hand_moment, "Nm"), "about the axis"
+        hand, way = point(found.hand_moment, "N m"), "about the axis"
     return (
         f"The device is linearised where it is in balance under {load_name(facts.point.load)}: the hand gives "
         f"{hand}, the wall {quantity(found.wall_force, 'N')} {way}, and the motors {motors}."
@@ -55,7 +55,7 @@ def across(facts: Facts) -> str:
     found = facts.point.equilibrium
     if not has_sideways_force(found):
         return ""
-    part = point(found.sideways_force, "N" if np.any(found.screw[:3]) else "Nm")
+    part = point(found.sideways_force, "N" if np.any(found.screw[:3]) else "N m")
     return f"Of the hand's force {part} is across the direction, where no wall acts: this posture needs it."
 
 

@@ -23,7 +23,7 @@ from zwidth.show.figures.stability import draw_models
 from zwidth.show.figures.style import context, figure
 from zwidth.show.report.figures import both_drawings
 from zwidth.show.report.report import page_template
-from zwidth.show.units import percent, printed, quantity, speaking_of_moments
+from zwidth.show.units import percent, quantity, speaking_of_moments
 from zwidth.study.designs.sweep_data import axis_value_text
 from zwidth.study.optimisation.evaluation import margins
 from zwidth.study.optimisation.optimisation import Optimisation, worst_point
@@ -50,7 +50,7 @@ def optimisation_page(found: Optimisation) -> str:
 
 
 def _value(number: float, unit: str) -> str:
-    return quantity(number, printed(unit)) if np.isfinite(number) else NONE
+    return quantity(number, unit) if np.isfinite(number) else NONE
 
 
 def _before_and_after(found: Optimisation) -> list[tuple[str, str, str, str]]:
@@ -63,7 +63,7 @@ def _before_and_after(found: Optimisation) -> list[tuple[str, str, str, str]]:
         after = design[axis.key]
         number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (own, after))
         texts = [
-            NONE if value is None else quantity(value, printed(axis.unit)) if number else axis_value_text(value)
+            NONE if value is None else quantity(value, axis.unit) if number else axis_value_text(value)
             for value in (own, after)
         ]
         ratio = f"{after / own:.3g}" if number and own else NONE
@@ -174,9 +174,9 @@ def _gain(found: Optimisation) -> str:
     parts = []
     for objective in problem.objectives:
         one, value = problem.columns[objective.column], float(found.values[knee, objective.column])
-        part = f"{one.name} {quantity(value, printed(one.unit))}"
+        part = f"{one.name} {quantity(value, one.unit)}"
         if found.baseline is not None and np.isfinite(own := float(found.baseline.values[0, objective.column])):
-            part += f" instead of {quantity(own, printed(one.unit))}"
+            part += f" instead of {quantity(own, one.unit)}"
         parts.append(part)
     return f"{chosen} has {comma_list(parts)}"
 
@@ -231,7 +231,7 @@ def _produced(found: Optimisation) -> list[str]:
         one = problem.columns[objective.column]
         low, high = (float(array[knee, objective.column]) for array in (bars.low, bars.high))
         if np.isfinite(low):
-            span = f"{quantity(low, printed(one.unit))} to {quantity(high, printed(one.unit))}"
+            span = f"{quantity(low, one.unit)} to {quantity(high, one.unit)}"
             said.append(f"90 % of them have {one.name} {span}")
     return said
 

@@ -21,7 +21,7 @@ from zwidth.show.report.figures import svg_figures
 from zwidth.show.units import SPACE, speaking_of_moments
 
 PARTS: Final = 5  # the facts, three of them at length, and the page
-BLANK_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Hz|N|J|s|m|g)|Ns|samples?)(?![\w-]))")
+BLANK_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=(?:%|[kMGmµn]?(?:Hz|N|J|s|m|g)|N s|samples?)(?![\w-]))")
 
 
 def write_report(

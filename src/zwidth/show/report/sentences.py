@@ -106,7 +106,7 @@ def largest_stiffness(facts: Facts) -> str:
         )
     return (
         f"{start} renders walls of up to {stiffness}, "
-        f"at {quantity(facts.base.damping, 'Ns/m')} of virtual damping."
+        f"at {quantity(facts.base.damping, 'N s/m')} of virtual damping."
     )
 
 
@@ -300,7 +300,7 @@ def decay(facts: Facts) -> str:
 def _comes_to_rest(wall: FastestDecay, facts: Facts) -> str:
     """The wall and how long its slowest motion takes."""
     time = quantity(tenfold_time(wall.spectral_radius, facts.loop.period), "s")
-    numbers = f"{quantity(wall.stiffness, 'N/m')} and {quantity(wall.damping, 'Ns/m')}"
+    numbers = f"{quantity(wall.stiffness, 'N/m')} and {quantity(wall.damping, 'N s/m')}"
     return f"a wall of {numbers} comes to rest fastest: a tenth is left after {time}"
 
 

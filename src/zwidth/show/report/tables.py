@@ -44,9 +44,9 @@ def limits(facts: Facts, variants: tuple[Variant, ...]) -> list[Row]:
             f"{v.label} (ideal)" if v.key in sentences.IDEAL else v.label,
             quantity(v.stiffness_max, "N/m") if v.stiffness_max > 0.0 else NONE,
             f"{number(v.stiffness_max / base)}{SPACE}×" if base > 0.0 else UNKNOWN,
-            quantity(v.damping, "Ns/m"),
+            quantity(v.damping, "N s/m"),
             ", ".join(sentences.hertz(f) for f in v.frequencies) or UNKNOWN,
-            quantity(v.area, "N²s/m²"),
+            quantity(v.area, "N^2 s/m^2"),
         )
         for v in variants
         if v.chart is not None
@@ -112,7 +112,7 @@ def _wall_text(stiffness: float, damping: float) -> str:
     if stiffness == 0.0:
         return NONE
     wall = quantity(stiffness, "N/m")
-    return wall if isnan(damping) else f"{wall} at {quantity(damping, 'Ns/m')}"
+    return wall if isnan(damping) else f"{wall} at {quantity(damping, 'N s/m')}"
 
 
 def document(facts: Facts) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def plane_positions(dataset: xr.Dataset) -> Floats:
 
 
 def areas(x: Floats, y: Floats) -> Floats:
-    """Area [m^2] that belongs to each point (ny, nx) of a grid by the trapezoidal rule.
+    """Area [m²] that belongs to each point (ny, nx) of a grid by the trapezoidal rule.
 
     >>> areas(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0])).tolist()
     [[0.5, 1.0, 0.5], [0.5, 1.0, 0.5]]
@@ -155,7 +155,7 @@ class Column:
         values   the measure at each cell
         point    gives the operating point of all cells; called where the statistic needs more than the values, as
                  to cut one design's point out of those of many takes longer than to measure it
-        weights  area of each cell [m^2]; None: all equal
+        weights  area of each cell [m²]; None: all equal
         Returns  the statistic of the cells that have a value; nan with the commonest status where none has one
         """
         assert self.statistic is not None

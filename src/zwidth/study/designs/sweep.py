@@ -36,6 +36,7 @@ from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells
 from zwidth.study.jobs.store import Store, store_for
 from zwidth.study.workspace.plane_grid import PlaneGrid
+from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +104,7 @@ class Sweep(Result):
         one, summary = self.job.columns[column], self.summaries[column]
         span = ""
         if summary.lowest is not None and summary.highest is not None:
-            span = f"{summary.lowest[0]:.4g} to {summary.highest[0]:.4g} {one.unit}".rstrip() + ", "
+            span = f"{summary.lowest[0]:.4g} to {summary.highest[0]:.4g} {unit_text(one.unit)}".rstrip() + ", "
         return f"{one.name}: {span}{summary.counts[OK]} of {self.job.count} have a value"
 
 

@@ -78,7 +78,7 @@ class SweepJob:
     operators            as in `Study`
     columns              the measures to compute
     positions            (..., 3) of the workspace or (n, 1, 3) of the task [m]; None where no column is over any
-    weights              (...) area that belongs to each position [m^2]
+    weights              (...) area that belongs to each position [m²]
     fixed_circumstances  circumstances that no axis sets
     directions           (d, 3) of the task; None: the one that is a circumstance
     complete             whether a column over all positions needs a value at each of them, as a task does

@@ -22,7 +22,6 @@ from zwidth.device.operator_choice import with_operator
 from zwidth.errors import DeviceError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note, WantedWall
-from zwidth.measures.unit_text import unit_text
 from zwidth.result import Result
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis
 from zwidth.study.designs.study import Study
@@ -30,6 +29,7 @@ from zwidth.study.designs.task import Task, task_of
 from zwidth.study.optimisation.evaluation import DesignJudgement, margins
 from zwidth.study.optimisation.problem import Demand, Problem
 from zwidth.study.optimisation.search import pieces, value_at, values_at
+from zwidth.unit_text import unit_text
 
 BEST_FOUND: Final = "best found"
 NO_BETTER: Final = "no better design lies within the bounds"

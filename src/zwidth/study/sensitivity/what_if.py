@@ -66,7 +66,7 @@ class Variant:
 
     @property
     def area(self) -> float:
-        """Stable area within K >= 0, B >= 0 [N^2 s/m^2]; 0 if no wall is stable, nan if left out."""
+        """Stable area within K >= 0, B >= 0 [N² s/m²]; 0 if no wall is stable, nan if left out."""
         if self.chart is None:
             return nan
         # without a stable wall the area is rounding error

@@ -34,7 +34,7 @@ class PlaneArea:
     """A part of a plane.
 
     shape  a shapely polygon or several, in the plane's coordinates [m]
-    area   [m^2]
+    area   [m²]
     share  of the area that can be reached; nan where nothing can
     """
 
@@ -43,7 +43,7 @@ class PlaneArea:
     share: float
 
     def __repr__(self) -> str:
-        return f"PlaneArea: {self.area:.4g} m^2, {100.0 * self.share:.4g} % of the reachable area"
+        return f"PlaneArea: {self.area:.4g} m², {100.0 * self.share:.4g} % of the reachable area"
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,7 +72,7 @@ class CommonArea(Result):
         if not self.reach.area > 0.0:
             return f"CommonArea: the map reaches nothing, with {required}"
         share = f"{100.0 * common.share:.4g} % of the reachable area"
-        return f"CommonArea: {common.area:.4g} m^2, {share}, with {required}"
+        return f"CommonArea: {common.area:.4g} m², {share}, with {required}"
 
     def document(self) -> dict[str, Any]:
         """The areas by key and unit."""

@@ -29,6 +29,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import MISSING, OK, Measure, MeasureValues, Note
 from zwidth.measures.evaluation import NO_MECHANISM, evaluate
 from zwidth.study.designs.column import Requirement
+from zwidth.unit_text import unit_text
 
 Extreme = Literal["worst", "best", "lowest", "highest"]
 EXTREMES: Final = ("worst", "best", "lowest", "highest")
@@ -408,7 +409,7 @@ def share_measure(requirement: Requirement) -> Measure:
     """The share as a measure, "share_of_directions", which is mapped like any other."""
     measure = requirement.measure
     sign = "\u2265" if requirement.at_least else "\u2264"
-    unit = f" {measure.unit}" if measure.unit else ""
+    unit = f" {unit_text(measure.unit)}" if measure.unit else ""
     return Measure(
         name=NAME,
         title=f"Share of directions with {measure.name} {sign} {requirement.value:g}{unit}",

@@ -69,7 +69,7 @@ const ALL = Object.keys(PREFIXES).map(Number);
 /** @type {Record<string, number[]>} Powers of ten that a unit takes; one that is not named takes none. */
 const TAKES = {
   "N/m": [0, 3, 6],
-  "Nm/rad": [0, 3, 6],
+  "N m/rad": [0, 3, 6],
   Hz: ALL,
   s: ALL,
   m: ALL,
@@ -217,7 +217,7 @@ export function quantity(value, unit, digits = 4) {
   if (!Number.isFinite(value)) return `${number(value)}${SPACE}${unit}`.trim();
   const rounded = Number(value.toExponential(digits - 1)); // so that 999.996 becomes 1.000 k, not 1000
   const exponent = exponentOf(rounded, unit);
-  return `${number(rounded / 10 ** exponent, digits)}${SPACE}${PREFIXES[exponent]}${unit}`.trim();
+  return `${number(rounded / 10 ** exponent, digits)}${SPACE}${PREFIXES[exponent]}${unit.replaceAll(" ", SPACE)}`.trim();
 }
 
 /**

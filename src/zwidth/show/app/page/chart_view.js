@@ -50,7 +50,7 @@ export class ChartView {
     this.held = false;
     /** @type {{x: number, y: number} | null} */
     this.pointer = null;
-    this.units = { K: "N/m", B: "Ns/m" };
+    this.units = { K: "N/m", B: "N s/m" };
     this.listen();
   }
 
@@ -188,7 +188,7 @@ export class ChartView {
   setFrame(frame) {
     this.frame = frame;
     const moments = frame.head.moments;
-    this.units = moments ? { K: "Nm/rad", B: "Nms/rad" } : { K: "N/m", B: "Ns/m" };
+    this.units = moments ? { K: "N m/rad", B: "N m s/rad" } : { K: "N/m", B: "N s/m" };
     this.follow();
   }
 

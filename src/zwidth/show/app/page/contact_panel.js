@@ -91,7 +91,7 @@ export class ContactPanel {
   update(frame, wall) {
     this.takeWall(wall);
     const moments = frame.head.moments;
-    this.view.units = moments ? { x: "rad", f: "Nm" } : { x: "m", f: "N" };
+    this.view.units = moments ? { x: "rad", f: "N m" } : { x: "m", f: "N" };
     if (!this.touching) return;
     const found = frame.head.touch;
     if (!found || found.reason) {
@@ -106,7 +106,7 @@ export class ContactPanel {
     this.view.delay = found.delay_samples;
     this.view.frequency = frame.head.chart.wall?.verdict === "unstable" ? frequency : null;
     const shift = this.touch.factor === 1 ? "" : ` Sound is played ${number(this.touch.factor, 2)} times ${this.touch.factor > 1 ? "higher" : "lower"}.`;
-    this.write(`${NO_FORCE} The chart is the one held by this hand (${quantity(found.arm[0], "N/m")}, ${quantity(found.arm[1], "Ns/m")}).${shift}`);
+    this.write(`${NO_FORCE} The chart is the one held by this hand (${quantity(found.arm[0], "N/m")}, ${quantity(found.arm[1], "N s/m")}).${shift}`);
     if (first) {
       this.view.begin(found.period);
       void this.touch.start();

@@ -382,7 +382,7 @@ export class DeviceView {
       const both = stiffness[k] > 0 && damping[k] > 0;
       if (stiffness[k] > 0) spring(context, ends[0], ends[1], both ? y - 12 : y, colours.ink);
       if (damping[k] > 0) damper(context, ends[0], ends[1], both ? y + 12 : y, colours.ink);
-      const lines = [stiffness[k] > 0 ? quantity(stiffness[k], "N/m") : "", damping[k] > 0 ? quantity(damping[k], "Ns/m") : ""].filter(Boolean);
+      const lines = [stiffness[k] > 0 ? quantity(stiffness[k], "N/m") : "", damping[k] > 0 ? quantity(damping[k], "N s/m") : ""].filter(Boolean);
       lines.forEach((line, row) => drawText(context, line, from + gap / 2, y + 34 + 16 * row, { align: "center", colour: colours.ink }));
       if (k === 0 || k === n) {
         const at = k === 0 ? from : from + gap;

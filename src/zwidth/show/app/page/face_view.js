@@ -41,7 +41,7 @@ export class FaceView {
   drawEdge(context, box, frame, colours) {
     const arcs = frame.arrays["chart.arcs"].values;
     const ends = frame.arrays["chart.arcs_ends"].values;
-    const unit = frame.head.moments ? "Nm/rad" : "N/m";
+    const unit = frame.head.moments ? "N m/rad" : "N/m";
     let [top, most] = [0, 0];
     for (let i = 0; i < arcs.length; i += 3) {
       if (arcs[i] < 0 || arcs[i + 1] < 0) continue;
@@ -79,7 +79,7 @@ export class FaceView {
     ].filter((line) => frame.arrays[line.key]);
     const all = lines.flatMap((line) => [...frame.arrays[line.key].values]).filter((value) => value > 0 && Number.isFinite(value));
     const scale = logarithmic(box, [frequency[0], frequency[frequency.length - 1]], [Math.min(...all), Math.max(...all)]);
-    axes(context, box, scale, { x: "Frequency", xUnit: "Hz", y: "Impedance |Z|", yUnit: "Ns/m" }, colours);
+    axes(context, box, scale, { x: "Frequency", xUnit: "Hz", y: "Impedance |Z|", yUnit: "N s/m" }, colours);
     const style = { weight: 600 };
     let left = box.left;
     let up = box.top - 10;

@@ -68,7 +68,7 @@ export class NumbersPanel {
    */
   setNumbers(numbers, settings, another) {
     const before = new Map(another ? [] : this.numbers.map((of) => [of.path, of]));
-    this.numbers = numbers.map((of) => before.get(of.path) ?? { ...of, unit: of.unit.replaceAll("^2", "²").replaceAll("^3", "³") });
+    this.numbers = numbers.map((of) => before.get(of.path) ?? of);
     this.settings = settings;
     if (before.size === numbers.length && numbers.every((of) => before.has(of.path))) this.update(settings);
     else if (this.dragging) this.outdated = true;

@@ -37,7 +37,7 @@ export class PaddlePanel {
     this.stream = new PaddleStream({
       onTrial: (trial) => {
         this.trials.push(trial);
-        this.say(`${this.trials.length} trials; the last: ${quantity(trial.stiffness, "N/m")}, ${quantity(trial.damping, "Ns/m")}, ${trial.verdict}`);
+        this.say(`${this.trials.length} trials; the last: ${quantity(trial.stiffness, "N/m")}, ${quantity(trial.damping, "N s/m")}, ${trial.verdict}`);
         this.listeners.onTrials(this.trials);
       },
       onSample: () => {},
