@@ -88,7 +88,7 @@ def haptic_equilibrium() -> list[Row]:
         ),
         Number(
             "(2.5)",
-            f"spectral radius at {e.STIFFNESS / 1e3:g} kN/m and {e.DAMPING:g} Ns/m under 5 N, motion along the "
+            f"spectral radius at {e.STIFFNESS / 1e3:g} kN/m and {e.DAMPING:g} N s/m under 5 N, motion along the "
             "surface among the roots",
             e.spectral_radius,
             second_value=e.radius_by_hand,

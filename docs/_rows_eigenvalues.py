@@ -51,10 +51,10 @@ def figure_5_10() -> list[Row]:
         ),
         Claim(
             "Fig. 5.10",
-            "the other eigenvalues, damping from −2 to 35 Ns/m",
+            "the other eigenvalues, damping from −2 to 35 N s/m",
             "remain inside and change very little",
-            f"below {slow.value:.2f} Ns/m the slow pair is outside, |z| = {across.slow_at_first:.4f} at −2 Ns/m. "
-            f"From edge to edge it moves by {moves['slow pair']:.3f}, the real one by {moves['real']:.2f}, the "
+            f"below {slow.value:.2f} N s/m the slow pair is outside, |z| = {across.slow_at_first:.4f} at −2 "
+            f"N s/m. From edge to edge it moves by {moves['slow pair']:.3f}, the real one by {moves['real']:.2f}, the "
             f"fast pair by {moves['fast pair']:.2f}",
             across.slow_at_first < 1.0 and moves["real"] < 0.1,
             Reason(
@@ -65,7 +65,7 @@ def figure_5_10() -> list[Row]:
         ),
         Claim(
             "Fig. 5.10",
-            f"point A, here ({K:.1f} N/m, {B:.2f} Ns/m)",
+            f"point A, here ({K:.1f} N/m, {B:.2f} N s/m)",
             "optimal spectral radius; two of the real eigenvalues are collocated",
             f"real eigenvalues {low:.4f}, {double[0]:.5f} and {double[1]:.5f}, a pair of modulus "
             f"{abs(across.pair_at_A):.5f}",
@@ -93,7 +93,7 @@ def figure_5_11() -> list[Row]:
         *(
             Claim(
                 "Fig. 5.11",
-                f"point {name} ({radii.WALLS[name][0]:.0f} N/m, {radii.WALLS[name][1]:.0f} Ns/m)",
+                f"point {name} ({radii.WALLS[name][0]:.0f} N/m, {radii.WALLS[name][1]:.0f} N s/m)",
                 printed,
                 f"ρ = {two[name]:.4f} with two masses, {one[name]:.4f} with the motor's, undamped "
                 f"({damped[name]:.4f} damped)",

@@ -71,16 +71,16 @@ def figure_3_12() -> list[Row]:
             "Fig. 3.12",
             f"one-sided wall, pushed with {touched.PUSH:.0f} N by the passive hand: lower edge",
             "in the negative virtual damping domain",
-            f"{touched.passive.min():.2f} to {touched.passive.max():.2f} Ns/m from {touched.STIFFNESS[0]:.0f} to "
-            f"{touched.STIFFNESS[-1]:.0f} N/m, within {apart:.2f} Ns/m of the two-sided chart's edge",
+            f"{touched.passive.min():.2f} to {touched.passive.max():.2f} N s/m from {touched.STIFFNESS[0]:.0f} to "
+            f"{touched.STIFFNESS[-1]:.0f} N/m, within {apart:.2f} N s/m of the two-sided chart's edge",
             bool((touched.passive < 0.0).all()) and apart < 0.1,
         ),
         Claim(
             "3.3.1",
             "high negative virtual damping",
             "the operator's passive damping cannot explain it; he must compensate actively",
-            f"the passive hand keeps contact down to {touched.passive.min():.1f} Ns/m and no further; a reflex "
-            f"that stiffens it (amounts ours) lowers the edge by {gain.min():.1f} to {gain.max():.1f} Ns/m",
+            f"the passive hand keeps contact down to {touched.passive.min():.1f} N s/m and no further; a reflex "
+            f"that stiffens it (amounts ours) lowers the edge by {gain.min():.1f} to {gain.max():.1f} N s/m",
             bool((gain > 0.2).all()),
         ),
     ]

@@ -6,7 +6,7 @@ import re
 from decimal import Decimal
 from typing import NamedTuple
 
-SI = {"kN/m": 1e3, "N/m": 1.0, "Ns/m": 1.0, "N": 1.0, "kg": 1.0, "g": 1e-3, "ms": 1e-3, "µm": 1e-6, "Hz": 1.0}
+SI = {"kN/m": 1e3, "N/m": 1.0, "N s/m": 1.0, "N": 1.0, "kg": 1.0, "g": 1e-3, "ms": 1e-3, "µm": 1e-6, "Hz": 1.0}
 WORDS = {"one sample": 1.0, "half a sample": 0.5}
 ONE = r"(?<![\w.\[])(\d+(?:\.\d+)?)"
 STATED = re.compile(rf"{ONE} ({'|'.join(SI)})(?![\w/])|(?i:({'|'.join(WORDS)}))|(?<=type ){ONE}")

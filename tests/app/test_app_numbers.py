@@ -46,7 +46,7 @@ def test_keys_on_a_slider_keep_the_focus(page) -> None:
     ("field", "text", "part"),
     [
         ("wall-stiffness", "1e300", 'K of the wall is a number in N/m, such as 4000, up to 1e15; got "1e300"'),
-        ("wall-damping", "3 mm", 'B of the wall is a number in Ns/m, such as 10, up to 1e15; got "3 mm"'),
+        ("wall-damping", "3 mm", 'B of the wall is a number in N s/m, such as 10, up to 1e15; got "3 mm"'),
         ("wall-damping", "", 'got ""'),
         ("goal", "8 N/mm", 'a goal is a stiffness in kN/m, a number above 0 such as 8; got "8 N/mm"'),
     ],

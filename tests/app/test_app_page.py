@@ -22,7 +22,7 @@ def page(browser, workbench):
 def test_the_first_view_is_the_chart_of_python(page) -> None:
     assert page.stiffness_max == pytest.approx(zwidth.load("five-bar").at().chart().stiffness_max, rel=1e-12)
     headline = page.page.locator("#headline").text_content().replace("\u00a0", " ")
-    assert headline == "up to 7.849 kN/m at 10.82 Ns/m of damping; there it oscillates at 170.5 Hz"
+    assert headline == "up to 7.849 kN/m at 10.82 N s/m of damping; there it oscillates at 170.5 Hz"
     assert page.page.title() == "Five-bar – zwidth"
 
 

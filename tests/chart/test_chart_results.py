@@ -108,7 +108,7 @@ def test_a_chart_shows_itself_in_five_lines_with_units(kind):
         assert f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m" in text
         assert f"{chart.frequencies_at_stiffness_max[0]:.6g} Hz" in text.replace(" and", " Hz")
         assert f"{chart.damping_max:.6g} N s/m" in text
-        assert f"{chart.stable_area:.6g} N^2 s/m^2" in text
+        assert f"{chart.stable_area:.6g} N² s/m²" in text
 
 
 def test_an_arc_shows_how_long_it_is_and_where():

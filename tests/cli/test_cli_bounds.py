@@ -71,7 +71,7 @@ def test_the_exact_answer_at_a_damping_is_the_edge(damping):
 
 
 def test_the_thesis_edges_at_4000():
-    """At K = 4000 N/m the edges are at 2.42 and 21.66 Ns/m."""
+    """At K = 4000 N/m the edges are at 2.42 and 21.66 N s/m."""
     for damping in (2.42, 21.66):
         assert document_of("bounds", TWO_MASS, "--damping", damping)["exact_N_per_m"] == pytest.approx(
             4000.0, rel=3e-3
@@ -141,7 +141,7 @@ def test_the_wall_asked_about_is_light_or_not(paddle):
 
 def test_people_read_which_assumptions_are_not_met():
     out = run_command("bounds", TWO_MASS).out
-    assert "exact, at 9.975 Ns/m" in out
+    assert "exact, at 9.975 N s/m" in out
     assert "7.134 kN/m" in out
     assert "1  The device moves along the wall as one rigid mass, tied to nothing." in out
     assert "not applied, because the device lacks what they need:" in out

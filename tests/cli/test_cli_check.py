@@ -16,7 +16,7 @@ HEAD = "stiffness_N_per_m,damping_Ns_per_m\n"
 
 
 def test_the_verdicts_at_the_edges_printed_in_the_thesis(tmp_path):
-    """At K = 4000 N/m the published plant's walls are stable from 2.42 to 21.66 Ns/m."""
+    """At K = 4000 N/m the published plant's walls are stable from 2.42 to 21.66 N s/m."""
     file = tmp_path / "walls.csv"
     file.write_text(HEAD + "4000,2.41\n4000,2.43\n4000,21.65\n4000,21.67\n467.90,21.9465\n0,0\n")
     points = document_of("check", TWO_MASS, "--points", file)["points"]

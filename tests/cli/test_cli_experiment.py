@@ -149,7 +149,7 @@ EDGES = (point(2e3, 1.0, "lower", 1.1), point(2e3, 11.0, "upper", 11.0))
 def test_a_tip_far_off_is_named_before_edges_that_are_near_and_doubts_are_told():
     doubtful = experiment_of(*EDGES, point(5e3, 5.0, "tip", 4e3, True))
     far = dict(experiment_sentences(doubtful))
-    assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 Ns/m")
+    assert far["difference"].startswith("farthest from the exact linear edge is the tip at 5.000 N s/m")
     assert "measured 5.000 kN/m, exact 4.000 kN/m, more is stable" in far["difference"]
     assert far["stiffest"].endswith(", unsure")
     assert far["unsure"].startswith("at 1 tip the verdict changes more than once")
@@ -173,10 +173,10 @@ def test_edges_that_are_unsure_are_marked_as_tips_are():
     [
         (
             [(1500.0, 6.0), (4000.0, 5.0)],
-            "at 2.000 kN/m walls from 1.000 Ns/m to 11.00 Ns/m were stable, although ",
+            "at 2.000 kN/m walls from 1.000 N s/m to 11.00 N s/m were stable, although ",
         ),
-        ([(1500.0, 12.0), (1900.0, 5.0)], "the tip at 5.000 Ns/m is 1.900 kN/m"),
-        ([(1500.0, 12.0)], "the tip at 12.00 Ns/m is 1.500 kN/m"),
+        ([(1500.0, 12.0), (1900.0, 5.0)], "the tip at 5.000 N s/m is 1.900 kN/m"),
+        ([(1500.0, 12.0)], "the tip at 12.00 N s/m is 1.500 kN/m"),
         ([(1500.0, 6.0), (1500.0, 7.0)], "(2 tips lie below edges)"),
     ],
 )

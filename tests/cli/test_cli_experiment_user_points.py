@@ -35,7 +35,7 @@ def edge(low, high):
 
 
 def in_words(damping):
-    return amount(damping, "Ns/m")
+    return amount(damping, "N s/m")
 
 
 def points_report(tmp_path, text, drawn=True):

@@ -40,7 +40,7 @@ def test_the_promised_keys_with_two_springs_in_series():
 def test_people_read_the_same():
     out = run_command("felt", TWO_MASS, *WALL).out
     for row in (
-        "wall                  4.000 kN/m, 10.00 Ns/m: stable",
+        "wall                  4.000 kN/m, 10.00 N s/m: stable",
         "felt at rest          3.185 kN/m (79.61 % of it)",
         "felt in free motion   0.2870 kg",
         "no wall is felt above  15.62 kN/m",

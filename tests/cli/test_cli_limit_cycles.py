@@ -69,7 +69,7 @@ def test_the_numbers_are_those_of_the_package(cycle_prediction):
 
 def test_people_read_the_same():
     out = " ".join(run_command("limit-cycles", ONE_MASS, *ROUGH_AND_LIMITED).out.split())
-    assert "2.600 kN/m, 0 Ns/m: unstable if linear" in out
+    assert "2.600 kN/m, 0 N s/m: unstable if linear" in out
     assert "nonlinear parts dry friction, encoder steps, the force limit" in out
     assert "rests under every push on walls up to 3.000 kN/m" in out
     assert "450.8 µm 46.51 Hz" in out

@@ -129,7 +129,7 @@ def test_moments_have_their_units(tmp_path):
     assert document["wall_force_Nm"][0] == pytest.approx(0.2)
     assert {"stiffness_max_Nm_per_rad", "one_sided_amplitude_rad"} <= set(document)
     assert not {key for key in document if key.endswith(("_N", "N_per_m"))}
-    assert re.search(r"^ -0.2 Nm +\S+ kNm/rad", run_command("load", file, *words).out, re.MULTILINE)
+    assert re.search(r"^ -0.2 N m +\S+ kN m/rad", run_command("load", file, *words).out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_show_says_who_carries_what():
     told = run_command(*words).out
     assert re.search(r"balance +wall 5.005 N, hand \(-0.002916, -5\) N, of which \(-0.002916, 0\) N across", told)
     torque = found.equilibrium.torques[0] / found.equilibrium.ratio[0]
-    assert re.search(rf"motor motor-right +{torque:.4g}\d* Nm, its drive bent by", told)
+    assert re.search(rf"motor motor-right +{torque:.4g}\d* N m, its drive bent by", told)
     document = document_of(*words)
     assert document["equilibrium"]["hand_force_N"] == found.equilibrium.hand_force.tolist()
     assert "equilibrium" not in document_of("show", MECHANISM)
@@ -191,7 +191,7 @@ def test_the_equilibrium_of_moments_keeps_forces_and_places_in_space(tmp_path):
         equilibrium = document_of(command, file, *words)["equilibrium"]
         assert {"hand_force_N", "position_m", "counted_position_m", "wall_force_Nm"} <= set(equilibrium)
         assert not {"angle_rad", "hand_force_Nm", "wall_force_N"} & set(equilibrium)
-    assert "under a moment of -0.2 Nm about the axis" in run_command("chart", file, *words).out
+    assert "under a moment of -0.2 N m about the axis" in run_command("chart", file, *words).out
 
 
 def test_a_map_counts_and_hatches_what_has_no_equilibrium(tmp_path):

@@ -66,7 +66,7 @@ def test_parameters_come_by_their_option_and_by_those_of_walls():
     motion = move_from_python(package.contact.SurfaceEnvironment(ENVIRONMENTS["slot"], values))
     assert document["force_N"] == motion.force.tolist()
     out = run_command("move", MECHANISM, *PLANE, *PUSH, *words, "--no-pull").out
-    said = "slot: width 4.000 mm, stiffness 1.000 kN/m, damping 3.000 Ns/m, no pull"
+    said = "slot: width 4.000 mm, stiffness 1.000 kN/m, damping 3.000 N s/m, no pull"
     assert said in " ".join(out.split())
 
 

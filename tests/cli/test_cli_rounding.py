@@ -25,8 +25,8 @@ COMMANDS = {
 }
 UNITS = {
     "_N_per_m": "N/m",
-    "_Ns_per_m": "Ns/m",
-    "_N2s_per_m2": "N²s/m²",
+    "_Ns_per_m": "N s/m",
+    "_N2s_per_m2": "N² s/m²",
     "_Hz": "Hz",
     "_kg": "kg",
     "_s": "s",
@@ -37,7 +37,7 @@ LONGEST = 30
 PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 NUMBER = re.compile(
     r"(?<![\w.])(?P<digits>\d+\.?\d*)(?: ?× ?10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
-    r"(?: (?P<prefix>[nµmkM]?)(?P<unit>N/m|Ns/m|N²s/m²|Hz|kg|s|m|J|%|×)(?![\w²/]))?"
+    r"(?: (?P<prefix>[nµmkM]?)(?P<unit>N/m|N s/m|N² s/m²|Hz|kg|s|m|J|%|×)(?![\w²/]))?"
 )
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 BLANKS = str.maketrans("\u00a0\u2009\u2212", "  -")
@@ -134,7 +134,7 @@ def test_no_number_is_printed_in_two_roundings(figure_texts, tmp_path):
     }
     assert not wrong, sorted(wrong)
     seen = {text for written in texts.values() for text, *_ in numbers(written)}
-    assert {"7.134 kN/m", "9.975 Ns/m", "174.5 Hz"} <= seen  # the numbers are found at all
+    assert {"7.134 kN/m", "9.975 N s/m", "174.5 Hz"} <= seen  # the numbers are found at all
 
 
 def _is_rounded(value: float, size: float) -> bool:

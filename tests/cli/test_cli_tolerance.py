@@ -79,7 +79,7 @@ def test_the_answer_in_sentences(folder):
     assert "plant.mass_kg uniform, 0.08 to 0.12 kg" in told
     (wall,) = [line for line in told if line.startswith("the wall")]
     number = re.fullmatch(
-        r"the wall 62\.00 kN/m at 90\.00 Ns/m is stable in ([\d.]+) % \(([\d.]+) to ([\d.]+) %\) of those that "
+        r"the wall 62\.00 kN/m at 90\.00 N s/m is stable in ([\d.]+) % \(([\d.]+) to ([\d.]+) %\) of those that "
         r"are produced",
         wall,
     )
@@ -96,11 +96,11 @@ def test_the_answer_in_sentences(folder):
 
 def test_a_wall_that_all_render_or_none(folder):
     told = lines(study(folder, MASS, wall="stiffness_N_per_m = 1000\ndamping_Ns_per_m = 30\n"))
-    place = "the wall 1.000 kN/m at 30.00 Ns/m"
+    place = "the wall 1.000 kN/m at 30.00 N s/m"
     assert f"{place} is stable in all of them, so in at least 96.38 % of all that are produced" in told
     assert told[-1] == "every one of 100 devices renders the wall: nothing is to be tightened for it"
     told = lines(study(folder, MASS, wall="stiffness_N_per_m = 300000\ndamping_Ns_per_m = 30\n"))
-    place = "the wall 300.0 kN/m at 30.00 Ns/m"
+    place = "the wall 300.0 kN/m at 30.00 N s/m"
     assert f"{place} is stable in none of them, so in at most 3.622 % of all that are produced" in told
     assert told[-1].startswith("no narrower tolerance helps this wall, for it is unstable in the middle")
 
@@ -110,7 +110,7 @@ ON_THE_LIMIT = "within rounding of the stability limit"  # which passes through 
 
 def test_a_wall_that_is_undecided_is_said_to_be(folder):
     told = lines(study(folder, MASS, wall="stiffness_N_per_m = 0\ndamping_Ns_per_m = 0\n"))
-    place = "the wall 0 N/m at 0 Ns/m"
+    place = "the wall 0 N/m at 0 N s/m"
     assert f"{place} is undecided in all of them, {ON_THE_LIMIT}: its probability is not known" in told
     assert "no index of wall_is_stable: 192 of 192 verdicts are undecided" in told
     assert told[-1].startswith("which tolerance to tighten first is not known, for the wall lies on the stability")
@@ -142,7 +142,7 @@ def test_a_wall_that_is_undecided_in_some_devices_says_in_how_many(
     values[:, n] = np.repeat([1.0, 0.0, np.nan], [stable, unstable, undecided])
     status[:, n] = np.repeat([OK, OK, UNDECIDED], [stable, unstable, undecided])
     some = replace(found, cells=replace(found.cells, values=values, status=status))
-    place = "the wall 62.00 kN/m at 90.00 Ns/m"
+    place = "the wall 62.00 kN/m at 90.00 N s/m"
     assert wall_sentence(some) == f"{place} is {known}, {ON_THE_LIMIT}: in {part} of those that are produced"
     assert f"undecided in {undecided} devices" in repr(some)
     labels = [text.get_text() for text in some.plot().get_legend().get_texts()]

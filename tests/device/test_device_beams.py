@@ -80,7 +80,7 @@ FAULTS = {
     "length 0": (of_link(0, length_m=0.0), f"{UPPER}.length_m", "is the length of the beam, and must be above 0"),
     "no length": (left_out(0, "length_m"), f"{UPPER}.length_m", "leave beam out of a rigid link"),
     "too heavy": (of_link(1, mass_kg=0.001), f"{LOWER}.mass_kg", "the beam alone weighs 0.0152681 kg"),
-    "inertia": (of_link(1, inertia_kg_m2=1e-6), f"{LOWER}.inertia_kg_m2", "leaves -5.909e-05 kg m^2 for what"),
+    "inertia": (of_link(1, inertia_kg_m2=1e-6), f"{LOWER}.inertia_kg_m2", "leaves -5.909e-05 kg m² for what"),
     "modes of a lump": (
         beam(method="lumped", modes=2),
         f"{UPPER}.beam.modes",
@@ -266,7 +266,7 @@ SLIPS = {
     "g/cm^3": (
         beam(material={"youngs_modulus_Pa": 70e9, "shear_modulus_Pa": 26e9, "density_kg_per_m3": 2.7}),
         f"{UPPER}.beam.material.density_kg_per_m3",
-        "if it is in g/cm^3, write 2700",
+        "if it is in g/cm³, write 2700",
     ),
 }
 

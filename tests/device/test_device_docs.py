@@ -11,6 +11,7 @@ import pytest
 
 from zwidth.device import from_document, validation_messages
 from zwidth.device.schema import device_file as schema
+from zwidth.unit_text import unit_text
 
 PAGE = (Path(__file__).parents[2] / "docs" / "device-files.md").read_text(encoding="utf-8")
 
@@ -61,7 +62,9 @@ def rows(path: tuple[str | int, ...]) -> list[str]:
             needed = "required" if key in found.get("required", ()) else ""
             shown = f"`{json.dumps(default)}`" if default not in (None, {}, [], "") else ""
             meaning = value["description"]
-            lines.setdefault(key, f"| `{key}` | {value.get('unit', '')} | {meaning} | {needed or shown} |")
+            lines.setdefault(
+                key, f"| `{key}` | {unit_text(value.get('unit', ''))} | {meaning} | {needed or shown} |"
+            )
     return list(lines.values())
 
 

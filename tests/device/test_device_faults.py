@@ -112,19 +112,19 @@ CASES = [
         ARM_FILE,
         {"mechanism__links__0__inertia_kg_m2": 1e13},
         "mechanism.links.upper.inertia_kg_m2",
-        "must be 0 (no inertia) or between 1e-18 and 1e+12 kg m^2, got 1e+13; is the unit right?",
+        "must be 0 (no inertia) or between 1e-18 and 1e+12 kg m², got 1e+13; is the unit right?",
     ),
     (
         ARM_FILE,
         {"mechanism__links__0__inertia_kg_m2": [1e-20, 1e-20, 1e-20]},
         "mechanism.links.upper.inertia_kg_m2",
-        "between 1e-18 and 1e+12 kg m^2, got 1e-20",
+        "between 1e-18 and 1e+12 kg m², got 1e-20",
     ),
     (
         ARM_FILE,
         {"mechanism__drives__0__motor_inertia_kg_m2": 1e-200},
         "mechanism.drives.shoulder.motor_inertia_kg_m2",
-        "must be 0 (no inertia) or between 1e-18 and 1e+12 kg m^2, got 1e-200",
+        "must be 0 (no inertia) or between 1e-18 and 1e+12 kg m², got 1e-200",
     ),
     (
         ARM_FILE,

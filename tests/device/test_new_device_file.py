@@ -14,7 +14,7 @@ from zwidth.device.read import KINDS
 OPTIONAL = re.compile(r"^#(?=[a-z\[])", re.MULTILINE)
 UNIT = re.compile(r"\w+?_(kg_m2|kg|m|s|N|rad|samples|Nm|N_per_m|Ns_per_m|Nm_per_rad|Nm_per_A) =")
 UNITS = {
-    "kg_m2": "kg m^2",
+    "kg_m2": "kg m²",
     "kg": "kg",
     "m": "m",
     "s": "s",

@@ -306,7 +306,7 @@ def test_a_loop_says_what_is_in_it():
     assert "feedforward of 0.1 kg, 0.5 N s/m, 0.2 N of dry friction" in texts
     assert "a local loop at 10 times the rate (2 N s/m)" in texts
     about_an_axis = controller.feedback_texts(moments=True)
-    assert "feedforward of 0.1 kg m^2, 0.5 N m s/rad, 0.2 N m of dry friction" in about_an_axis
+    assert "feedforward of 0.1 kg m², 0.5 N m s/rad, 0.2 N m of dry friction" in about_an_axis
     assert controller.wall_alone == Controller(T)
 
 

@@ -58,7 +58,7 @@ def test_crossings_are_on_the_circle_and_count_the_roots_outside():
 
 
 def test_the_edges_of_the_published_chart():
-    """Thesis Fig. 5.10: at 4000 N/m damping is stable between 2.42 and 21.66 Ns/m."""
+    """Thesis Fig. 5.10: at 4000 N/m damping is stable between 2.42 and 21.66 N s/m."""
     loop = published()
     found = wall_paths(loop, 4000.0, np.linspace(-2.0, 35.0, 30))
     inside = [one for one in found.crossings if one.value > 1.0]

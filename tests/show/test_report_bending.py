@@ -236,8 +236,8 @@ def test_a_wall_of_moments_has_its_units_and_tubes_keep_theirs():
     with speaking_of_moments(True):
         said = typed(" ".join(section.sentences(of)))
         (row,) = section.tubes(of)
-    assert "from 29.35 Nm/rad with rigid links to 29.04 Nm/rad" in said
-    assert "felt stiffer than 117.2 Nm/rad" in said
+    assert "from 29.35 N m/rad with rigid links to 29.04 N m/rad" in said
+    assert "felt stiffer than 117.2 N m/rad" in said
     assert typed(row[1]) == "75.00 mm"
     document = keys_of_moments({"bending": json_value(of.bending.document())})["bending"]
     assert document["bent"]["stiffness_max_Nm_per_rad"] == of.bending.bent.stiffness_max

@@ -65,8 +65,8 @@ def test_a_chart_says_what_it_shows(saved, tmp_path, options, words):
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (("felt", "hapkit-course", "--stiffness", "500", "--damping", "2"), "wall of 500 N/m and 2 Ns/m"),
-        (("simulate", "hapkit-course", "--stiffness", "500", "--damping", "2"), "wall of 500 N/m and 2 Ns/m"),
+        (("felt", "hapkit-course", "--stiffness", "500", "--damping", "2"), "wall of 500 N/m and 2 N s/m"),
+        (("simulate", "hapkit-course", "--stiffness", "500", "--damping", "2"), "wall of 500 N/m and 2 N s/m"),
         (("guarantees", "hapkit-course", "--operator", "course-hand"), "Hapkit, course model sampled every 1 ms"),
         (("robust", "hapkit-course", "--range", "loop.delay_samples=0,1", "--members", "4", "--unseen", "4"),
          "varied: loop.delay_samples"),
@@ -102,9 +102,9 @@ def test_results_remember_where_they_were_computed():
         assert words in chart
     assert "encoder steps, the force limit" in chart
     assert "held by" not in said(point.guarantees())
-    assert "wall of 1 kN/m and 5 Ns/m" in said(point.felt(1000.0, 5.0))
+    assert "wall of 1 kN/m and 5 N s/m" in said(point.felt(1000.0, 5.0))
     motion = point.simulate(1000.0, 5.0, duration=0.05)
-    assert "wall of 1 kN/m and 5 Ns/m" in said(motion)
+    assert "wall of 1 kN/m and 5 N s/m" in said(motion)
     assert "linear" not in said(motion)
     study = study_over(zwidth.load("hapkit-course"), {"loop.delay_samples": [0, 1]}, "stiffness_max")
     assert said(zwidth.run_study(study)).endswith("varied: loop.delay_samples")

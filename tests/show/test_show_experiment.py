@@ -35,7 +35,7 @@ def test_bars_run_along_what_was_bisected_and_only_where_trials_differ():
 def test_axes_legend_and_window():
     ax = draw_points(stability_chart(published(), decay=False), USER_POINTS)
     assert ax.get_xlabel() == "Virtual stiffness K [kN/m]"
-    assert ax.get_ylabel() == "Virtual damping B [Ns/m]"
+    assert ax.get_ylabel() == "Virtual damping B [N s/m]"
     told = [text.get_text() for text in ax.get_legend().get_texts()]
     assert told == [
         "stable, exact and linear",

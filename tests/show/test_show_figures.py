@@ -67,7 +67,7 @@ def test_the_tip_is_marked_with_its_numbers(chart):
         [[chart.stiffness_max, chart.damping_at_stiffness_max]]
     ]
     text = " ".join(legend_text(ax)).replace("\u00a0", " ")
-    assert "7.849 kN/m at 10.82 Ns/m; oscillates at 170.5 Hz" in text
+    assert "7.849 kN/m at 10.82 N s/m; oscillates at 170.5 Hz" in text
 
 
 def test_the_window_is_the_box_or_the_one_asked_for(chart):
@@ -266,7 +266,7 @@ def test_the_row_shows_its_numbers():
     _, ax = figure(5.0, 2.0)
     draw_chain(ax, plant, as_chain(plant))
     texts = {text.get_text().replace("\u00a0", " ") for text in ax.texts}
-    assert {"0.2616 kg", "0.0254 kg", "15.62 kN/m", "1.8744 Ns/m", "handle", "wall acts\nencoder"} == texts
+    assert {"0.2616 kg", "0.0254 kg", "15.62 kN/m", "1.8744 N s/m", "handle", "wall acts\nencoder"} == texts
 
 
 @pytest.mark.parametrize("kind", [".png", ".svg", ".pdf"])

@@ -232,7 +232,7 @@ def test_the_section_says_who_carries_what_and_what_it_changes():
     text = told(facts("five-bar", {"load.push_N": -5.0}))
     assert "in balance under a push of -5 N along the direction: the hand gives (-0.002916, -5) N" in text
     assert (
-        "the wall 5.005 N along the direction, and the motors motor-right 0.02440 Nm, motor-left -0.02444 Nm"
+        "the wall 5.005 N along the direction, and the motors motor-right 0.02440 N m, motor-left -0.02444 N m"
         in text
     )
     assert "Of the hand's force (-0.002916, 0) N is across the direction" in text

@@ -82,8 +82,8 @@ BY_SPRING = "it is its flexibility, at 130.7 Hz: with a rigid structure, which c
 ONE_LATE = "with one sample of delay it would"
 
 STIFFNESS_SENTENCES = [
-    (lambda: facts("five-bar"), f"{FIVE_BAR_OPENING} 7.849 kN/m, at 10.82 Ns/m of virtual damping."),
-    (lambda: facts("five-bar", LATE), f"{FIVE_BAR_OPENING} 1.708 kN/m, at 3.216 Ns/m of virtual damping."),
+    (lambda: facts("five-bar"), f"{FIVE_BAR_OPENING} 7.849 kN/m, at 10.82 N s/m of virtual damping."),
+    (lambda: facts("five-bar", LATE), f"{FIVE_BAR_OPENING} 1.708 kN/m, at 3.216 N s/m of virtual damping."),
     (
         lambda: facts("five-bar", position=(0.02, 0.2), direction=(-1.0, 0.0)),
         "Along −x at (0.02, 0.2) m this device renders walls of up to ",
@@ -94,7 +94,7 @@ STIFFNESS_SENTENCES = [
     ),
     (
         lambda: facts("hapkit-course"),
-        "This device renders walls of up to 21.94 kN/m, at 24.66 Ns/m of virtual damping.",
+        "This device renders walls of up to 21.94 kN/m, at 24.66 N s/m of virtual damping.",
     ),
     (
         lambda: facts("hapkit-course", FILTER),
@@ -284,10 +284,10 @@ def test_differences_in_words(ratio, text):
 
 def test_the_fastest_wall():
     assert plain(sentences.decay(facts("five-bar"))) == (
-        "A wall of 500.0 N/m and 22.50 Ns/m comes to rest fastest: a tenth is left after 48.33 ms."
+        "A wall of 500.0 N/m and 22.50 N s/m comes to rest fastest: a tenth is left after 48.33 ms."
     )
     negative = plain(sentences.decay(facts("five-bar", model="motor-mass")))
-    assert re.match(r"A wall of 0 N/m and \S+ Ns/m comes to rest fastest: a tenth is left after", negative)
+    assert re.match(r"A wall of 0 N/m and \S+ N s/m comes to rest fastest: a tenth is left after", negative)
     assert "; with negative stiffness or damping allowed, a wall of -" in negative.replace("\u2212", "-")
     assert sentences.decay(facts("published-two-mass", UNDAMPED, LATE)) == ""
 

@@ -41,7 +41,7 @@ def test_keys_and_tables_say_so(tmp_path):
         '[[axis]]\nkey = "loop.sampling_period_s"\nvalues = [0.001, 0.002]\n'
     )
     assert document_of("sweep", str(study))["units"] == {"stiffness_max": "Nm/rad", "rigid_mass": "kg m^2"}
-    assert "stiffness_max [Nm/rad]" in run_command("sweep", str(study)).out
+    assert "stiffness_max [N m/rad]" in run_command("sweep", str(study)).out
     run_command("sweep", str(study), "--output", str(tmp_path / "out.csv"))
     header = (tmp_path / "out.csv").read_text().splitlines()[0]
     assert "stiffness_max_Nm_per_rad" in header
@@ -78,8 +78,8 @@ def test_python_writes_the_report_that_the_command_writes(tmp_path, monkeypatch)
 def test_a_figure_drawn_from_python_has_the_units_of_moments():
     chart = zwidth.load(WRIST).at().chart()
     axes = chart.plot(Figure().add_subplot())
-    assert "Nm/rad]" in axes.get_xlabel()
-    assert "Nms/rad]" in axes.get_ylabel()
+    assert "N m/rad]" in axes.get_xlabel()
+    assert "N m s/rad]" in axes.get_ylabel()
 
 
 def test_a_push_about_an_axis_is_a_moment_in_what_a_study_says_of_itself():
