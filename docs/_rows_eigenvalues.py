@@ -54,8 +54,8 @@ def figure_5_10() -> list[Row]:
             "the other eigenvalues, damping from −2 to 35 N s/m",
             "remain inside and change very little",
             f"below {slow.value:.2f} N s/m the slow pair is outside, |z| = {across.slow_at_first:.4f} at −2 "
-            f"N s/m. From edge to edge it moves by {moves['slow pair']:.3f}, the real one by {moves['real']:.2f}, the "
-            f"fast pair by {moves['fast pair']:.2f}",
+            f"N s/m. From edge to edge it moves by {moves['slow pair']:.3f}, the real one by {moves['real']:.2f}, "
+            f"the fast pair by {moves['fast pair']:.2f}",
             across.slow_at_first < 1.0 and moves["real"] < 0.1,
             Reason(
                 UNEXPLAINED,

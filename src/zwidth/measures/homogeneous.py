@@ -101,8 +101,8 @@ def scaled_jacobian(jacobian: ArrayLike, largest_velocities: ArrayLike, largest_
     coordinates; of their text only the beginning could be read.
 
     Singular values above 1 mean that the drives together reach more than the wanted velocity. Invariant to every
-    unit, and to the coordinates of the drives as far as each is scaled by itself (a transmission ratio). Forces,
-    mass matrices and other design matrices are scaled in the same way, each side by its coordinates' largest values.
+    unit, and to the coordinates of the drives as far as each is scaled by itself (a ratio). Forces, mass
+    matrices and other design matrices are scaled in the same way, each side by its coordinates' largest values.
 
     jacobian            (..., m, n)  in any units
     largest_velocities  (..., m)     wanted of each coordinate of the handle, in the units of J's rows times rates
