@@ -1,4 +1,4 @@
-"""Felt stiffness at rest, and its limit for a wall without end, against exact fractions and closed forms."""
+"""Felt stiffness at rest, and its limit for an infinitely stiff wall, against exact fractions and closed forms."""
 
 from __future__ import annotations
 

@@ -45,10 +45,10 @@ from zwidth.model.plant import Plant
 from zwidth.result import Result
 
 LIMIT_HEADINGS: Final[dict[LimitKind, str]] = {
-    "bound": "no wall is felt above",
-    "limit": "a wall without end is felt with",
-    "infinite": "a wall without end is felt with",
-    "unknown": "a wall without end is felt with",
+    "bound": "the structure itself has",
+    "limit": "an infinitely stiff wall is felt with",
+    "infinite": "an infinitely stiff wall is felt with",
+    "unknown": "an infinitely stiff wall is felt with",
 }
 LIMIT_WORDS: Final[dict[LimitKind, str]] = {
     "infinite": "no limit: nothing gives way between sensor and handle",
@@ -68,7 +68,7 @@ class FeltWall(Result):
                                          ground
     stiffness_max                        of the stiffest stable wall [N/m]; None: none has K > 0 and B >= 0
     static_stiffness_at_stiffness_max    felt stiffness of that wall [N/m]; None as before
-    static_stiffness_limit               felt stiffness of a wall without end [N/m]; inf where nothing gives way
+    static_stiffness_limit               felt, of an infinitely stiff wall [N/m]; inf where nothing gives way
     static_stiffness_limit_kind          "bound": no wall is felt stiffer; "limit": walls of finite stiffness
                                          may be; "infinite"; "unknown": errors of a measurement hide it
     frequency                            (k,)  [Hz]
@@ -306,7 +306,7 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
     >>> felt_wall(OperatingPoint(Controller(0.00125), given_plant=pair), 4000.0, 10.0)
     FeltWall: 4000 N/m, 10 N s/m, stable
       felt at rest with 3185 N/m
-      stiffest stable wall 7134 N/m, felt with 4897 N/m; no wall is felt above 1.562e+04 N/m
+      stiffest stable wall 7134 N/m, felt with 4897 N/m; the structure itself has 1.562e+04 N/m
       free motion 0.287 kg
       impedances at 400 frequencies from 0.4 to 399.6 Hz
     """
@@ -354,7 +354,7 @@ class FeltChart(Result):
     regions        closed rings (k, 2) of [felt stiffness, wall damping], counter-clockwise
     boundary       the arcs of the stable set's edge with K >= 0; `stiffness` is the felt one
     stiffness_max  felt stiffness of the stiffest stable wall with B >= 0 [N/m]; nan if there is none
-    limit          felt stiffness of a wall without end [N/m]; inf where nothing gives way
+    limit          felt stiffness of an infinitely stiff wall [N/m]; inf where nothing gives way
     limit_kind     "bound": no wall is felt stiffer; "limit": walls of finite stiffness may be; "infinite"
     """
 

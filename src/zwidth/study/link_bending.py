@@ -83,8 +83,8 @@ class BendingNumbers:
     """Of a device with bending or with rigid links.
 
     chart             its stable walls; None where they could not be computed
-    static_stiffness  at the handle, of a wall without end, the motors held and no load [N/m]; inf where nothing
-                      gives; nan where there is no equilibrium
+    static_stiffness  at the handle, of an infinitely stiff wall, the motors held and no load [N/m]; inf where
+                      nothing gives; nan where there is no equilibrium
     first_mode        lowest natural frequency of a mode that the wall moves, nobody at the handle [Hz]; nan where
                       there is none
     reason            why there is no largest stiffness; "" where there is one

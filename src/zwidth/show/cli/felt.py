@@ -90,4 +90,5 @@ def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
         hardest = amount(felt_wall.static_stiffness_at_stiffness_max, "N/m")
         yield "hardest felt contact", f"{hardest}, of a wall of {amount(felt_wall.stiffness_max, 'N/m')}"
     kind = felt_wall.static_stiffness_limit_kind
-    yield LIMIT_HEADINGS[kind], LIMIT_WORDS.get(kind) or amount(felt_wall.static_stiffness_limit, "N/m")
+    limit = LIMIT_WORDS.get(kind) or amount(felt_wall.static_stiffness_limit, "N/m")
+    yield LIMIT_HEADINGS[kind], f"{limit}: nothing stiffer is felt" if kind == "bound" else limit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 
@@ -22,6 +22,7 @@ from zwidth.show.cli.options import (
     with_settings_option,
 )
 from zwidth.show.output import destination, printable, write_text
+from zwidth.show.units import typed, uncertain
 from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
@@ -64,6 +65,9 @@ spring_option = click.option(
 def segment_option(shortest: int, what: str) -> Callable[[Any], Any]:
     """`--segment SAMPLES`, from a shortest one on, and what it is with its default."""
     return click.option("--segment", metavar="SAMPLES", type=click.IntRange(shortest), help=what)
+
+
+MOST_EXPLAINED: Final = 0.999  # share of the variance beyond which more digits say nothing
 
 
 class IdentifyCommand(Command):
@@ -148,7 +152,7 @@ class IdentifyCommand(Command):
             ["number", "value", "95 %", "unit", "in the file"], [_row(one) for one in result.listed]
         )
         share = result.validation
-        explained = f"{100.0 * share:.6g} % of the variance explained, " if share == share else ""
+        explained = f"{_explained(share)} of the variance explained, " if share == share else ""
         yield f"validation: {explained}{result.validated_on}"
         yield from result.remarks
         yield from result.left_out
@@ -216,6 +220,10 @@ _write = click.Option(
     is_flag=True,
     help="Write the numbers into DEVICE, with their intervals under [sources]; all else in it stays as it is.",
 )
+
+
+def _explained(share: float) -> str:
+    return "over 99.9 %" if share > MOST_EXPLAINED else f"{typed(uncertain(100.0 * share))} %"
 
 
 def _row(estimate: Estimate) -> tuple[str, ...]:

@@ -125,7 +125,7 @@ class LoadCommand(Command):
             [_chart_row(step, free) for step in result.steps],
         )
         yield answer_table(
-            ["push", "wall", "hand across", "sideways growth", "doubles in", "one-sided below F/K"],
+            ["push", "wall", "hand across", "sideways growth", "doubles in", "keeps contact below"],
             [_balance_row(step) for step in result.steps],
         )
         yield from map(typed, path_sentences(result))

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 MOST: Final = 100_000  # members, or unseen ones
 BINDING_ROWS: Final = 12  # binding members in what people read
+LEAST_SHARE: Final = 1e-4  # of the edge, that is given as a number
 ARGUMENT_NAMES: Final = {"Device.with_": "--set", "logarithmic": "log"}  # arguments of a range, as typed
 
 
@@ -162,7 +163,7 @@ class RobustCommand(Command):
         shares = result.edge_shares
         paths = list(result.members[0])
         rows = [
-            [str(index), *(printable(value_text(result.members[index][p])) for p in paths), typed(percent(share))]
+            [str(index), *(printable(value_text(result.members[index][p])) for p in paths), _share(share)]
             for index, share in list(shares.items())[:BINDING_ROWS]
         ]
         yield answer_table(["limiting member", *paths, "share of the edge"], rows)
@@ -266,6 +267,10 @@ def _member(study: RobustStudy, member: int) -> str:
     return "the ungripped device" if operator == NOBODY else f"the device held by {operator_text(str(operator))}"
 
 
+def _share(share: float) -> str:
+    return "under 0.01 %" if 0.0 < share < LEAST_SHARE else typed(percent(share))
+
+
 def _members_text(study: RobustStudy) -> str:
     count, edge_change = len(study.members), f"{typed(uncertain(100 * study.area_change))} %"
     if study.violation is None:
@@ -274,11 +279,17 @@ def _members_text(study: RobustStudy) -> str:
             if not study.chart.failed
             else f"{count}, {len(study.chart.charted)} charted"
         )
-    if study.settled:
-        end = f"the search converged: its last round moved the edge by {edge_change} of the area"
-    else:
-        end = f"the search used up --members {count} and had still moved the edge by {edge_change}"
-    return f"{count}, of which {count - study.sampled} found by searching the ranges for worse cases; {end}"
+    found = count - study.sampled
+    worse = (
+        f"{found} of them found by searching the ranges for worse ones" if found else "a search found none worse"
+    )
+    if not study.settled:
+        worse += (
+            f"; --members {count} ended the search, whose last round moved the edge by {edge_change} of the area"
+        )
+    elif study.area_change:
+        worse += f"; its last round moved the edge by {edge_change} of the area"
+    return f"{count} charted, {worse}"
 
 
 def _violation(violation: Violation) -> str:

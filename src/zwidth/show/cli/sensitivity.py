@@ -10,7 +10,7 @@ import click
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.options import Finite
-from zwidth.show.units import amount, as_written, signed, typed
+from zwidth.show.units import amount, as_written, number, signed, typed
 from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
@@ -148,23 +148,24 @@ def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
         yield f"{more} more; show them with --top N, or get all with --json or --output"
     near = next((one for one in goal.numbers if one.status == "out of range"), None)
     if near is not None and near.value != near.now:
-        value = f"{typed(as_written(near.value))} {unit_text(near.unit)}".rstrip()
+        value = f"{typed(number(near.value))} {unit_text(near.unit)}".rstrip()
         reached = amount(near.stiffness_max, "N/m")
         yield f"of the others {near.path} comes nearest, {reached} with {value}"
 
 
-def _goal_row(number: GoalNumber) -> tuple[str, str, str, str]:
-    now, wanted = (f"{typed(as_written(v))} {unit_text(number.unit)}".rstrip() for v in (number.now, number.value))
-    return number.path, now, wanted, amount(number.factor) if number.factor == number.factor else ""
+def _goal_row(one: GoalNumber) -> tuple[str, str, str, str]:
+    unit = unit_text(one.unit)
+    now, wanted = f"{typed(as_written(one.now))} {unit}".rstrip(), f"{typed(number(one.value))} {unit}".rstrip()
+    return one.path, now, wanted, amount(one.factor) if one.factor == one.factor else ""
 
 
-def _row(sensitivities: Sensitivities, number: Sensitivity) -> tuple[str, str, str, str]:
+def _row(sensitivities: Sensitivities, one: Sensitivity) -> tuple[str, str, str, str]:
     assert sensitivities.peak is not None
-    gain = 0.01 * number.logarithmic * sensitivities.peak.stiffness
+    gain = 0.01 * one.logarithmic * sensitivities.peak.stiffness
     return (
-        number.path,
-        f"{typed(as_written(number.value))} {unit_text(number.unit)}".rstrip(),
-        typed(signed(number.logarithmic)),
+        one.path,
+        f"{typed(as_written(one.value))} {unit_text(one.unit)}".rstrip(),
+        typed(signed(one.logarithmic)),
         f"{'+' if gain > 0.0 else ''}{amount(gain, 'N/m')}",
     )
 

@@ -427,7 +427,7 @@ def felt(facts: Facts) -> str:
         "bound": f"whatever is commanded, nothing stiffer than {quantity(limit, 'N/m')} can be felt",
         "infinite": "nothing between wall and handle bounds what can be felt",
     }
-    end = ends.get(facts.felt.limit_kind, f"a wall without end would be felt as {quantity(limit, 'N/m')}")
+    end = ends.get(facts.felt.limit_kind, f"an infinitely stiff wall would be felt as {quantity(limit, 'N/m')}")
     return f"At rest the stiffest wall is felt as {quantity(stiffest, 'N/m')}, {share} of its stiffness; {end}."
 
 
