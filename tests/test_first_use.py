@@ -14,6 +14,7 @@ from time import sleep
 
 import numpy as np
 import pytest
+from cli.command_runner import document_of
 
 from zwidth import compile_events, machine_code
 from zwidth import compiled as compiled_module
@@ -49,6 +50,11 @@ def total(pair: Pair) -> float:
     for x in pair.first:
         sum += twice(x)
     return sum
+
+@compiled
+def ratio_of_parts(x: float) -> float:
+    number = complex(x, 0.0)
+    return number.real / number.imag
 '''
 CALL = """
 import numpy as np, kernels
@@ -57,9 +63,26 @@ names = []
 with listening(lambda name, ended: ended and names.append(name)):
     print(kernels.total(kernels.Pair(np.ones(4), np.zeros(4))), names)
 """
+STEPS = """
+import sys, numpy as np, kernels
+names, pair = [], kernels.Pair(np.ones(4), np.zeros(4))
+sys.settrace(lambda frame, event, argument: names.append(frame.f_code.co_name))
+total = kernels.total(pair)
+sys.settrace(None)
+print(total, *dict.fromkeys(names), kernels.ratio_of_parts(2.0))
+"""
+SHORT_RUN = ["simulate", "hapkit-course", "--stiffness", "300", "--damping", "1", "--duration", "0.05", "--json"]
 needs_parts = pytest.mark.skipif(
     not can_be_taken_apart(), reason="another release of numba: its own cache is used"
 )
+
+
+def run_python(folder: Path, *words: str, **variables: str) -> str:
+    """Standard output of a new interpreter in a folder that keeps its compiled kernels, too."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **variables}
+    done = subprocess.run([sys.executable, *words], cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
 
 
 @pytest.fixture
@@ -72,14 +95,22 @@ def call(tmp_path):
             assert old in text
             text = text.replace(old, new)
         (tmp_path / "kernels.py").write_text(text)
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
-        done = subprocess.run(
-            [sys.executable, "-c", CALL], cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout.strip()
+        return run_python(tmp_path, "-c", CALL)
 
     return run
+
+
+def test_without_compiling_kernels_are_python_that_can_be_stepped_through(tmp_path):
+    (tmp_path / "kernels.py").write_text(KERNELS)
+    assert run_python(tmp_path, "-c", STEPS, NUMBA_DISABLE_JIT="1") == "24.0 total twice scaled inf"
+
+
+def test_without_compiling_a_command_answers_the_same(tmp_path):
+    """To rounding; of a simulation, which also calls functions by their addresses."""
+    answer = json.loads(run_python(tmp_path, "-m", "zwidth", *SHORT_RUN, NUMBA_DISABLE_JIT="1"))
+    compiled_answer = document_of(*SHORT_RUN[:-1])
+    assert len(answer["position_m"]) > 50
+    assert answer["position_m"] == pytest.approx(compiled_answer["position_m"], rel=1e-9, abs=1e-15)
 
 
 @needs_parts

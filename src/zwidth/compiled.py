@@ -9,6 +9,8 @@ holds. Numba by itself does both at every level of calls, which takes twice the 
 `zwidth move`: 84 s against 31 s of processor time). Called by Python it becomes machine code, which `machine_code`
 keeps on disk; the interpreter's lock is released while it runs, so that `threads.in_chunks` can spread a loop over
 the cores.
+
+With NUMBA_DISABLE_JIT=1 nothing is compiled: a kernel is then its Python function, for a debugger to step through.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from threading import Lock
 from typing import Any, Final, TypeVar, cast
 
 import numba
-from numba.core import compiler, registry
+import numpy as np
+from numba.core import compiler, config, registry
 from numba.core.codegen import JITCodeLibrary
 
 from zwidth.compile_events import compiling
@@ -79,9 +82,11 @@ def compiled_for(signature: Any, function: Callable[..., Any]) -> Any:
     """Compile `function` for one signature now, for callers that use only its address.
 
     signature  a numba signature, such as float64(float64, float64)
-    Returns    numba's dispatcher; keep it as long as its address is in use
+    Returns    numba's dispatcher; keep it as long as its address is in use. With NUMBA_DISABLE_JIT the function
     Raises     numba.core.errors.NumbaError where numba cannot compile it
     """
+    if config.DISABLE_JIT:
+        return function
     if not can_be_taken_apart():
         return numba.njit(signature, error_model="numpy")(function)
     entry = _Entry(function, OPTIONS)
@@ -110,6 +115,10 @@ def can_be_taken_apart() -> bool:
 
 
 def _kernel(function: Function, options: dict[str, Any]) -> Function:
+    if config.DISABLE_JIT:
+        # 1/0 is inf in kernels, as of NumPy's numbers; Python's raise, and so would parts of its complex numbers
+        function.__globals__.setdefault("complex", np.complex128)
+        return function
     options = {**OPTIONS, **options}
     apart = bool(options.pop(APART, False))
     if not can_be_taken_apart():

@@ -54,6 +54,8 @@ def _check_gpu() -> None:
     """Raise ProcessorError unless there is a GPU, or numba simulates one."""
     from numba.core import config
 
+    if config.DISABLE_JIT:
+        raise ProcessorError("compiles its kernels, and NUMBA_DISABLE_JIT is set", "unset it")
     if config.ENABLE_CUDASIM:
         return
     if find_spec("numba_cuda") is None:

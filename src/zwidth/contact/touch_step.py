@@ -29,11 +29,12 @@ From a loop and who holds the handle to the blocks of numbers of `touch_step`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import prod
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, config
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
@@ -269,6 +270,15 @@ def view(typing_context: Any, block: Any, start: Any, shape: Any) -> Any:
         return array._getvalue()
 
     return signature, generate
+
+
+def _view_in_python(block: Any, start: int, shape: tuple[int, ...]) -> Any:
+    """The same of an array, for kernels that run as Python."""
+    return block[start : start + prod(shape)].reshape(shape)
+
+
+if config.DISABLE_JIT:
+    view = _view_in_python
 
 
 INPUT_NAMES: Final = ("law", "stiffness", "damping", "wall_position", "push", "last_push")

@@ -21,7 +21,7 @@ from typing import Any, Final
 
 import numba
 import numpy as np
-from numba.core import cgutils
+from numba.core import cgutils, config
 from numba.extending import intrinsic
 
 from zwidth import _verbs
@@ -29,9 +29,15 @@ from zwidth.arrays import Floats
 from zwidth.compiled import compiled_for
 from zwidth.unit_text import unit_text
 
+PLAIN_FUNCTIONS: Final[dict[int, Any]] = {}
+"""Functions by what stands for their addresses where nothing is compiled (NUMBA_DISABLE_JIT)."""
+
 
 def address_of(dispatcher: Any) -> int:
-    """Where the machine code of a function compiled by `compiled_as` begins, for `function_at`."""
+    """Where the machine code of a function compiled by `compiled_for` begins, for `function_at`."""
+    if config.DISABLE_JIT:
+        PLAIN_FUNCTIONS[id(dispatcher)] = dispatcher
+        return id(dispatcher)
     (result,) = dispatcher.overloads.values()
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
@@ -50,6 +56,8 @@ def function_at(signature: Any) -> Any:
     is found on disk whichever function is called; arrays of addresses and `prange` are fine. An address that is
     not of `address_of` with the same signature ends the process.
     """
+    if config.DISABLE_JIT:
+        return PLAIN_FUNCTIONS.__getitem__
     kind = numba.types.FunctionType(signature)
     proxy: Any = cgutils.create_struct_proxy
 

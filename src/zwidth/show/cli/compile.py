@@ -22,10 +22,14 @@ def compile_command(as_json: bool) -> int:
     Without it, each command compiles the kernels it needs when it is first used, which takes up to half a minute.
     The compiled kernels are kept beside the sources, or in your cache folder.
     """
+    from numba.core import config
+
     from zwidth.machine_code import written_folder
     from zwidth.show.cli.errors import BadInput
     from zwidth.show.cli.first_use import compile_kernels
 
+    if config.DISABLE_JIT:
+        raise BadInput("kernels run as Python while NUMBA_DISABLE_JIT is set, and none is compiled; unset it")
     folder = written_folder()
     if folder is None:
         raise BadInput("no folder for compiled kernels can be written; set NUMBA_CACHE_DIR to a folder of yours")
