@@ -8,11 +8,12 @@ From the checked file to the nonlinear parts: dry friction, encoder steps, bent 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.device.faults import KeyPath
@@ -36,7 +37,7 @@ from zwidth.device.schema.velocity import (
 from zwidth.loop.controller import NOT_KNOWN, Butterworth, Controller, FirstOrder
 from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, LinearMethod, VelocityMethod
 from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
-from zwidth.model.design_axes import stack_numbers
+from zwidth.model.design_axes import stack_columns, stack_numbers
 from zwidth.model.mechanism import DriveNonlinearity
 from zwidth.model.modes import add_dampers
 from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
@@ -184,22 +185,23 @@ def damping(section: DampingSection | None) -> Damping:
     return ProportionalDamping(*(value_or(one, 0.0) for one in coefficients))
 
 
-def in_space(vector: Sequence[float]) -> Floats:
-    """A vector of up to three components, (..., 3): those left out are 0."""
-    return stack_numbers([*vector, 0.0, 0.0, 0.0][:3])
+def in_space(vector: Sequence[Any]) -> list[Any]:
+    """The three components of a vector of up to three: those left out are 0."""
+    return [*vector, 0.0, 0.0, 0.0][:3]
 
 
-def roll_pitch_yaw(angles: Sequence[float] | Floats) -> Floats:
+def roll_pitch_yaw(angles: ArrayLike) -> Floats:
     """Rotation Rz(yaw) Ry(pitch) Rx(roll): about the parent's fixed x, y, z axes in turn, (..., 3, 3)."""
-    turns = np.moveaxis(stack_numbers(angles), -1, 0)
+    turns = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
     (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
-    return stack_numbers(
+    rows = np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
             [-sp, cp * sr, cp * cr],
         ]
     )
+    return np.ascontiguousarray(np.moveaxis(rows, (0, 1), (-2, -1)))
 
 
 def _even(matrix: Floats) -> Floats:
@@ -289,30 +291,43 @@ def _counters(sensor: Floats, encoder: EncoderSection) -> tuple[Counter, ...]:
     return (Counter(sensor.copy(), step, noise=noise),) if step or noise else ()
 
 
+NONLINEAR_NUMBERS: Final = {
+    "coulomb": ("coulomb_Nm", 0.0),
+    "breakaway": ("breakaway_Nm", math.nan),
+    "hardening": ("hardening_Nm_per_rad3", 0.0),
+    "backward_stiffness": ("backward_stiffness_Nm_per_rad", math.nan),
+    "preload": ("preload_Nm", 0.0),
+    "brake_damping": ("brake_damping_max_Nms_per_rad", 0.0),
+    "brake_time_constant": ("brake_time_constant_s", 0.0),
+    "encoder_noise": ("encoder_noise_rad", 0.0),
+}
+"""Field of `DriveNonlinearity` -> key of a drive, and the number of one that leaves it out."""
+
+
 def drive_nonlinearity(drives: Sequence[DriveSection], friction: DriveFrictionSection) -> DriveNonlinearity | None:
     """What the file says of a mechanism's drives, at the motor; None where it says nothing."""
     nonlinearity = DriveNonlinearity(
-        coulomb=per_drive(drives, "coulomb_Nm", 0.0),
         friction_model=friction.model,
-        breakaway=per_drive(drives, "breakaway_Nm", math.nan),
         bristle_stiffness=value_or(friction.bristle_stiffness_Nm_per_rad, math.inf),
         bristle_damping=friction.bristle_damping_Nms_per_rad or 0.0,
         stribeck_velocity=value_or(friction.stribeck_velocity_rad_per_s, math.nan),
-        hardening=per_drive(drives, "hardening_Nm_per_rad3", 0.0),
-        backward_stiffness=per_drive(drives, "backward_stiffness_Nm_per_rad", math.nan),
-        preload=per_drive(drives, "preload_Nm", 0.0),
-        brake_damping=per_drive(drives, "brake_damping_max_Nms_per_rad", 0.0),
-        brake_time_constant=per_drive(drives, "brake_time_constant_s", 0.0),
-        encoder_noise=per_drive(drives, "encoder_noise_rad", 0.0),
+        **stack_columns(drive_columns(drives, NONLINEAR_NUMBERS)),
     )
     parts = (nonlinearity.coulomb, nonlinearity.hardening, nonlinearity.brake_damping, nonlinearity.encoder_noise)
     return nonlinearity if any(map(np.any, parts)) or np.isfinite(nonlinearity.backward_stiffness).any() else None
 
 
-def per_drive(drives: Sequence[DriveSection], key: str, omitted: float) -> Floats:
-    """One number of every drive, (..., d)."""
-    values: list[Any] = [getattr(drive, key) for drive in drives]
-    return stack_numbers([omitted if value is None else value for value in values])
+def drive_columns(
+    drives: Sequence[DriveSection], numbers: Mapping[str, tuple[str, float]]
+) -> dict[str, list[float]]:
+    """Numbers of all drives by the fields that take them.
+
+    numbers  field -> key of a drive, and the number of one that leaves it out
+    """
+    return {
+        field: [value_or(getattr(drive, key), omitted) for drive in drives]
+        for field, (key, omitted) in numbers.items()
+    }
 
 
 def value_or(value: float | None, omitted: float) -> float:

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.arrays import Floats, Ints
-from zwidth.device.build import drive_nonlinearity, in_space, per_drive, roll_pitch_yaw, value_or
+from zwidth.arrays import Flags, Floats, Ints
+from zwidth.device.build import drive_columns, drive_nonlinearity, in_space, roll_pitch_yaw, value_or
 from zwidth.device.consistency import HELD
 from zwidth.device.legs import LegMember, members, of_copies
 from zwidth.device.schema.beam import BeamSection, MaterialSection, RectangleShape, RodShape, TubeShape
@@ -40,7 +40,7 @@ from zwidth.model.beam_section import (
     tube,
     typical_material,
 )
-from zwidth.model.design_axes import join_designs, stack_numbers
+from zwidth.model.design_axes import stack_columns, stack_numbers
 from zwidth.model.flexible_body import FlexibleLink
 from zwidth.model.mechanism import (
     AXIS,
@@ -73,7 +73,8 @@ SINGLE: Final = {
 """Joint of a file -> the joints of one coordinate that make it, the body behind the last of them."""
 CONTROLS: Final = {"position": POSITION, "pose": POSE, "orientation": ORIENTATION}
 CLOSES: Final = {"point": POINT, "axis": AXIS, "frame": FRAME}
-X, Y, Z = np.eye(3)
+X, Y, Z = np.eye(3).tolist()
+UNKNOWN_INERTIA: Final = np.full((3, 3), math.nan).tolist()
 
 
 @dataclass(frozen=True)
@@ -97,18 +98,28 @@ def mechanism(section: MechanismSection) -> Mechanism:
     tables = {drive.joint: _ratio_table(drive) for drive in drives if drive.ratio_table is not None}
     handle, workspace, reference = section.handle, section.workspace, section.reference
     bounds = [(workspace and getattr(workspace, f"{axis}_m")) or (math.nan, math.nan) for axis in "xyz"]
+    places = stack_columns(
+        {
+            "handle": tree.tips[handle.link] if handle.point_m is None else handle.point_m,
+            "handle angles": handle.orientation_rad,
+            "reference": in_space(reference.position_m or ()),
+            "reference angles": reference.orientation_rad or in_space(()),
+        }
+    )
     made = Mechanism(
         links=_links(tree, tables),
         closures=_closures(loops, tree),
         drives=_drives(drives, section, tree, tables),
         handle_link=tree.last[handle.link],
-        handle_point=stack_numbers(tree.tips[handle.link] if handle.point_m is None else handle.point_m),
-        assemblies={name: _coordinates(section, assembly, tree) for name, assembly in section.assemblies.items()},
-        reference_position=in_space(reference.position_m or (0.0, 0.0, 0.0)),
+        handle_point=places["handle"],
+        assemblies=stack_columns(
+            {name: _coordinates(section, assembly, tree) for name, assembly in section.assemblies.items()}
+        ),
+        reference_position=places["reference"],
         workspace=np.array(bounds),
-        handle_rotation=roll_pitch_yaw(handle.orientation_rad),
+        handle_rotation=roll_pitch_yaw(places["handle angles"]),
         controls=CONTROLS[handle.controls],
-        reference_rotation=roll_pitch_yaw(reference.orientation_rad or (0.0, 0.0, 0.0)),
+        reference_rotation=roll_pitch_yaw(places["reference angles"]),
         free=_free(tree, loops),
         gravity_compensation=section.gravity_compensation,
     )
@@ -118,12 +129,7 @@ def mechanism(section: MechanismSection) -> Mechanism:
 
 def _known_axes(links: Mapping[int, LinkSection]) -> dict[int, Floats]:
     """Of each link whose inertia is one number, its joint's axis, about which alone it is known."""
-    single = {index: link for index, link in links.items() if isinstance(link.inertia_kg_m2, tuple)}
-    return {
-        index: _unit(link.axis)
-        for index, link in single.items()
-        if np.shape(stack_numbers(link.inertia_kg_m2))[-1] == 1
-    }
+    return {index: _unit(np.array(link.axis)) for index, link in links.items() if _has_one_moment(link)}
 
 
 def arm(section: ArmSection) -> Arm:
@@ -172,27 +178,95 @@ def _tree(links: Sequence[LegMember]) -> Tree:
 
 
 def _links(tree: Tree, tables: Mapping[str, RatioTable]) -> Links:
-    rows = [row for member in tree.members for row in _entries(member, tree, tables.get(member.entry.name))]
-    names, parent, joint, origin, rotation, axis, mass, center, inertia, tip, limits = zip(*rows, strict=True)
-    lower, upper = zip(*limits, strict=True)
-    limited = np.isfinite([*lower, *upper]).any()
+    """One row of `Links` for each joint coordinate of a link. Only the last is a body, and only the first is apart
+    from the parent."""
+    links: list[LinkSection] = [member.entry for member in tree.members]
+    of_link = np.repeat(np.arange(len(links)), [joint_entries(link.joint) for link in links])
+    first, body = (np.diff(of_link, prepend=-1) > 0), (np.diff(of_link, append=len(links)) > 0)
+    given = stack_columns(_columns(links, tree))
+    axis, angles = _unit(given["axis"]), given["angles"]
+    turns = np.stack([member.turn_of(member.entry.parent) for member in tree.members])
+    limits = np.array([_limits(link, tables.get(link.name)) for link in links])[of_link]
+    lower, upper = limits.T.copy()
+    limited = np.isfinite(limits).any()
+
+    def spread(numbers: Floats, own: int, where: Flags, otherwise: float | Floats = 0.0) -> Floats:
+        """Rows of the links (..., links, own axes) on those of their coordinates, and others elsewhere."""
+        rows = np.take(numbers, of_link, axis=-1 - own)
+        return np.ascontiguousarray(np.where(where.reshape(-1, *(1,) * own), rows, otherwise))
+
     return Links(
-        names=names,
-        parent=np.array(parent, dtype=np.int64),
-        joint=np.array(joint, dtype=np.int64),
-        origin=join_designs(origin, 1),
-        rotation=join_designs(rotation, 2),
-        axis=join_designs(axis, 1),
-        mass=stack_numbers(list(mass)),
-        center_of_mass=join_designs(center, 1),
-        inertia=join_designs(inertia, 2),
-        tip=join_designs(tip, 1),
-        lower=np.array(lower) if limited else None,
-        upper=np.array(upper) if limited else None,
+        names=tuple(name for link in links for name in _names(link)),
+        parent=np.array([parent for link in links for parent in _parents(link, tree)], dtype=np.int64),
+        joint=np.array([kind for link in links for kind in SINGLE[link.joint]], dtype=np.int64),
+        origin=spread((turns @ given["origin"][..., None])[..., 0], 1, first),
+        rotation=spread(turns @ roll_pitch_yaw(angles), 2, first, np.eye(3)),
+        axis=axis,
+        mass=spread(given["mass"], 0, body),
+        center_of_mass=spread(given["center_of_mass"], 1, body),
+        inertia=spread(_inertia(links, given, axis[..., body, :]), 2, body),
+        tip=spread(given["tip"], 1, body),
+        lower=lower if limited else None,
+        upper=upper if limited else None,
         joint_stiffness=_of_joints(tree, "stiffness", "Nm_per_rad", "N_per_m"),
         joint_damping=_of_joints(tree, "damping", "Nms_per_rad", "Ns_per_m"),
         joint_coulomb=_of_joints(tree, "coulomb", "Nm", "N"),
     )
+
+
+def _columns(links: Sequence[LinkSection], tree: Tree) -> dict[str, list[Any]]:
+    """The numbers of all links, those of the body nan where they are not given; axes of each joint coordinate."""
+    own = [_body(link) for link in links]
+    return {
+        "origin": [tree.tips[link.parent] if link.origin_m is None else link.origin_m for link in links],
+        "angles": [link.orientation_rad for link in links],
+        "axis": [axis for link in links for axis in _axes(link)],
+        "tip": [tree.tips[link.name] for link in links],
+        "mass": [mass for mass, _, _ in own],
+        "center_of_mass": [center for _, center, _ in own],
+        "inertia": [UNKNOWN_INERTIA if _has_one_moment(link) else own[i][2] for i, link in enumerate(links)],
+        "moment": [own[i][2][0][0] if _has_one_moment(link) else math.nan for i, link in enumerate(links)],
+    }
+
+
+def _body(link: LinkSection) -> tuple[Any, Any, Any]:
+    """Mass, centre of mass (3,) and inertia, (3, 3) or the one moment (1, 1) that is given of it."""
+    if link.beam is not None and link.mass_kg is None:
+        mass, center, moments = own_body(link.beam, link.length_m)
+        return mass, center.tolist(), moments.tolist()
+    inertia = UNKNOWN_INERTIA if link.inertia_kg_m2 is None else link.inertia_kg_m2
+    return value_or(link.mass_kg, math.nan), in_space(link.center_of_mass_m), inertia
+
+
+def _has_one_moment(link: LinkSection) -> bool:
+    """Whether of a link's inertia only the moment about the joint's axis is given."""
+    return link.inertia_kg_m2 is not None and len(link.inertia_kg_m2) == 1
+
+
+def _inertia(links: Sequence[LinkSection], given: Mapping[str, Floats], axis: Floats) -> Floats:
+    """(..., links, 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
+    whole = 0.5 * given["inertia"] + 0.5 * np.swapaxes(given["inertia"], -1, -2)
+    single = np.array([_has_one_moment(link) for link in links])
+    if not single.any():
+        return whole
+    about_axis = given["moment"][..., None, None] * axis[..., :, None] * axis[..., None, :]
+    return np.where(single[:, None, None], about_axis, whole)
+
+
+def _names(link: LinkSection) -> list[str]:
+    """A name for each joint coordinate of a link: its own for the body, the last of them."""
+    return [*(f"{link.name}/{k}" for k in range(1, joint_entries(link.joint))), link.name]
+
+
+def _parents(link: LinkSection, tree: Tree) -> list[int]:
+    """Index of the coordinate before each of a link's; the first follows the parent's body."""
+    return [tree.last[link.parent], *range(tree.first[link.name], tree.last[link.name])]
+
+
+def _limits(link: LinkSection, table: RatioTable | None) -> tuple[float, ...]:
+    """Limits of a link's joint; where it has none, those of the ratio table of its drive."""
+    ends = (-math.inf, math.inf) if table is None else (table.coordinate[0], table.coordinate[-1])
+    return link.limits_rad or link.limits_m or ends
 
 
 def _of_joints(tree: Tree, what: str, turning: str, sliding: str) -> Floats | None:
@@ -207,112 +281,48 @@ def _of_joints(tree: Tree, what: str, turning: str, sliding: str) -> Floats | No
     return stack_numbers(rows) if any(np.any(row) for row in rows) else None
 
 
-def _entries(member: LegMember, tree: Tree, table: RatioTable | None) -> list[tuple[Any, ...]]:
-    """One row of `Links` for each joint coordinate of a link. Only the last is a body, and only the first is apart
-    from the parent. A joint without limits has those of the ratio table of its drive."""
-    link: LinkSection = member.entry
-    origin = stack_numbers(tree.tips[link.parent] if link.origin_m is None else link.origin_m)
-    rotation = roll_pitch_yaw(link.orientation_rad)
-    turn = member.turn_of(link.parent)
-    origin, rotation = (turn @ origin[..., None])[..., 0], turn @ rotation
-    kinds, axes = SINGLE[link.joint], _axes(link)
-    none, tip = np.zeros(3), stack_numbers(tree.tips[link.name])
-    ends = (-math.inf, math.inf) if table is None else (table.coordinate[0], table.coordinate[-1])
-    rows = []
-    for k, (kind, axis) in enumerate(zip(kinds, axes, strict=True)):
-        body = k == len(kinds) - 1
-        name = link.name if body else f"{link.name}/{k + 1}"
-        parent = tree.last[link.parent] if k == 0 else tree.first[link.name] + k - 1
-        place = (origin, rotation) if k == 0 else (none, np.eye(3))
-        mass = math.nan if link.mass_kg is None else link.mass_kg
-        own = mass, in_space(link.center_of_mass_m), _inertia(link, axis), tip
-        if link.beam is not None and link.mass_kg is None:
-            own = (*own_body(link.beam, link.length_m), tip)
-        limits = link.limits_rad or link.limits_m or ends
-        rows.append(
-            (name, parent, kind, *place, axis, *(own if body else (0.0, none, np.zeros((3, 3)), none)), limits)
-        )
-    return rows
-
-
-def _axes(link: LinkSection) -> list[Floats]:
-    """Unit axis of each joint coordinate, in the link's frame."""
+def _axes(link: LinkSection) -> list[Any]:
+    """Axis of each joint coordinate, of any length, in the link's frame."""
     if link.joint == "universal":
-        return [_unit(link.axis), _unit(Y if link.second_axis is None else link.second_axis)]
-    return {"spherical": [X, Y, Z], "free": [X, Y, Z, X, Y, Z]}.get(link.joint, [_unit(link.axis)])
+        return [link.axis, Y if link.second_axis is None else link.second_axis]
+    return {"spherical": [X, Y, Z], "free": [X, Y, Z, X, Y, Z]}.get(link.joint, [link.axis])
 
 
-def _unit(vector: Any) -> Floats:
-    axis = stack_numbers(vector)
-    axis = axis / np.abs(axis).max(axis=-1, keepdims=True)  # lengths of 1e-300 have a direction, too
-    return np.asarray(axis / np.linalg.norm(axis, axis=-1, keepdims=True))
-
-
-def _inertia(link: LinkSection, axis: Floats) -> Floats:
-    """(..., 3, 3); one number is the moment about the joint axis and leaves the others open: I a a^T."""
-    if link.inertia_kg_m2 is None:
-        return np.full((3, 3), math.nan)
-    rows = stack_numbers(link.inertia_kg_m2)
-    if rows.shape[-1] == 1:
-        return rows * axis[..., :, None] * axis[..., None, :]
-    return 0.5 * rows + 0.5 * np.swapaxes(rows, -1, -2)
+def _unit(vectors: Floats) -> Floats:
+    """Vectors (..., 3) at unit length."""
+    scaled = vectors / np.abs(vectors).max(axis=-1, keepdims=True)  # lengths of 1e-300 have a direction, too
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True))
 
 
 def _closures(loops: Sequence[LegMember], tree: Tree) -> Closures:
-    ends = [_points(member, tree) for member in loops]
-    points = join_designs(ends, 2) if ends else np.zeros((0, 2, 3))
-    kind = np.array([CLOSES[member.entry.closes] for member in loops], dtype=np.int64)
-    axes = join_designs([_closing_axes(member) for member in loops], 2) if ends else points
+    entries: list[LoopClosure] = [member.entry for member in loops]
+    kind = np.array([CLOSES[loop.closes] for loop in entries], dtype=np.int64)
+    columns: dict[str, list[Any]] = {
+        "points": [list(loop.points_m or [tree.tips[name] for name in loop.links]) for loop in entries]
+    }
+    if kind.any():
+        columns["axes"] = [list(loop.axes or (Z, Z)) for loop in entries]
+        columns["angles"] = [loop.orientation_rad or in_space(()) for loop in entries]
+    given = stack_columns(columns)
+    # vectors in frames that are shared turn with the copy of a leg
+    turns = np.array([[member.turn_of(name) for name in member.entry.links] for member in loops])
+    points = (turns @ given["points"][..., None])[..., 0] if loops else np.zeros((0, 2, 3))
     closures = Closures(
-        names=tuple(member.entry.name for member in loops),
-        a=np.array([tree.last[member.entry.links[0]] for member in loops], dtype=np.int64),
-        b=np.array([tree.last[member.entry.links[1]] for member in loops], dtype=np.int64),
+        names=tuple(loop.name for loop in entries),
+        a=np.array([tree.last[loop.links[0]] for loop in entries], dtype=np.int64),
+        b=np.array([tree.last[loop.links[1]] for loop in entries], dtype=np.int64),
         point_a=points[..., 0, :],
         point_b=points[..., 1, :],
     )
     if not kind.any():
         return closures
-    rotation = join_designs([_closing_rotation(member) for member in loops], 2)
-    return Closures(
-        **{
-            **vars(closures),
-            "kind": kind,
-            "axis_a": axes[..., 0, :],
-            "axis_b": axes[..., 1, :],
-            "rotation": rotation,
-        }
-    )
+    axes = (turns @ _unit(given["axes"])[..., None])[..., 0]
+    rotation = turns[:, 0] @ roll_pitch_yaw(given["angles"]) @ np.swapaxes(turns[:, 1], -1, -2)
+    return replace(closures, kind=kind, axis_a=axes[..., 0, :], axis_b=axes[..., 1, :], rotation=rotation)
 
 
-def _points(member: LegMember, tree: Tree) -> Floats:
-    """The meeting points (..., 2, 3) of a loop, each in the frame of its link."""
-    loop: LoopClosure = member.entry
-    points = stack_numbers(list(loop.points_m or [tree.tips[name] for name in loop.links]))
-    return _turned_ends(member, points)
-
-
-def _closing_axes(member: LegMember) -> Floats:
-    loop: LoopClosure = member.entry
-    return _turned_ends(member, join_designs([_unit(axis) for axis in loop.axes or (Z, Z)], 1))
-
-
-def _turned_ends(member: LegMember, vectors: Floats) -> Floats:
-    """Vectors (..., 2, 3), one in the frame of each of a loop's links; those in shared frames turn with the
-    copy."""
-    turns = np.stack([member.turn_of(name) for name in member.entry.links])
-    return np.asarray((turns @ vectors[..., None])[..., 0])
-
-
-def _closing_rotation(member: LegMember) -> Floats:
-    """Axes of the second link in the frame of the first."""
-    loop: LoopClosure = member.entry
-    rotation = roll_pitch_yaw(loop.orientation_rad or (0.0, 0.0, 0.0))
-    before, behind = (member.turn_of(name) for name in loop.links)
-    return np.asarray(before @ rotation @ behind.T)
-
-
-def _coordinates(section: MechanismSection, assembly: AssemblySection, tree: Tree) -> Floats:
-    """Approximate joint coordinates (..., n) of an assembly."""
+def _coordinates(section: MechanismSection, assembly: AssemblySection, tree: Tree) -> list[Any]:
+    """Approximate joint coordinates (n,) of an assembly."""
     angles, ways = of_copies(section, assembly.joints_rad), of_copies(section, assembly.joints_m)
     rows: list[Any] = []
     for member in tree.members:
@@ -322,7 +332,7 @@ def _coordinates(section: MechanismSection, assembly: AssemblySection, tree: Tre
             rows += _listed(way, 3) + _listed(given, 3)
         else:
             rows += _listed(given, joint_entries(link.joint))
-    return stack_numbers(rows)
+    return rows
 
 
 def _listed(value: Any, count: int) -> list[Any]:
@@ -361,34 +371,40 @@ def _way_to_base(name: str, parent: dict[str, str]) -> list[str]:
     return way
 
 
+DRIVE_NUMBERS: Final = {
+    "motor_inertia": ("motor_inertia_kg_m2", math.nan),
+    "transmission": ("transmission_ratio", math.nan),
+    "stiffness": ("stiffness_Nm_per_rad", math.inf),
+    "damping": ("damping_Nms_per_rad", 0.0),
+    "torque_constant": ("torque_constant_Nm_per_A", math.nan),
+    "torque_limit": ("torque_limit_Nm", math.inf),
+    "encoder_counts": ("encoder_counts_per_rev", math.nan),
+    "continuous_torque": ("continuous_torque_Nm", math.nan),
+    "winding_resistance": ("winding_resistance_ohm", math.nan),
+}
+"""Field of `Drives` -> key of a drive, and the number of one that leaves it out."""
+
+
 def _drives(
     drives: Sequence[DriveSection], section: MechanismSection, tree: Tree, tables: Mapping[str, RatioTable]
 ) -> Drives:
     index = tree.last
-
-    def column(key: str, omitted: float) -> Floats:
-        return per_drive(drives, key, omitted)
-
     windings = [_winding(drive) for drive in drives]
+    columns = {
+        **drive_columns(drives, DRIVE_NUMBERS),
+        "winding_damping": [damping for damping, _ in windings],
+        "winding_time_constant": [lag for _, lag in windings],
+    }
+    numbers: dict[str, Any] = stack_columns(columns)
     return Drives(
         names=tuple(drive.name for drive in drives),
         joint=np.array([index[drive.joint] for drive in drives], dtype=np.int64),
-        motor_inertia=column("motor_inertia_kg_m2", math.nan),
-        transmission=column("transmission_ratio", math.nan),
-        stiffness=column("stiffness_Nm_per_rad", math.inf),
-        damping=column("damping_Nms_per_rad", 0.0),
-        torque_constant=column("torque_constant_Nm_per_A", math.nan),
-        torque_limit=column("torque_limit_Nm", math.inf),
-        encoder_counts=column("encoder_counts_per_rev", math.nan),
-        continuous_torque=column("continuous_torque_Nm", math.nan),
-        winding_resistance=column("winding_resistance_ohm", math.nan),
-        winding_damping=stack_numbers([damping for damping, _ in windings]),
-        winding_time_constant=stack_numbers([lag for _, lag in windings]),
         nonlinearity=drive_nonlinearity(drives, section.friction),
         coupling=_coupling(drives, index),
         motor_link=_motor_links(drives, index),
         motor_axis=_motor_axes(drives),
         ratio_tables=tuple(tables.get(drive.joint) for drive in drives) if tables else None,
+        **numbers,
     )
 
 
@@ -408,8 +424,8 @@ def _coupling(drives: Sequence[DriveSection], index: dict[str, int]) -> Floats |
         row: list[Any] = [0.0] * max(index.values()) + [0.0]
         for name, ratio in drive.coupling.items():
             row[index[name]] = ratio / value_or(drive.transmission_ratio, math.nan)
-        rows.append(stack_numbers(row))
-    return join_designs(rows, 1)
+        rows.append(row)
+    return stack_numbers(rows)
 
 
 def _motor_links(drives: Sequence[DriveSection], index: dict[str, int]) -> Ints | None:
@@ -422,9 +438,9 @@ def _motor_axes(drives: Sequence[DriveSection]) -> Floats | None:
     """Unit axes of the rotors, (..., d, 3); 0 of one that is neglected."""
     if all(drive.motor_axis is None for drive in drives):
         return None
-    return join_designs(
-        [np.zeros(3) if drive.motor_axis is None else _unit(drive.motor_axis) for drive in drives], 1
-    )
+    known = np.array([drive.motor_axis is not None for drive in drives])
+    axes = np.array([drive.motor_axis or X for drive in drives], dtype=np.float64)
+    return np.where(known[:, None], _unit(axes), 0.0)
 
 
 def _winding(drive: DriveSection) -> tuple[float, float]:

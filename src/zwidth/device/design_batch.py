@@ -26,7 +26,7 @@ from zwidth.device.schema.value_types import Section
 from zwidth.errors import DeviceError, PostureError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import PROJECTION_TOLERANCE
-from zwidth.model.design_axes import change_designs, design_shape
+from zwidth.model.design_axes import at_index, change_designs, change_fields, design_shape, differing_fields
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.posture import UNSOLVED, Posture, join_postures, solve_posture
 from zwidth.model.reduction import Model
@@ -111,17 +111,14 @@ class DesignBatch:
     @property
     def differs(self) -> bool:
         """Whether any number differs."""
-        return any(design_shape(getattr(self.parts, name)) for name in _PARTS)
+        return bool(differing_fields(self.parts, _PARTS))
 
     def __getitem__(self, piece: slice) -> DesignBatch:
         """Some of the designs."""
         count = len(range(*piece.indices(self.count)))
         if count == self.count:
             return self
-        parts: dict[str, Any] = {
-            name: change_designs(getattr(self.parts, name), lambda array: array[piece], (self.count,))
-            for name in _PARTS
-        }
+        parts = change_fields(self.parts, _PARTS, at_index(piece), (self.count,))
         return DesignBatch(self.device, replace(self.parts, **parts), count)
 
     def at(
@@ -179,7 +176,7 @@ class DesignBatch:
         mechanism, alone = cast(Mechanism, self.parts.mechanism), np.zeros(self.count, dtype=bool)
         postures: list[Posture | None] = []
         for p in range(self.count):
-            own = change_designs(mechanism, lambda array: array[p], (self.count,))  # noqa: B023
+            own = change_designs(mechanism, at_index(p), (self.count,))
             try:
                 with self.device.solving(assembly) as name:
                     postures.append(solve_posture(own, self.device.position(position), name))
@@ -219,9 +216,7 @@ class DesignBatch:
         def beside(array: NDArray[Any]) -> NDArray[Any]:
             return array.reshape(self.count, *(1,) * axes, *array.shape[1:])
 
-        parts: dict[str, Any] = {
-            name: change_designs(getattr(self.parts, name), beside, (self.count,)) for name in _PARTS
-        }
+        parts = change_fields(self.parts, _PARTS, beside, (self.count,))
         posture, directions = point.posture, point.directions
         if posture is None or directions is None or posture.status.ndim > axes:
             return replace(point, **parts)

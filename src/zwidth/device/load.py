@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
@@ -217,8 +218,8 @@ def build_device(
 def _reference_direction(reference: ReferenceSection) -> Floats:
     """(3,) of any length, or a screw (6,)."""
     if reference.axis is None:
-        return build.in_space(reference.direction or ())
-    direction = None if reference.direction is None else build.in_space(reference.direction)
+        return np.array(build.in_space(reference.direction or ()), dtype=np.float64)
+    direction = None if reference.direction is None else np.array(build.in_space(reference.direction))
     return screws("", direction, reference.axis, reference.characteristic_length_m)
 
 

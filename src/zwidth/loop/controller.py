@@ -27,7 +27,7 @@ from zwidth.loop.fixed_feedback import (
 from zwidth.loop.low_pass import Butterworth as Butterworth
 from zwidth.loop.low_pass import FirstOrder as FirstOrder
 from zwidth.loop.low_pass import LowPass, check_cutoff
-from zwidth.model.argument_checks import check_number, wrong_type
+from zwidth.model.argument_checks import NumberRange, check_fields, wrong_type
 from zwidth.model.design_axes import Number
 from zwidth.model.plant import Plant
 
@@ -50,6 +50,13 @@ class NotKnown(float):
 
 
 NOT_KNOWN: Final = NotKnown(nan)
+
+PERIOD: Final = {"sampling_period": NumberRange("s", above=0.0, hint="is it a frequency?")}
+RANGES: Final = {
+    "delay": NumberRange("samples", least=0.0),
+    "actuator_time_constant": NumberRange("s", least=0.0),
+    "force_limit": NumberRange("N", above=0.0, infinite=True),
+}
 
 
 @dataclass(frozen=True)
@@ -84,11 +91,7 @@ class Controller:
 
     def __post_init__(self) -> None:
         T = self.sampling_period
-        if not isinstance(T, NotKnown):
-            check_number("sampling_period", T, "s", above=0.0, hint="is it a frequency?")
-        check_number("delay", self.delay, "samples", least=0.0)
-        check_number("actuator_time_constant", self.actuator_time_constant, "s", least=0.0)
-        check_number("force_limit", self.force_limit, "N", above=0.0, infinite=True)
+        check_fields(self, RANGES if isinstance(T, NotKnown) else PERIOD | RANGES)
         if not isinstance(self.velocity, VelocityMethod):
             raise wrong_type("velocity", "an estimate such as WindowedDifference(4)", self.velocity)
         for name in ("velocity_filter", "force_filter"):

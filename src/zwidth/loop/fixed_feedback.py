@@ -14,13 +14,26 @@ import numpy as np
 
 from zwidth.loop.estimators import BackwardDifference, LinearMethod
 from zwidth.loop.low_pass import Butterworth, FirstOrder, LowPass
-from zwidth.model.argument_checks import check_choice, check_number, describe_value, wrong_type
+from zwidth.model.argument_checks import NumberRange, check_choice, check_fields, describe_value, wrong_type
 from zwidth.model.design_axes import Number
 
 ForceLaw = Literal["force-feedforward", "force-error"]
 UNITS_ALONG_A_DIRECTION: Final = ("N/m", "N s/m", "kg", "N")  # of stiffness, damping, mass and force
 UNITS_ABOUT_AN_AXIS: Final = ("N m/rad", "N m s/rad", "kg m²", "N m")
 MOST_FAST_SAMPLES: Final = 200  # of a local loop in a period of the wall's
+SENSOR_RANGES: Final = {"gain": NumberRange("N/N", above=-1.0), "mass_beyond": NumberRange("kg", least=0.0)}
+FEEDFORWARD_RANGES: Final = {
+    "inertia": NumberRange("kg", least=0.0),
+    "damping": NumberRange("N s/m", least=0.0),
+    "coulomb": NumberRange("N", least=0.0),
+    "dead_band": NumberRange("m/s", least=0.0),
+    "inertia_share": NumberRange("1", least=0.0),
+}
+LOCAL_RANGES: Final = {
+    "stiffness": NumberRange("N/m"),
+    "damping": NumberRange("N s/m"),
+    "delay": NumberRange("samples of the local loop", least=0.0),
+}
 
 
 @dataclass(frozen=True)
@@ -46,8 +59,7 @@ class ForceSensor:
 
     def __post_init__(self) -> None:
         """Raise ValueError for a number out of range or an unknown law, TypeError for a filter of another type."""
-        check_number("gain", self.gain, "N/N", above=-1.0)
-        check_number("mass_beyond", self.mass_beyond, "kg", least=0.0)
+        check_fields(self, SENSOR_RANGES)
         _check_count("delay", self.delay, 0)
         check_choice("law", self.law, get_args(ForceLaw))
         _check_filter("filter", self.filter)
@@ -81,9 +93,7 @@ class Feedforward:
 
     def __post_init__(self) -> None:
         """Raise ValueError for a number out of range, TypeError for an estimate or a filter of another type."""
-        units = {"inertia": "kg", "damping": "N s/m", "coulomb": "N", "dead_band": "m/s", "inertia_share": "1"}
-        for name, unit in units.items():
-            check_number(name, getattr(self, name), unit, least=0.0)
+        check_fields(self, FEEDFORWARD_RANGES)
         if np.any(self.inertia) and np.any(self.inertia_share):
             raise ValueError(
                 f"inertia and inertia_share exclude each other, got {describe_value(self.inertia)} kg and "
@@ -116,9 +126,7 @@ class LocalLoop:
     def __post_init__(self) -> None:
         """Raise ValueError for a number out of range, TypeError for an estimate or a filter of another type."""
         _check_count("rate_multiple", self.rate_multiple, 1, MOST_FAST_SAMPLES)
-        check_number("stiffness", self.stiffness, "N/m")
-        check_number("damping", self.damping, "N s/m")
-        check_number("delay", self.delay, "samples of the local loop", least=0.0)
+        check_fields(self, LOCAL_RANGES)
         _check_estimate(self.velocity)
         _check_filter("velocity_filter", self.velocity_filter)
 

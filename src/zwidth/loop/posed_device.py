@@ -5,7 +5,7 @@ An operating point in words: a line of its own, its errors, and what several dir
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypeAlias, get_args
@@ -26,7 +26,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.arm import Arm
-from zwidth.model.design_axes import change_designs, design_shape
+from zwidth.model.design_axes import Change, at_index, change_fields, design_shape, differing_fields, in_one_axis
 from zwidth.model.drive_side import DriveSide, drive_side
 from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
 from zwidth.model.equilibrium import Equilibrium, solve_equilibrium
@@ -145,7 +145,7 @@ class PosedDevice:
     def differing(self) -> tuple[str, ...]:
         """Which of mechanism, given_plant, controller, damping and operator have numbers that differ from point to
         point, as those of several designs do."""
-        return tuple(name for name in _OF_DESIGNS if design_shape(getattr(self, name)))
+        return differing_fields(self, _OF_DESIGNS)
 
     @property
     def status(self) -> NDArray[np.uint8]:
@@ -173,21 +173,18 @@ class PosedDevice:
     def __getitem__(self, index: Any) -> Self:
         """One of the points, of shape (), or several, by leading axes; a single device without a mechanism is its
         only one."""
-        return self if self.posture is None and not self.shape else self._change_axes(lambda array: array[index])
+        return self if self.posture is None and not self.shape else self._change_axes(at_index(index))
 
     @property
     def flat(self) -> Self:
         """All points along one leading axis. Raises NoMechanismError for a device without a mechanism."""
         if not self.differing:
             self._posture  # noqa: B018  raises for a device without a mechanism
-        axes = len(self.shape)
-        return self._change_axes(lambda array: array.reshape(-1, *array.shape[axes:]))
+        return self._change_axes(in_one_axis(len(self.shape)))
 
-    def _change_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
+    def _change_axes(self, change: Change) -> Self:
         """The points with `change`, which changes the leading axes of an array, applied to all their arrays."""
-        parts: dict[str, Any] = {
-            name: change_designs(getattr(self, name), change, self.shape) for name in self.differing
-        }
+        parts = change_fields(self, self.differing, change, self.shape)
         if self.posture is not None and self.directions is not None:
             parts |= {"posture": self.posture.with_axes(change), "directions": change(self.directions)}
         return replace(self, **parts)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from math import inf, isfinite
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -106,6 +107,23 @@ def check_number(
     raise ValueError(
         f"{name} must be {kind}{bound} [{unit}], got {describe_value(value)}" + (f"; {hint}" if hint else "")
     )
+
+
+@dataclass(frozen=True)
+class NumberRange:
+    """Which numbers a field of a dataclass takes, in which unit; as the arguments of `check_number`."""
+
+    unit: str
+    least: float = -inf
+    above: float = -inf
+    infinite: bool = False
+    hint: str = ""
+
+
+def check_fields(owner: object, ranges: Mapping[str, NumberRange]) -> None:
+    """Raise ValueError for the first of these fields that is no number in its range; see `check_number`."""
+    for name, one in ranges.items():
+        check_number(name, getattr(owner, name), **vars(one))
 
 
 def broadcast_walls(

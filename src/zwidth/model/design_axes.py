@@ -50,6 +50,26 @@ def change_designs(value: T, change: Change, shape: tuple[int, ...]) -> T:
     return value if not design_shape(value) else _changed(value, change, shape)
 
 
+def differing_fields(owner: object, names: Sequence[str]) -> tuple[str, ...]:
+    """Which of an object's fields have axes of designs."""
+    return tuple(name for name in names if design_shape(getattr(owner, name)))
+
+
+def change_fields(owner: object, names: Sequence[str], change: Change, shape: tuple[int, ...]) -> dict[str, Any]:
+    """Fields of an object after a change of the axes of designs, by name; see `change_designs`."""
+    return {name: change_designs(getattr(owner, name), change, shape) for name in names}
+
+
+def at_index(index: Any) -> Change:
+    """The change that takes one point, or several, by their leading axes."""
+    return lambda array: np.asarray(array[index])
+
+
+def in_one_axis(count: int) -> Change:
+    """The change that puts so many leading axes into one."""
+    return lambda array: array.reshape(-1, *array.shape[count:])
+
+
 def _changed(value: Any, change: Change, shape: tuple[int, ...]) -> Any:
     if isinstance(value, tuple):
         return tuple(_changed(one, change, shape) for one in value)
@@ -111,6 +131,16 @@ def stack_numbers(nested: Any) -> Floats:
         if not depth or plain.ndim == depth:
             return plain
     return join_designs([stack_numbers(one) for one in nested], depth - 1)
+
+
+def stack_columns(columns: Mapping[str, Sequence[Any]]) -> dict[str, Floats]:
+    """Each column of a table as one array (..., rows, own axes); its rows are numbers or nested lists of them.
+
+    >>> table = stack_columns({"mass": [1.0, np.array([2.0, 3.0])], "tip": [[0.1, 0.0], [0.2, 0.0]]})
+    >>> {name: column.shape for name, column in table.items()}
+    {'mass': (2, 2), 'tip': (2, 2)}
+    """
+    return {name: stack_numbers(list(rows)) for name, rows in columns.items()}
 
 
 def join_designs(arrays: Sequence[Floats], own: int) -> Floats:

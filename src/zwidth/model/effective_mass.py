@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
+from zwidth.model.design_axes import at_index
 from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import design_of_each, pack, per_design
@@ -131,11 +131,7 @@ def _stiffness_with_links(mechanism: Mechanism, posture: Posture, screws: Floats
     postures, screws = posture.broadcast_to(shape), np.broadcast_to(screws, (*shape, 6))
     out = np.full(shape, np.nan)
     for index in np.ndindex(shape):
-
-        def single(array: NDArray[Any], index: tuple[int, ...] = index) -> NDArray[Any]:
-            return np.asarray(array[index])
-
-        one = postures.with_axes(single)
+        one = postures.with_axes(at_index(index))
         if one.status != OK:
             continue
         posed = at_postures(mechanism, one)

@@ -10,17 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.errors import EquilibriumError, LoadError
 from zwidth.model.closure import equations, passive_rates
 from zwidth.model.continuation import moved_posture
-from zwidth.model.design_axes import change_designs
+from zwidth.model.design_axes import at_index, change_designs
 from zwidth.model.equilibrium import Balance, Equilibrium
 from zwidth.model.forward_kinematics import link_point, place_links, working_memory
 from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
@@ -58,10 +57,7 @@ def loaded_postures(
     for index in np.ndindex(shape):
         if posture.status[index] != OK:
             continue
-
-        def single(array: NDArray[Any], index: tuple[int, ...] = index) -> NDArray[Any]:
-            return np.asarray(array[index])
-
+        single = at_index(index)
         try:
             own = change_designs(mechanism, single, shape)
             one = _loaded(own, posture.with_axes(single), screws[index], load, counts_motors)

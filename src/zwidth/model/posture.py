@@ -5,7 +5,7 @@ Why a mechanism has no posture, in words: what, where, and what to ask for inste
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import degrees
 from typing import Any, Final
@@ -29,6 +29,7 @@ from zwidth.model.continuation import (
     joint_beyond_limit,
     reference_batch,
 )
+from zwidth.model.design_axes import Change
 from zwidth.model.forward_kinematics import place_links, working_memory
 from zwidth.model.handle_position import (
     answered_goal,
@@ -108,7 +109,7 @@ class Posture:
     rotation: Floats | None = None
     asked: Posture | None = None
 
-    def with_axes(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Posture:
+    def with_axes(self, change: Change) -> Posture:
         """The postures with a change of the leading axes made to each of their arrays, such as an index."""
         arrays: dict[str, Any] = {name: np.asarray(change(array)) for name, array in _arrays(self).items()}
         asked = None if self.asked is None else self.asked.with_axes(change)
