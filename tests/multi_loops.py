@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
-from systems import random_controller, random_plant, velocity_filter
 
+from tests.systems import random_controller, random_plant, velocity_filter
 from zwidth.loop import MultiLoop, WallMatrices
 from zwidth.model import MultiPlant, Plant
 

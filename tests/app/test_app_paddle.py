@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.paddle_simulation import MASS, SKETCH, compile_sketch, cpp_compiler, run_sketch
-from lazy_module import LazyModule
 
 import zwidth
+from tests.lazy_module import LazyModule
 from zwidth.study import read_points
 
 PAGE = SKETCH.parent

@@ -6,8 +6,8 @@ import mpmath
 import numpy as np
 import scipy.linalg
 from mpmath import mp
-from systems import velocity_filter
 
+from tests.systems import velocity_filter
 from zwidth.loop import WallMatrices
 
 DIGITS = 40

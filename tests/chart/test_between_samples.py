@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from systems import FEATURES, random_loop, reference_transition_matrix, two_mass
 
+from tests.systems import FEATURES, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart import ALL_NUMBERS, numbers_of_points
 from zwidth.chart.chart_batch import STIFFEST, ChartNumbers, chart_numbers
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import FEATURES, mass, published, random_controller, random_loop, random_plant
 
+from tests.systems import FEATURES, mass, published, random_controller, random_loop, random_plant
 from zwidth.chart import ALL_NUMBERS, MOST_DEGREE, TracedEdge, Tracer, closed_rings, stability_chart, work_array
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.curve import trace, walls

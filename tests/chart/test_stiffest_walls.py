@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import FEATURES, mass, published, random_loop
 
+from tests.systems import FEATURES, mass, published, random_loop
 from zwidth.chart import largest_stiffness, spectral_radius
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL

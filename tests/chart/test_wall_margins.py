@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import FEATURES, mass, published, random_loop
 
+from tests.systems import FEATURES, mass, published, random_loop
 from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
 from zwidth.chart.wall_margins import (

@@ -6,9 +6,9 @@ import csv
 import re
 
 import pytest
-from command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
 
 import zwidth as package
+from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of, refusal_lines, run_command
 from tests.interruption import stopped_by_ctrl_c
 from zwidth.model import Load
 from zwidth.show.cli.load import LoadCommand

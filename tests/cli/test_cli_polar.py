@@ -3,9 +3,9 @@
 import csv
 
 import pytest
-from command_runner import MECHANISM, TWO_MASS, run_command
 
 import zwidth as package
+from tests.cli.command_runner import MECHANISM, TWO_MASS, run_command
 from zwidth.chart import largest_stiffness
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conditions.conditions_cases import devices, one_mass
-from systems import FEATURES, random_loop
 
+from tests.systems import FEATURES, random_loop
 from zwidth.chart import judge, stability_chart
 from zwidth.conditions import assumptions, compare
 from zwidth.device.load import load

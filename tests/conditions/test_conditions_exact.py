@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from systems import published, random_loop
 
+from tests.systems import published, random_loop
 from zwidth.chart import judge, stability_chart
 from zwidth.chart.verdict import STABLE
 from zwidth.conditions import exact_stiffness_limit

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from systems import mass, two_mass
 
+from tests.systems import mass, two_mass
 from zwidth.contact import one_sided_wall, simulate, wall
 from zwidth.loop import Controller, Loop
 from zwidth.model import Friction, Nonlinear

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import mpmath
 import numpy as np
-from systems import StateSpaceBuilder, low_pass_sections, velocity_filter, velocity_weights
 
+from tests.systems import StateSpaceBuilder, low_pass_sections, velocity_filter, velocity_weights
 from zwidth.loop import Kalman
 
 LONG = np.longdouble

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from contact.engine_cases import friction_of, one_mass, run, two_mass_loop
 from contact.test_ledger import with_all_nonlinearities
-from systems import FEATURES, random_loop
 
+from tests.systems import FEATURES, random_loop
 from zwidth.contact import Hand, Reflex, Run, one_sided_wall, simulate, simulate_batch, wall
 from zwidth.errors import TooLarge
 from zwidth.loop import BackwardDifference, Foaw, LeastSquaresSlope, Levant, Loop, SavitzkyGolay, velocity_of

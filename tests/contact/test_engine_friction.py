@@ -14,8 +14,8 @@ from contact.engine_cases import (
     two_mass_loop,
     two_sided,
 )
-from systems import random_loop
 
+from tests.systems import random_loop
 from zwidth.contact import SOURCES, Hand, Run, simulate, simulate_batch, wall
 from zwidth.loop import Loop
 from zwidth.model import Counter, Friction, Nonlinear

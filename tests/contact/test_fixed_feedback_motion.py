@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import mass, two_mass
 
 from tests.control_apart import ControlledLoop, DoublePrecision, Memory, Period, random_controlled_loop
+from tests.systems import mass, two_mass
 from zwidth.contact import (
     Hand,
     Reflex,

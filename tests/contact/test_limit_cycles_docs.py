@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 import numpy as np
-from lazy_module import LazyModule
+
+from tests.lazy_module import LazyModule
 
 study = LazyModule("gallery.quantisation_limit")
 

@@ -13,8 +13,8 @@ from contact.mechanism_cases import (
     with_drives,
     with_friction,
 )
-from systems import random_controller, random_method
 
+from tests.systems import random_controller, random_method
 from zwidth.contact import (
     ENVIRONMENTS,
     Box,

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import mass
 
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
+from tests.systems import mass
 from zwidth.contact import SOURCES, TimeResponse, judge_response, predict_limit_cycles, quiet_limit, resting_limit
 from zwidth.contact.wall_limit_cycles import answered_cycles, behaviour_at_the_end, largest_motion
 from zwidth.errors import ArgumentError, HysteresisError, NoAnswerError

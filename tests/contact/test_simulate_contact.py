@@ -7,11 +7,11 @@ from math import inf, log, nan
 
 import numpy as np
 import pytest
-from systems import mass, random_loop
 
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, ONE_MASS, TWO_MASS, document_of
 from tests.paddle import LENGTH, paddle
+from tests.systems import mass, random_loop
 from zwidth.chart import largest_stiffness, spectral_radius
 from zwidth.contact import Hand, Reach, Reflex, Tremor, environment, simulate_contact, slot
 from zwidth.contact.contact_simulation import bound_of_run, lengthened, needed_substeps, run_length

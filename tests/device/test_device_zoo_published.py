@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from published_formulas import (
+
+import zwidth
+from tests.device.published_formulas import (
     DELTAS,
     FIVE_BARS,
     PREMIUM_CAD_LENGTHS,
@@ -23,8 +25,6 @@ from published_formulas import (
     wooden_jacobian,
     wooden_place,
 )
-
-import zwidth
 
 CLOSE = 1e-9
 

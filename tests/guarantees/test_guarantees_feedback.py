@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from systems import mass, random_operator, two_mass
 
+from tests.systems import mass, random_operator, two_mass
 from zwidth.guarantees import find_guarantees, guarantees_of, passive_region
 from zwidth.guarantees.disks import Aliases
 from zwidth.guarantees.port import port

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identify.virtual_joint import Joint, records_of
-from paddle import PADDLE
 
 import zwidth
+from tests.paddle import PADDLE
 from zwidth.errors import DeviceError
 from zwidth.identify import identify_friction, identify_mass, record_of
 from zwidth.identify.joint.friction import COLUMNS

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import matrix_balance
-from systems import mass, published, random_loop, two_mass
 
 from tests.control_apart import ControlledLoop, random_controlled_loop
+from tests.systems import mass, published, random_loop, two_mass
 from zwidth.errors import HysteresisError, ModelError, UnmovedError
 from zwidth.loop import (
     AlphaBeta,

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import mass, two_mass
 
+from tests.systems import mass, two_mass
 from zwidth.device.load import load
 from zwidth.errors import MeasureError
 from zwidth.loop import Controller, OperatingPoint

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import FEATURES, mass, random_loop, reference_transition_matrix
 
+from tests.systems import FEATURES, mass, random_loop, reference_transition_matrix
 from zwidth.chart import largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import DECAY, STIFFEST, chart_numbers
 from zwidth.chart.edge_memory import FOUND, NO_WALL

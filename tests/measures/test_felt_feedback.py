@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import mass, two_mass
 
+from tests.systems import mass, two_mass
 from zwidth.contact import Hand, Tremor, simulate, wall
 from zwidth.errors import FeedbackError, MeasureError
 from zwidth.loop import (

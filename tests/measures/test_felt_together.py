@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.optimize
-from systems import random_plant
 
 import zwidth
+from tests.systems import random_plant
 from zwidth.chart import largest_stiffness
 from zwidth.errors import MeasureError
 from zwidth.loop import Butterworth, Controller, FirstOrder, Loop, OperatingPoint

@@ -7,10 +7,10 @@ from math import inf, nan
 
 import numpy as np
 import pytest
-from systems import mass, random_loop, random_operator, two_mass
 
 import zwidth as package
 from tests.cli.command_runner import MECHANISM, TWO_MASS, document_of
+from tests.systems import mass, random_loop, random_operator, two_mass
 from zwidth.chart import judge, largest_stiffness
 from zwidth.errors import HandleError
 from zwidth.loop import Controller, OperatingPoint

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg
-from systems import low_pass_sections, mass, random_controller, random_plant, two_mass
 
 import zwidth
+from tests.systems import low_pass_sections, mass, random_controller, random_plant, two_mass
 from zwidth.loop import Butterworth, Controller, OperatingPoint
 from zwidth.measures import NO_VALUE, OK
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_cases import KINDS, some_postures
-from systems import random_operator, random_plant
 
+from tests.model.model_cases import KINDS, some_postures
+from tests.systems import random_operator, random_plant
 from zwidth.chart import ALL_NUMBERS, numbers_of_points, stability_chart
 from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND

@@ -13,12 +13,12 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from model_cases import random_five_bar, some_postures
-from model_engines import mass_matrix, mjcf, moving_links
-from random_mechanisms import closure_values, derivative, place, random_mechanisms
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
+from tests.model.model_cases import random_five_bar, some_postures
+from tests.model.model_engines import mass_matrix, mjcf, moving_links
+from tests.model.random_mechanisms import closure_values, derivative, place, random_mechanisms
 from zwidth.model import (
     BALL_X,
     PRISMATIC,

@@ -8,12 +8,12 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from model_cases import KINDS
-from model_engines import mass_matrix, mjcf, moving_links, quaternion, text
-from random_mechanisms import random_mechanism, random_mechanisms
 from scipy.spatial.transform import Rotation
 
 import zwidth
+from tests.model.model_cases import KINDS
+from tests.model.model_engines import mass_matrix, mjcf, moving_links, quaternion, text
+from tests.model.random_mechanisms import random_mechanism, random_mechanisms
 from zwidth.device import from_document, import_file
 from zwidth.model import BALL_X, FIXED, PRISMATIC, REVOLUTE, solve_posture
 

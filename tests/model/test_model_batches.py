@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_cases import KINDS, five_bar, random_five_bar, same_angles, some_postures
 
+from tests.model.model_cases import KINDS, five_bar, random_five_bar, same_angles, some_postures
 from zwidth.model import OK, OUT_OF_REACH, inertia_terms, link_points, solve_posture
 
 

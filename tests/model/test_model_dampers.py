@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from model_cases import KINDS, drives_on, five_bar, some_postures
 
+from tests.model.model_cases import KINDS, drives_on, five_bar, some_postures
 from zwidth.errors import ModelError
 from zwidth.model import (
     OK,

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_cases import KINDS, X, Y, five_bar, some_postures
 from scipy.linalg import block_diag
 
+from tests.model.model_cases import KINDS, X, Y, five_bar, some_postures
 from zwidth.errors import DirectionError, ModelError
 from zwidth.model import (
     GivenDamping,

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from model_cases import KINDS, some_postures
-from model_engines import ask_mujoco, ask_pinocchio
-from random_mechanisms import random_mechanisms
 
+from tests.model.model_cases import KINDS, some_postures
+from tests.model.model_engines import ask_mujoco, ask_pinocchio
+from tests.model.random_mechanisms import random_mechanisms
 from zwidth.model import OK, ORIENTATION, POSITION, inertia_terms, rotation_matrix, solve_posture
 
 RELATIVE = 1e-9

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_cases import (
+from scipy import ndimage
+
+from tests.model.model_cases import (
     KINDS,
     NO_CLOSURES,
     Z,
@@ -20,8 +22,6 @@ from model_cases import (
     spatial_arm,
     two_bar_angles,
 )
-from scipy import ndimage
-
 from zwidth.errors import LoopOpen, OutOfReach, Singular
 from zwidth.model import OK, OUT_OF_REACH, Mechanism, inertia_terms, pack, solve_posture
 from zwidth.model.handle_position import check_mobility, drives_fit

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy
-from model_cases import KINDS, Y, five_bar, some_postures
 from scipy.linalg import eigh, null_space
 
+from tests.model.model_cases import KINDS, Y, five_bar, some_postures
 from zwidth.errors import ModelError
 from zwidth.model import (
     GivenDamping,

@@ -5,9 +5,9 @@ Here each centre of mass lies beside its link's axis and the central inertia is 
 
 import numpy as np
 import pytest
-from lazy_module import LazyModule
-from model_cases import random_five_bar, two_bar_angles
 
+from tests.lazy_module import LazyModule
+from tests.model.model_cases import random_five_bar, two_bar_angles
 from zwidth.model import OK, inertia_terms, solve_posture
 
 appendix_b = LazyModule("gallery.appendix_b")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from model_cases import KINDS, five_bar
 
+from tests.model.model_cases import KINDS, five_bar
 from zwidth.errors import OutOfReach
 from zwidth.model import OK, OUT_OF_REACH, pack, posture_batch, solve_posture
 from zwidth.model.posture import UNSOLVED

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_cases import KINDS, some_postures
 
+from tests.model.model_cases import KINDS, some_postures
 from zwidth.loop import Controller, Loop, rows_response, section_rows
 from zwidth.model import MODELS, GivenDamping, ModalDamping, ProportionalDamping, reduce_mechanism, solve_posture
 from zwidth.model.rendered_modes import rendered_modes

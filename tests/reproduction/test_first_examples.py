@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lazy_module import LazyModule
 from matplotlib import pyplot
 
 import zwidth
 from gallery.brute_force import BruteForceLoop
 from gallery.five_bar import brute_force_loop, bundled
+from tests.lazy_module import LazyModule
 
 make_examples = LazyModule("docs.make_examples")
 FILES = sorted((Path(__file__).parents[2] / "gallery").glob("first_*.py"))

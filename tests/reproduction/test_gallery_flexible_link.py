@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from lazy_module import LazyModule
+
+from tests.lazy_module import LazyModule
 
 both = LazyModule("gallery.flexible_link")
 

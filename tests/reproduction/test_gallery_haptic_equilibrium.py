@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lazy_module import LazyModule
+
+from tests.lazy_module import LazyModule
 
 both = LazyModule("gallery.haptic_equilibrium")
 

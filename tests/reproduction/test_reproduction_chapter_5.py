@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lazy_module import LazyModule
 
+from tests.lazy_module import LazyModule
 from zwidth.device.load import load
 
 five_bar = LazyModule("gallery.five_bar")

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lazy_module import LazyModule
 
 from gallery.brute_force import BruteForceLoop, butterworth
+from tests.lazy_module import LazyModule
 
 algebra = LazyModule("gallery.chapter_4_algebra")
 completed = LazyModule("gallery.chapter_4_extended_forms")

@@ -6,7 +6,6 @@ import re
 from dataclasses import replace
 
 import pytest
-from lazy_module import LazyModule
 
 from docs._comparison_row import (
     AGREES,
@@ -27,6 +26,7 @@ from docs._comparison_row import (
     significant,
 )
 from docs._thesis_items import ITEMS, NOT_COVERED, item_text, items_covered, items_in
+from tests.lazy_module import LazyModule
 
 make_reproduction = LazyModule("docs.make_reproduction")
 one_sided_contact = LazyModule("gallery.fig_3_12_one_sided")

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lazy_module import LazyModule
 
 from docs._comparison_row import AGREES, ANOTHER_QUESTION, OURS_ONLY, UNEXPLAINED
+from tests.lazy_module import LazyModule
 
 page = LazyModule("docs._rows_quantisation")
 study = LazyModule("gallery.quantisation_limit")

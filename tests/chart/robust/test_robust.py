@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import shapely
 from study_sizes import study_size
-from systems import mass, random_loop, reference_transition_matrix, two_mass
 
+from tests.systems import mass, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart import Tracer, judge, robust_chart, softening, spectral_radius, stability_chart, unstable
 from zwidth.errors import ChartError
 from zwidth.loop import Butterworth, Controller, Loop

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from systems import reference_transition_matrix
 
 from tests.apart import ExactLoop
 from tests.chart.exact_radii import is_off, joined_excess, walls_beside_origin
 from tests.chart.robust.test_robust import similar_loops
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
+from tests.systems import reference_transition_matrix
 from zwidth.chart import robust_chart, stability_chart
 from zwidth.errors import ChartError
 

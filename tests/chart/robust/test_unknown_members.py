@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import mass, two_mass
 
+from tests.systems import mass, two_mass
 from zwidth.chart import TracedEdge, robust_chart
 from zwidth.chart.robust.chart import robust_chart_of_members, walls_off_edge
 from zwidth.chart.robust.members import chart_members

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from multi_loops import as_multi, random_multi, reference_radius, side_by_side
-from systems import random_loop, two_mass
 
+from tests.multi_loops import as_multi, random_multi, reference_radius, side_by_side
+from tests.systems import random_loop, two_mass
 from zwidth.chart import circle, largest_stiffness, largest_stiffness_by_direction, multi_chart, stability_chart
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop, MultiLoop

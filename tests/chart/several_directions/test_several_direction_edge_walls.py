@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from multi_loops import random_multi, random_unlike, reference_matrix
 
 from tests.chart.exact_radii import exact_matrix, exact_radius, is_off, joined_excess, walls_beside_origin
+from tests.multi_loops import random_multi, random_unlike, reference_matrix
 from tests.study_sizes import EVERYDAY_SEEDS, study_size
 from zwidth.chart import multi_chart
 

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
-from multi_loops import random_multi, random_unlike, reference_matrix, reference_radius, side_by_side
-from systems import mass
 
+from tests.multi_loops import random_multi, random_unlike, reference_matrix, reference_radius, side_by_side
+from tests.systems import mass
 from zwidth.chart import multi_chart, stability_chart
 from zwidth.errors import ArgumentError
 from zwidth.loop import Controller, Loop, MultiLoop, WallMatrices
