@@ -244,7 +244,7 @@ def test_people_read_numbers_and_where_they_are():
     assert "Condition number of the Jacobian (isotropy)" in out
     assert re.search(r"best +1\.0\d+ at \(.*\) m", out)
     assert re.search(r"cells +\d+ ok, \d+ out of reach", out)
-    assert re.search(r"common area +\d+(\.\d+)? cm\^2, \d+\.\d+ % of the reachable area", out)
+    assert re.search(r"common area +\d+(\.\d+)? cm², \d+\.\d+ % of the reachable area", out)
 
 
 def test_the_help_lists_every_measure_with_its_unit():

@@ -231,7 +231,7 @@ def test_a_filter_of_the_force_smooths_it():
         ({"push": np.zeros((7, 3))}, r"one for each sample, \(200, 3\), got an array of \(7, 3\)"),
         ({"push": [1.0]}, "push must be two or three finite numbers"),
         ({"push": np.full((200, 3), np.nan)}, "row 0 is not"),
-        ({"gravity": [0.0, np.nan]}, r"gravity must be two or three finite numbers \[m/s\^2\]"),
+        ({"gravity": [0.0, np.nan]}, r"gravity must be two or three finite numbers \[m/s²\]"),
         ({"start_velocity": (0.0, 0.0, 1.0)}, "across what the drives can do"),
         ({"wall": SurfaceWall(500.0)}, "a wall needs a surface"),
         ({"surface": INTO}, "a wall needs a surface"),
