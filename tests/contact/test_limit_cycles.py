@@ -82,7 +82,7 @@ def test_the_linear_loop_of_a_cycle_is_on_its_edge(what, seed):
     for cycle in limit_cycles(loop, K, B, **{part: 1e-3}):
         gain, plant = 1.0, loop.plant
         if what == "friction":
-            b = float(describing_functions.coulomb_damper(1e-3, cycle.velocity_amplitudes[0]))
+            b = float(describing_functions.damper_gain(1e-3, cycle.velocity_amplitudes[0]))
             plant = replace(plant, damping=plant.damping + b * np.outer(plant.sensor, plant.sensor))
         elif what == "quantiser":
             gain = float(describing_functions.quantiser(cycle.amplitude, 1e-3))
@@ -121,7 +121,7 @@ def test_most_of_these_loops_have_cycles():
 
 def initial_state(loop, K, B, cycle, C):
     """States [x, x'] of the equivalent linear loop's critical vibration, as large as the cycle."""
-    b = float(describing_functions.coulomb_damper(C, cycle.velocity_amplitudes[0]))
+    b = float(describing_functions.damper_gain(C, cycle.velocity_amplitudes[0]))
     plant = replace(loop.plant, damping=loop.plant.damping + b * np.outer(loop.plant.sensor, loop.plant.sensor))
     w = 2.0 * np.pi * cycle.frequency_Hz
     x = np.linalg.solve(

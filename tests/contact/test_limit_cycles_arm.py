@@ -8,7 +8,7 @@ import scipy.linalg
 
 from tests.systems import mass
 from zwidth.chart import eigenvalues
-from zwidth.contact.describing_functions import coulomb_damper
+from zwidth.contact.describing_functions import damper_gain
 from zwidth.contact.harmonic_balance import harmonic_balance
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop
@@ -109,7 +109,7 @@ def test_the_edge_of_what_is_recovered_from_has_a_root_on_the_circle(arm, balanc
     (cycle,) = balance.cycles
     damping = arm.plant.damping.copy()
     for friction, velocity in zip(arm.plant.nonlinear.friction, cycle.velocity_amplitudes, strict=True):
-        b = float(coulomb_damper(friction.coulomb, velocity))
+        b = float(damper_gain(friction.coulomb, velocity))
         damping += b * np.outer(friction.along, friction.along)
     roots = eigenvalues(Loop(replace(arm.plant, damping=damping), arm.controller), *WALL)
     on_circle = np.exp(2j * np.pi * cycle.frequency_Hz * arm.period)

@@ -9,7 +9,7 @@ import xarray as xr
 from tests.study.study_cases import TWO_MASS, axis, study
 from zwidth.errors import OutputError, TooLarge
 from zwidth.show import csv_text, dataset, json_text
-from zwidth.show.dataset import write_sweep_csv, write_sweep_zarr, write_zarr
+from zwidth.show.dataset import write_sweep_csv, write_sweep_zarr
 from zwidth.study import Sweep, run_study
 from zwidth.study.designs import sweep_data
 from zwidth.study.jobs import executor
@@ -41,15 +41,14 @@ def test_a_folder_holds_the_dataset(tmp_path, make, chunk, monkeypatch):
     monkeypatch.setattr(dataset, "CHUNK", chunk)
     found = make()
     write_sweep_zarr(tmp_path / "pieces.zarr", found)
-    write_zarr(tmp_path / "whole.zarr", found.dataset())
+    whole = found.dataset()
     with xr.open_zarr(tmp_path / "pieces.zarr", chunks=None) as pieces:
-        with xr.open_zarr(tmp_path / "whole.zarr", chunks=None) as whole:
-            xr.testing.assert_identical(pieces.load(), whole.load())
-            assert {name: one.dtype for name, one in pieces.variables.items()} == {
-                name: one.dtype for name, one in whole.variables.items()
-            }
-        assert sorted(pieces.coords) == sorted(found.dataset().coords)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["pieces.zarr", "whole.zarr"]
+        xr.testing.assert_identical(pieces.load(), whole)
+        assert {name: one.dtype.kind for name, one in pieces.variables.items()} == {
+            name: one.dtype.kind for name, one in whole.variables.items()
+        }
+        assert sorted(pieces.coords) == sorted(whole.coords)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pieces.zarr"]
 
 
 def test_a_table_in_pieces_is_the_table(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from zwidth.arrays import Flags, Floats
+from zwidth.arrays import Floats
 from zwidth.conditions.abbott_okamura import pure_spring_limit
 from zwidth.conditions.assumptions import COLLOCATED, DIRECT, RESISTIVE, RIGID, WHOLE_DELAY, Bound, ConditionCase
 
@@ -51,19 +51,6 @@ def viscous_stiffness_limit(
     """
     b, T, l = (np.asarray(value, dtype=float) for value in (device_damping, sampling_period, delay_samples))
     return np.asarray(np.maximum(b, 0.0) / (T * (l + 0.5)))
-
-
-def is_passive(beta: ArrayLike, sigma: ArrayLike, delay_samples: ArrayLike = 0) -> Flags:
-    """Whether walls (...) lie in the plane's passive quadrant, beta >= l + 1/2 and sigma >= 1/2.
-
-    There the wall is passive at every speed and with every hand. With beta alone large enough, the encoder's steps
-    may sustain a small vibration; with sigma alone, small motions decay and large ones may grow.
-
-    >>> is_passive([0.6, 0.6, 0.4], [0.5, 0.4, 0.5]).tolist()
-    [True, False, False]
-    """
-    b, s, l = (np.asarray(value, dtype=float) for value in (beta, sigma, delay_samples))
-    return np.asarray((b >= l + 0.5) & (s >= 0.5))
 
 
 def condition(case: ConditionCase) -> Bound:

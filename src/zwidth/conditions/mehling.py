@@ -20,34 +20,13 @@ from zwidth.conditions.assumptions import (
 )
 
 
-def effective_damping(
-    angular_frequency: ArrayLike, device_damping: ArrayLike, electrical_damping: ArrayLike, corner: ArrayLike
-) -> Floats:
-    """Effective damping of a vibration at w: b + b_e/(1 + (w L/R)^2) [N s/m], (...).
-
-    A motor shorted through R and L brakes with b_e/(1 + s L/R), b_e = k_t^2/R at the handle; this is its real
-    part. It is b_e below the corner frequency R/L and falls to 0 far above. (Derived from the circuit; of the
-    source only the abstract was read, which agrees.)
-
-    angular_frequency   (...)  w [rad/s]
-    device_damping      (...)  b [N s/m]
-    electrical_damping  (...)  b_e [N s/m]
-    corner              (...)  R/L [rad/s]; inf: no inductance
-
-    >>> float(effective_damping(100.0, 1.0, 2.0, 100.0))
-    2.0
-    """
-    w, b, e, c = (
-        np.asarray(v, dtype=float) for v in (angular_frequency, device_damping, electrical_damping, corner)
-    )
-    return np.asarray(b + e / (1.0 + (w / c) ** 2))
-
-
 def stiffness_limit(
     wall_damping: ArrayLike, device_damping: ArrayLike, electrical_damping: ArrayLike, sampling_period: ArrayLike
 ) -> Floats:
     """Largest passive stiffness with electrical damping counted as friction, b + b_e > K T/2 + |B| [N/m], (...).
 
+    A motor shorted through R and L brakes with b_e/(1 + s L/R), b_e = k_t^2/R at the handle. (Derived from the
+    circuit; of the source only the abstract was read, which agrees.)
     An approximation for corner frequencies well above half the sampling rate; too large otherwise. For b = 0 no
     stiffness is exactly passive: aliases of the vibration lie above any corner frequency (`passivity`).
     """

@@ -77,34 +77,8 @@ def quantiser_gain(a: float, c: float) -> float:
     return float(2.0 / (np.pi * a) * total)
 
 
-def quantiser_mean(amplitude: ArrayLike, step: float, offset: ArrayLike) -> Floats:
-    """Mean reading of a motion c + A sin(theta) by an encoder: what a constant push is held by, over K.
-
-        c_mean = c_count + Delta sum over thresholds t of (1/2 - sgn(t)/2 - asin((t - c)/A)/pi),    |t - c| < A
-
-    with whole steps for the thresholds that the motion does not cross.
-
-    amplitude  (...)  A [m], positive
-    step              Delta [m], positive
-    offset     (...)  c [m]
-
-    >>> quantiser_mean([0.2, 0.2, 5.0], 1.0, [0.1, 0.5, 3.2]).round(3).tolist()
-    [0.0, 0.5, 3.177]
-    """
-    A, c = np.broadcast_arrays(np.asarray(amplitude, dtype=float), np.asarray(offset, dtype=float))
-    _positive(amplitude=A, step=step)
-    mean = np.empty(A.shape)
-    for index in np.ndindex(A.shape):
-        a, middle = float(A[index] / step), float(c[index] / step)
-        # the count below all thresholds that are crossed, and each threshold's share of the time
-        first = np.floor(middle - a + 0.5)
-        t = first + 0.5 + np.arange(np.ceil(2.0 * a) + 1.0)
-        share = 0.5 - np.arcsin(np.clip((t - middle) / a, -1.0, 1.0)) / np.pi
-        mean[index] = step * (first + np.sum(share))
-    return mean
-
-
-def coulomb_damper(coulomb: ArrayLike, velocity_amplitude: ArrayLike) -> Floats:
+@compiled_lean
+def damper_gain(coulomb: float, velocity_amplitude: float) -> float:
     """Viscous damping that takes as much of a vibration as dry friction does [N s/m].
 
         b = 4 C/(pi V)                 C sign v for v = V sin theta: 4 C/pi at the vibration's own frequency
@@ -112,19 +86,8 @@ def coulomb_damper(coulomb: ArrayLike, velocity_amplitude: ArrayLike) -> Floats:
     The energy of a cycle is the same: 4 C X of friction, pi b omega X^2 of the damper, X = V/omega. Motion without
     rests is assumed; a stuck phase in each cycle needs another function.
 
-    coulomb             (...)  C [N]
-    velocity_amplitude  (...)  V [m/s], positive
-
-    >>> round(float(coulomb_damper(0.1, 0.02)), 3)
-    6.366
+    coulomb  C [N];   velocity_amplitude  V [m/s], positive
     """
-    _positive(velocity_amplitude=velocity_amplitude)
-    return _each(damper_gain, coulomb, velocity_amplitude)
-
-
-@compiled_lean
-def damper_gain(coulomb: float, velocity_amplitude: float) -> float:
-    """`coulomb_damper` of one friction."""
     return 4.0 * coulomb / (np.pi * velocity_amplitude)
 
 
@@ -150,28 +113,18 @@ def saturation_gain(amplitude: float, limit: float) -> float:
     return float(2.0 / np.pi * (np.arcsin(s) + s * np.sqrt(1.0 - s * s)))
 
 
-def bent_spring(
-    amplitude: ArrayLike, cubic: ArrayLike = 0.0, backward_excess: ArrayLike = 0.0, kink: ArrayLike = 0.0
-) -> Floats:
+@compiled_lean
+def bent_spring_gain(amplitude: float, cubic: float, backward_excess: float, kink: float) -> float:
     """Stiffness that a bent spring has beyond its linear one, for a vibration about 0 [N/m].
 
         N = (3/4) cubic A^2 + backward_excess/pi (arccos c - c sqrt(1 - c^2)),    c = min(-kink/A, 1)
 
-    amplitude        (...)  A of its deflection [m]
-    cubic            (...)  [N/m³]
-    backward_excess  (...)  what it is stiffer by for deflections below the kink [N/m]; they also push the mean,
-                            what is left out
-    kink             (...)  not positive [m]
-
-    >>> float(bent_spring(0.1, cubic=400.0))
-    3.0
+    amplitude        A of its deflection [m]
+    cubic            [N/m³]
+    backward_excess  what it is stiffer by for deflections below the kink [N/m]; they also push the mean, which is
+                     left out
+    kink             not positive [m]
     """
-    return _each(bent_spring_gain, amplitude, cubic, backward_excess, kink)
-
-
-@compiled_lean
-def bent_spring_gain(amplitude: float, cubic: float, backward_excess: float, kink: float) -> float:
-    """`bent_spring` of one spring."""
     share = 0.5
     if kink < 0.0:
         c = min(-kink / amplitude, 1.0)

@@ -56,16 +56,6 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> None:
         _WRITERS[kind](draft, dataset)
 
 
-def write_zarr(path: Path, dataset: xr.Dataset) -> None:
-    """Write a dataset as a zarr folder (version 2, which knows texts), whole or not at all.
-
-    path    where nothing is yet
-    Raises  OutputError  where it cannot be written
-    """
-    with new_folder(path) as draft:
-        dataset.to_zarr(draft, mode="w", zarr_format=2, consolidated=True)
-
-
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
     """A folder to be filled inside this block, which then gets its name; nothing is left of it where that fails.

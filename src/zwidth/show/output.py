@@ -16,7 +16,7 @@ from zwidth.errors import OutputError
 DATA: Final = (".csv", ".json")
 FIGURES: Final = (".png", ".svg", ".pdf")
 ARRAYS: Final = (".nc", ".mat")  # what `dataset.write_dataset` writes: maps and sweeps
-FOLDERS: Final = (".zarr",)  # what `dataset.write_zarr` writes; one that is there is never replaced
+FOLDERS: Final = (".zarr",)  # what `dataset.write_sweep_zarr` writes; one that is there is never replaced
 
 
 def json_value(value: Any) -> Any:
