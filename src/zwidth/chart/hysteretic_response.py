@@ -378,8 +378,11 @@ def _edge_of_arcs(curve: HystereticCurve, viscous: TracedEdge, moved: MovedArcs)
 
 
 def _angles_between(points: ArcPoints, start: float, end: float) -> Floats:
-    """Angles strictly between an arc's moved ends: the viscous arc's, thinned but for turns of K and of B, and
-    some where the arc is longer."""
+    """Angles strictly between the ends `start` and `end` of an arc of the hysteretic plant, from start to end.
+
+    They are those of the viscous plant's arc, every THINNED-th and all at which K or B turns, and further ones on
+    the pieces by which the hysteretic arc is longer.
+    """
     thetas, K, B = points
     way = np.sign(np.diff([K, B], axis=1))
     kept = np.arange(len(thetas)) % THINNED == 0

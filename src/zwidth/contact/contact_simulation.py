@@ -120,12 +120,13 @@ class ContactSimulation(Result):
 
     @property
     def growth(self) -> float:
-        """Of the motion per sample, ln rho; nan where nothing moves, or the run was too short to tell."""
+        """ln rho, rho the factor by which the motion grows per sample; nan where nothing moves, or the run was too
+        short to tell."""
         return self.judgement.growth
 
     @property
     def dominant_frequency(self) -> float:
-        """In the second half [Hz]; nan where nothing moves."""
+        """Frequency of the strongest vibration in the second half [Hz]; nan where nothing moves."""
         return self.judgement.frequency
 
     @property

@@ -206,7 +206,10 @@ def _nothing(largest_motion: float) -> HarmonicBalance:
 def _parts(
     loop: Loop, coulomb_friction: ArrayLike | None, resolution: float | None, force_limit: float | None
 ) -> tuple[Nonlinear, float]:
-    """The nonlinear parts of the loop, the linear parts that replace them, and the smallest force limit."""
+    """The plant's nonlinear parts, friction and encoder steps given here in place of its own, and the force limit.
+
+    coulomb_friction, resolution, force_limit  [N], [m], [N]; None: the loop's own
+    """
     plant, parts = loop.plant, loop.plant.nonlinear
     if coulomb_friction is not None:
         C = np.asarray(coulomb_friction, dtype=float)

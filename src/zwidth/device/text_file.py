@@ -113,6 +113,7 @@ def header_fault(header: Sequence[str], needed: Sequence[str], optional: Collect
 
 
 def _columns(names: Sequence[str]) -> str:
+    """Subject and verb of a sentence: "column a is", "columns a, b are"."""
     return f"column {names[0]} is" if len(names) == 1 else f"columns {', '.join(names)} are"
 
 

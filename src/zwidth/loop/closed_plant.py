@@ -103,7 +103,7 @@ def path_responses(plant: Plant, controller: Controller, d: Complexes) -> tuple[
     return np.asarray(moved @ form.output), np.asarray(moved @ measured)
 
 
-class _Rows:
+class _StateRows:
     """The states of a loop as rows: what those at the beginning of a period, and the wall's force, contribute.
 
     change  (N, N + 1)  what has been added to each state so far; the last column is of the wall's force
@@ -113,29 +113,30 @@ class _Rows:
         self.size = 0
 
     def add(self, count: int) -> slice:
-        """Room for some more states."""
+        """Make room for more states. Returns their places."""
         self.size += count
         return slice(self.size - count, self.size)
 
     def begin(self) -> Floats:
-        """All states at the beginning of a period; returns the row of the wall's force."""
+        """Set all states to those at the beginning of a period. Returns the row (N + 1,) of the wall's force."""
         self.change, self.start = np.zeros((self.size, self.size + 1)), np.eye(self.size, self.size + 1)
         return np.asarray(np.eye(1, self.size + 1, self.size)[0])
 
-    def now(self, at: slice) -> Floats:
-        """Rows of some states as they are by now."""
+    def current(self, at: slice) -> Floats:
+        """Rows (k, N + 1) of some states at this instant: those at the beginning of the period, and what has been
+        added to them since."""
         return np.asarray(self.start[at] + self.change[at])
 
 
 class _FilterRows:
     """A discrete filter among the rows."""
 
-    def __init__(self, rows: _Rows, states: FilterStates) -> None:
+    def __init__(self, rows: _StateRows, states: FilterStates) -> None:
         self.rows, self.states, self.at = rows, states, rows.add(len(states.A))
 
     def output(self, signal: Floats) -> Floats:
         """A signal behind the filter, whose states go on by one sample."""
-        own, now = self.states, self.rows.now(self.at)
+        own, now = self.states, self.rows.current(self.at)
         self.rows.change[self.at] += own.A @ now + np.outer(own.input, signal)
         return np.asarray(own.output @ now + own.direct * signal)
 
@@ -143,18 +144,18 @@ class _FilterRows:
 class _QueueRows:
     """Past values of a signal among the rows, the newest first."""
 
-    def __init__(self, rows: _Rows, count: int) -> None:
+    def __init__(self, rows: _StateRows, count: int) -> None:
         self.rows, self.at = rows, rows.add(count)
 
     def push(self, signal: Floats) -> Floats:
-        """Put a value at the head; returns it and those before it."""
-        values = np.vstack([signal, self.rows.now(self.at)])
+        """Put a signal's row at the head. Returns its rows and those of its past values, the newest first."""
+        values = np.vstack([signal, self.rows.current(self.at)])
         self.rows.change[self.at] = values[:-1] - self.rows.start[self.at]
         return values
 
     def past(self) -> Floats:
-        """The values before the next one."""
-        return self.rows.now(self.at)
+        """Rows of the past values, the newest first."""
+        return self.rows.current(self.at)
 
 
 class _HeldRows:
@@ -163,7 +164,7 @@ class _HeldRows:
     last  whether the one that acts at the end of a sample is kept even if none waits
     """
 
-    def __init__(self, rows: _Rows, delay: float, last: bool) -> None:
+    def __init__(self, rows: _StateRows, delay: float, last: bool) -> None:
         self.whole, self.part = split_delay(delay)
         self.queue = _QueueRows(rows, self.whole + (last or self.part > 0.0))
 
@@ -172,7 +173,7 @@ class _HeldRows:
         return np.asarray(self.queue.past()[self.whole])
 
     def push(self, command: Floats) -> tuple[Floats, Floats]:
-        """Put in a command; returns what acts until the part of the sample has passed, and from then on."""
+        """Queue a command. Returns rows of the commands that act before and after the delay's part of a sample."""
         values = self.queue.push(command)
         return values[self.whole + (self.part > 0.0)], values[self.whole]
 
@@ -180,15 +181,16 @@ class _HeldRows:
 class _LoadRows:
     """A force that the computer adds under load: what it reads of the states, filtered, delayed and held."""
 
-    def __init__(self, rows: _Rows, sampled: SampledInput, controller: Controller, keeps: bool) -> None:
+    def __init__(self, rows: _StateRows, sampled: SampledInput, controller: Controller, keeps: bool) -> None:
         self.sampled = sampled
         self.filter = None
         if sampled.filter is not None:
             self.filter = _FilterRows(rows, low_pass_states(sampled.filter, controller.sampling_period))
         self.held = _HeldRows(rows, controller.delay, keeps and sampled.direct != 0.0)
 
-    def push(self, states: Floats) -> tuple[Floats, Floats]:
-        """Read the states; returns what acts until the part of the sample has passed, and from then on."""
+    def read(self, states: Floats) -> tuple[Floats, Floats]:
+        """Read the plant's states at a sample and queue the load's force that follows. Returns rows of the forces
+        that act before and after the delay's part of a sample."""
         signal = np.asarray(self.sampled.reading @ states)
         return self.held.push(signal if self.filter is None else self.filter.output(signal))
 
@@ -196,7 +198,7 @@ class _LoadRows:
 class _SlowCommand:
     """The command of the wall's loop: wall, force feedback and feedforward, through the force filter."""
 
-    def __init__(self, rows: _Rows, controller: Controller) -> None:
+    def __init__(self, rows: _StateRows, controller: Controller) -> None:
         T, self.sensor, self.ahead = controller.sampling_period, controller.force_sensor, controller.feedforward
         self.on_force = _FilterRows(rows, low_pass_states(controller.force_filter, T))
         self.period = T
@@ -240,7 +242,7 @@ class _Period:
         self.measured: Floats | None = None
         # the force just before a sample is an older command, which then has to be kept
         keeps = self.measures and lag == 0.0 and states.force_direct != 0.0
-        self.rows = _Rows()
+        self.rows = _StateRows()
         self.at = self.rows.add(len(states.output))
         self.force_at = self.rows.add(1 + len(states.sampled) if lag > 0.0 else 0)
         self.command = _SlowCommand(self.rows, controller)
@@ -255,13 +257,13 @@ class _Period:
             self.fast = _HeldRows(self.rows, self.local.delay, keeps)
 
     def closed(self) -> SampledForm:
-        """Go through the period."""
+        """What one period adds to the states, and the reading: the closed plant."""
         wall = self.rows.begin()
         reading = self._reading()
         measured = self._measured_force() if self.measures else None
         if measured is not None:
             self.measured = measured[: self.rows.size].copy()
-        own = [load.push(self.rows.now(self.at)) for load in self.loads]
+        own = [load.read(self.rows.current(self.at)) for load in self.loads]
         slow, later = self.slow.push(self.command.of(wall, reading, measured))
         fast = fast_later = np.zeros_like(wall)
         at = 0.0
@@ -292,21 +294,21 @@ class _Period:
         return sorted(instants)
 
     def _reading(self) -> Floats:
-        return np.asarray(self.states.output @ self.rows.now(self.at))
+        return np.asarray(self.states.output @ self.rows.current(self.at))
 
     def _measured_force(self) -> Floats:
         """What the sensor measures, with the force that acts just before the sample."""
-        force = self.states.force_output @ self.rows.now(self.at)
+        force = self.states.force_output @ self.rows.current(self.at)
         lags = self.controller.actuator_time_constant > 0.0
         if self.states.force_direct != 0.0:
             if lags:
-                acting = self.rows.now(self.force_at)[0]
+                acting = self.rows.current(self.force_at)[0]
             else:
                 acting = self.slow.before() + (0.0 if self.local is None else self.fast.before())
             force = force + self.states.force_direct * acting
         for number, load in enumerate(self.loads):
             if load.sampled.direct != 0.0:
-                acting = self.rows.now(self.force_at)[1 + number] if lags else load.held.before()
+                acting = self.rows.current(self.force_at)[1 + number] if lags else load.held.before()
                 force = force + load.sampled.direct * acting
         return np.asarray(force)
 
@@ -323,7 +325,7 @@ class _Period:
         """Let the plant move for a time under held commands, the wall's and those of a load, a row each."""
         lag, rows = self.controller.actuator_time_constant, self.rows
         growth, lagged, pushed = self._growth(time)
-        states, forces = rows.now(self.at), rows.now(self.force_at)
+        states, forces = rows.current(self.at), rows.current(self.force_at)
         rows.change[self.at] += growth @ states + pushed @ commands
         if lag > 0.0:
             rows.change[self.at] += lagged @ forces
@@ -342,7 +344,7 @@ class _Period:
 
 
 def low_pass_states(low_pass: LowPass | None, period: float) -> FilterStates:
-    """A low pass in states."""
+    """A low pass as a discrete filter with states; without one the filter that passes everything on."""
     top, bottom = (np.array(rows, dtype=float).reshape(-1, 3) for rows in low_pass_factors(low_pass, period))
     return filter_states(top, bottom, np.ones(1))
 

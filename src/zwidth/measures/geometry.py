@@ -122,7 +122,7 @@ def rods_of(mechanism: Mechanism, posture: Posture) -> Rods:
             ends.append(carried(i, mechanism.handle_point))
         kept: list[Floats] = [start]
         for end in ends:
-            if all(_apart(end, other) for other in kept):
+            if all(_ever_apart(end, other) for other in kept):
                 kept.append(end)
                 owner.append(int(body[i]))
                 firsts.append(start)
@@ -132,8 +132,8 @@ def rods_of(mechanism: Mechanism, posture: Posture) -> Rods:
     return Rods(np.array(owner, dtype=np.int64), np.stack(firsts, axis=-2), np.stack(lasts, axis=-2))
 
 
-def _apart(one: Floats, other: Floats) -> bool:
-    """Whether two points are apart in any posture."""
+def _ever_apart(one: Floats, other: Floats) -> bool:
+    """Whether two points (..., 3) are farther apart than SAME_POINT in at least one posture."""
     with np.errstate(invalid="ignore"):
         return bool(np.any(np.linalg.norm(one - other, axis=-1) > SAME_POINT))
 

@@ -190,7 +190,7 @@ def merged_windows(fits: Sequence[Fits], places: Floats, floor: Floats) -> Local
     level = np.zeros(count, dtype=np.int64)  # of the window that each of the narrowest tiles goes with
     whole = np.ones(count, dtype=bool)
     for n in range(1, len(levels)):
-        apart = _apart(levels[n - 1], levels[n])
+        apart = _fit_difference(levels[n - 1], levels[n])
         halves = np.append(whole, True)[: 2 * len(apart)]  # the last may have one half only
         whole = (apart < APART) & halves[::2] & np.resize(halves[1::2], len(apart))
         level[np.repeat(whole & (apart < AGREED), 2**n)[:count]] = n
@@ -216,7 +216,7 @@ def _with_floor(fits: Fits, floor: Floats) -> Fits:
     return replace(fits, noise=np.maximum(fits.noise, floor[middles]))
 
 
-def _apart(narrow: Fits, wide: Fits) -> Floats:
+def _fit_difference(narrow: Fits, wide: Fits) -> Floats:
     """How far (n,) wide tiles are from the two narrow ones within each: the largest squared difference over the
     latter's variance; inf where a window is wide against its frequency."""
     count = len(wide.noise)

@@ -202,8 +202,8 @@ def copy_row(source: Floats, target: Floats) -> None:
 
 @compiled_lean
 def _pitch(mech: MechanismArrays, reference: Floats, drive: int, turns: int) -> float:
-    """From node to node of a drive, in its unit: of one that slides so that half of the `turns` nodes reach its
-    farther limit."""
+    """Step of one drive from a node to the next, in the drive's unit: 1/`turns` of a full turn; of one that slides
+    so much that half of the `turns` nodes reach its farther limit."""
     moved = mech.joint.size - mech.free
     joint = mech.joint[moved - mech.driven + drive]
     if mech.kind[joint] == REVOLUTE:

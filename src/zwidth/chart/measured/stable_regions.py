@@ -392,7 +392,7 @@ def largest_possible(edge: Boundary, doubt: Doubt, nominal: CertainWall, most_da
     lines = np.union1d(even, nominal.damping * (1.0 + AROUND))
     stiffnesses = nominal.stiffness * (1.0 + EXCESSES)
     K, B = np.meshgrid(stiffnesses, lines, indexing="ij")
-    may_be = _may_be(edge, doubt, np.column_stack([K.ravel(), B.ravel()])).reshape(K.shape)
+    may_be = _may_be_stable(edge, doubt, np.column_stack([K.ravel(), B.ravel()])).reshape(K.shape)
     rows = np.flatnonzero(np.any(may_be, axis=1))
     if not len(rows):
         return nominal.stiffness
@@ -403,13 +403,14 @@ def largest_possible(edge: Boundary, doubt: Doubt, nominal: CertainWall, most_da
     near = np.linspace(lines[max(at[0] - 1, 0)], lines[min(at[-1] + 1, len(lines) - 1)], POSSIBLE_LINES)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        good = np.any(_may_be(edge, doubt, np.column_stack([np.full(len(near), middle), near])))
+        good = np.any(_may_be_stable(edge, doubt, np.column_stack([np.full(len(near), middle), near])))
         low, high = (middle, high) if good else (low, middle)
     return float(high)
 
 
-def _may_be(edge: Boundary, doubt: Doubt, walls: Floats) -> Flags:
-    """Which walls (n, 2) may be stable."""
+def _may_be_stable(edge: Boundary, doubt: Doubt, walls: Floats) -> Flags:
+    """Which walls (n, 2) may be stable: as many roots outside the circle as doubt can explain."""
+    # the response may in truth pass the wall on its other side along each stretch: a pair of roots, at +-theta
     return np.asarray(edge.outside(walls) <= 2 * doubt.stretches(walls)[1])
 
 

@@ -174,6 +174,7 @@ def split_joint(joint: RobotJoint) -> Iterator[RobotJoint | Place]:
 
 
 def _joint_table(name: str, parent: str, place: Place, joint: RobotJoint, S: Floats) -> dict[str, Any]:
+    """A [[mechanism.links]] table for one joint, its axes turned by S (3, 3) into the link's own frame."""
     link = _place_table(name, parent, joint.kind, place)
     sliding = joint.kind == "prismatic"
     if joint.kind in ("revolute", "prismatic", "universal"):

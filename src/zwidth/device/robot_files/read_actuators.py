@@ -138,6 +138,12 @@ def read_equalities(mujoco: Any, model: Any, robot: Robot) -> None:
 
 
 def _closure(mujoco: Any, model: Any, e: int, name: str) -> RobotClosure:
+    """A connect or weld constraint of MuJoCo as a closure of two bodies.
+
+    `eq_data` of a connect holds the point in the first body's frame, then in the second's; of a weld the point in
+    the second body's, then in the first's, the quaternion of the second body in the first at [6:10], and at [10]
+    how much the orientation counts: with 0 it holds points only.
+    """
     first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
     data = np.array(model.eq_data[e])
     weld = int(model.eq_type[e]) == int(mujoco.mjtEq.mjEQ_WELD)

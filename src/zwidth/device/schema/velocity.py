@@ -54,6 +54,7 @@ class _Method(Section):
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
+        """Build the estimator, which raises ValueError where parameters do not fit each other."""
         own = self.parameters()
         if None not in own.values():
             METHODS[self.method](**own)
@@ -112,6 +113,7 @@ class SavitzkyGolaySection(_Method):
     @field_validator("order")
     @classmethod
     def _below_samples(cls, order: int, info: ValidationInfo) -> int:
+        """Refuse an order that so many samples cannot determine."""
         samples = info.data.get("samples")
         if samples is not None and order >= samples:
             raise ValueError(

@@ -165,6 +165,7 @@ def _shares_left(X: Floats, residual: Floats, further: Sequence[Floats]) -> Floa
 
 
 def consistency_check(links: ConsistentLinks) -> Check:
+    """Whether links that can exist have the fitted base parameters, to within their uncertainty."""
     if links.deviation < WORSE:
         reason = f"links that can exist have these base parameters, to {links.deviation:.2g} deviations"
         return Check("physical consistency", True, reason)
@@ -238,7 +239,7 @@ class TorqueComparison:
     start: Floats
 
     def of(self, stretch: TorqueStretch, static: Sequence[Floats] = ()) -> Compared:
-        """Torques and columns of a stretch.
+        """The measured torques of a stretch, and the torque per unit of each base parameter (the columns).
 
         static   gravities (3,) of which further columns are made
         Raises NoAnswerError  where the mechanism cannot be

@@ -105,7 +105,7 @@ def identify_boundary(
     plan = TrialPlan.of(points, point, disturbance, visible) if simulated else None
     checks.append(_route(point, plan))
     fits = [(_model(points, one, plan, report), one) for one in choices]
-    checks += [*_without_edge(fits, records), _apart(fits[0][0], fits[0][1])]
+    checks += [*_without_edge(fits, records), _moves_boundary(fits[0][0], fits[0][1])]
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     comparison = compare_models(fits, report)
@@ -223,7 +223,7 @@ def _without_edge(
     return checks
 
 
-def _apart(model: BoundaryModel, parameters: BoundaryParameters) -> Check:
+def _moves_boundary(model: BoundaryModel, parameters: BoundaryParameters) -> Check:
     """Whether each number moves the boundary at all, at the values of the file."""
     J = derivatives(model, parameters.start, first_scatter(model.points))
     names = [what for what, _, _ in parameters.named]

@@ -204,11 +204,12 @@ def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> 
 
 
 def _covered(quantities: Sequence[Quantity]) -> set[str]:
+    """Paths of the numbers that the quantities make, the delays always among them."""
     return {path for one in quantities for path, _, _ in one.entries} | set(DELAYS)
 
 
 def _remainder(plant: Plant, quantities: Sequence[Quantity], shapes: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    """The matrices without what the quantities make of them."""
+    """The plant's matrices less what the quantities add to them at their values in the file; rounding set to 0."""
     rest = {name: getattr(plant, name).copy() for name, _ in MATRICES.values()}
     for one, (name, shape) in zip(quantities, shapes, strict=True):
         if shape is not None:

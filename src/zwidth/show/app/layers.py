@@ -214,6 +214,7 @@ def edge_arrays(arcs: Iterable[BoundaryArc]) -> dict[str, Any]:
 
 
 def _joined(name: str, parts: Sequence[Floats], width: int) -> dict[str, Any]:
+    """Lists of rows (k, width) one after another, and under `name`_ends the row behind each."""
     ends = np.cumsum([len(part) for part in parts], dtype=np.int64)
     whole = np.concatenate(parts) if parts else np.zeros((0, width))
     return {name: whole, f"{name}_ends": ends}

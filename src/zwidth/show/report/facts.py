@@ -73,7 +73,7 @@ class Facts:
 
     @property
     def loop(self) -> Loop:
-        """Its loop."""
+        """The loop of the device as described."""
         loop = self.base.loop
         assert loop is not None
         return loop

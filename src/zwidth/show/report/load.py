@@ -18,7 +18,7 @@ def sentences(facts: Facts) -> list[str]:
     """What is said of the load; [] for a device that bears none."""
     if facts.point.load is None:
         return []
-    said = [carried(facts), across(facts), change(facts), one_sided(facts), other_branch(facts), along(facts)]
+    said = [carried(facts), across(facts), change(facts), never_pulling(facts), other_branch(facts), along(facts)]
     return [sentence for sentence in said if sentence]
 
 
@@ -72,8 +72,8 @@ def change(facts: Facts) -> str:
     return f"The load changes the largest stiffness by {moved}, from {bare} without it in this posture."
 
 
-def one_sided(facts: Facts) -> str:
-    """F/K; "" where nobody pushes, or no wall is stable."""
+def never_pulling(facts: Facts) -> str:
+    """Up to which amplitude, F/K, a wall that never pulls is as charted; "" without a push or a stable wall."""
     found = facts.point.equilibrium
     if not (found.load.pushes and facts.renders):
         return ""

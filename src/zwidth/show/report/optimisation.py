@@ -161,6 +161,7 @@ def optimisation_sentences(found: Optimisation) -> list[str]:
 
 
 def _how_found(found: Optimisation, tried: str) -> str:
+    """What the shown designs are of all that were tried, as a part of a sentence."""
     if len(found.problem.objectives) == 1:
         return f"the best found of {tried} tried"
     return f"{plural(len(found.front), 'design')} of the front, of {tried} tried"

@@ -268,11 +268,13 @@ class _CellCollection:
         self.notes: list[Notes] = []
 
     def add(self, first: int, cells: CellValues) -> None:
+        """Take in consecutive cells that begin with number `first`."""
         last = first + len(cells.values)
         self.values[first:last], self.status[first:last] = cells.values, cells.status
         self.notes.append(cells.notes)
 
     def cells(self) -> CellValues:
+        """All cells; nan and MISSING for those not yet taken in."""
         each = [
             merge_notes(note for notes in self.notes for note in notes[m]) for m in range(self.values.shape[1])
         ]

@@ -187,6 +187,7 @@ def _rank(number: GoalNumber, goal: float) -> tuple[int, float]:
 
 
 def _search(device: Device, path: str, steps: KeyPath, value: float, own: float, goal: float) -> _Search:
+    """The search for one number, within the limits that its schema allows; it knows the device as it is."""
     (lowest, highest, excluded), _ = number_limits(device.document, steps)
     lowest = np.nextafter(lowest, inf) if "lowest" in excluded else lowest
     highest = np.nextafter(highest, -inf) if "highest" in excluded else highest
@@ -202,7 +203,8 @@ def _level(stiffness: float, goal: float) -> float:
 def _found(
     searches: list[_Search], charts: ChangedStiffness, goal: float, progress: Progress | None
 ) -> list[GoalNumber]:
-    """Search outwards, a few values at a time, and refine what is crossed before going on."""
+    """For each number the value with which the goal is reached: values are tried outwards, a few at a time, and
+    each bracket is narrowed before going on."""
     left = searches
     for first in range(0, STEPS, AT_A_TIME):
         _sample([(one, t) for one in left for t in one.grid(first)], charts, goal)
@@ -407,6 +409,7 @@ class ChangedStiffness:
         return np.nan
 
     def _groups(self, changes: Sequence[Change]) -> Iterator[DesignGroup]:
+        """The changes as groups of designs that are charted together."""
         return self._grouping.groups(list(self._columns(changes))) if changes else iter(())
 
     def _columns(self, changes: Sequence[Change]) -> Iterator[DesignColumn]:

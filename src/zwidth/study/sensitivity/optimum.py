@@ -182,6 +182,7 @@ class _Piece(NamedTuple):
 
 
 def _pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
+    """The pieces of edge that meet at the peak, with their shares in its derivative."""
     return EdgePieces(
         kind=np.array([one.kind for one in pieces]),
         angle=np.array([one.angle for one in pieces]),
@@ -193,11 +194,13 @@ def _pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
 
 
 def _curve(tracer: Tracer, angle: float) -> _Piece:
+    """The curve of root pairs at an angle, by its normal: a unit vector across the tangent (dK, dB)."""
     _, _, dK, dB = tracer.wall(angle)
     return _Piece(CURVE, angle, np.array([dB, -dK]) / np.hypot(dB, dK))
 
 
 def _line(tracer: Tracer, angle: float, peak: Peak) -> _Piece:
+    """The line of walls with a root z = 1 at angle 0, else z = -1; sizes of its terms at the peak add to 1."""
     wall = np.array([1.0, peak.stiffness, peak.damping])
     line = tracer.line("plus" if angle == 0.0 else "minus")
     normal = line[1:] / float(np.abs(line) @ np.abs(wall))
