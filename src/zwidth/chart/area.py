@@ -253,8 +253,10 @@ def _rule(
     for i in range(1, n - 1):
         t[i - 1] = _between(a, b, rule[0, i], far)
     walls_of_samples(circle, t, n - 2, K[1:], B[1:], lanes)
+    # walls at the panel's ends are given; only those at the nodes between are solved for
     K[0], B[0], K[n - 1], B[n - 1] = Ka, Ba, Kb, Bb
     for i in range(n):
+        # dB by differentiating the polynomial through all nodes, so that the curve's slope is not needed
         slope = 0.0
         for j in range(n):
             slope += rule[i + 1, j] * B[j]

@@ -128,6 +128,7 @@ def fill_numbers(
         return
     fill_loop(loops, i, radius, memory)
     status = DOUBTFUL
+    # the stiffest wall alone is found from fewer samples; where that is in doubt the whole edge is read
     if what & (STIFFEST | WHOLE_EDGE) == STIFFEST:
         status = search_peak(memory)
     if what & (STIFFEST | WHOLE_EDGE) and status == DOUBTFUL:

@@ -194,6 +194,7 @@ def _read_damping(memory: EdgeMemory, scale: float) -> bool:
     """The supremum of B >= 0 that is stable for all sufficiently small K > 0, 0 if there is none; False where
     rounding hides whether an interval of K = 0+ is stable."""
     stops, n = memory.stops, memory.counts[STOPS]
+    # insertion sort: there are few stops, and nothing is allocated
     for k in range(1, n):
         B, i = stops[k], k
         while i > 0 and stops[i - 1] > B:
@@ -201,6 +202,7 @@ def _read_damping(memory: EdgeMemory, scale: float) -> bool:
             i -= 1
         stops[i] = B
     least = SHORTEST * (stops[n - 1] if stops[n - 1] > 0.0 else 1.0)
+    # from above: the first stable interval beside K = 0 ends at the supremum
     for k in range(n - 1, 0, -1):
         if stops[k] - stops[k - 1] <= least:
             continue

@@ -98,6 +98,7 @@ def _add_roots(out: Features, a0: float, a1: float, a2: float) -> None:
     if gap < 0.0:
         _add(out, mean, np.sqrt(-gap))
         return
+    # the root without cancellation, and the other from the product a0 / a2
     large = mean - np.sqrt(gap) if mean <= 0.0 else mean + np.sqrt(gap)
     _add(out, large, 0.0)
     _add(out, a0 / (a2 * large) if large != 0.0 else 0.0, 0.0)
@@ -180,6 +181,7 @@ def _fill_distances(radius: float, out: Features) -> None:
         s = out.points[k]
         over = 1.0 / ((1.0 - s.real) ** 2 + s.imag * s.imag)
         out.scales[0, k] = 4.0 * radius * radius * over
+        # z = (1 + s)/(1 - s), the quotient written out
         out.z[k] = complex((1.0 - s.real * s.real - s.imag * s.imag) * over, 2.0 * s.imag * over)
     for k in range(n):
         z = out.z[k]

@@ -79,6 +79,7 @@ def fill_corner(memory: EdgeMemory, i: int) -> int:
     if known >= 0:
         _copy_corner(memory, known, i)
     elif state == SETTLED:
+        # a crossing of the curve with itself, whose wall one of both angles gives with more digits, or with a line
         if 0.0 < partner < np.inf:
             K, B = wall_on_circle(circle, better_conditioned(circle, t, partner))
         else:

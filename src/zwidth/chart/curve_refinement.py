@@ -67,11 +67,14 @@ def _find_clear(memory: EdgeMemory, clear: Floats) -> None:
     a, s, v = line_of(memory, 0.0)
     b, p, q = line_of(memory, np.inf)
     for i in range(memory.counts[SAMPLES] - 1):
+        # slopes are per ln t; this is its step, to the third order
         step = 2.0 * (t[i + 1] - t[i]) / (t[i + 1] + t[i])
         uK, wK, uB, wB = step * slope_K[i], step * slope_K[i + 1], step * slope_B[i], step * slope_B[i + 1]
         K0, K3, B0, B3 = K[i], K[i + 1], B[i], B[i + 1]
+        # control points of the cubic through both ends with their slopes, drawn out by STRAY: its hull holds it
         K1, K2 = K0 + STRAY / 3.0 * uK, K3 - STRAY / 3.0 * wK
         B1, B2 = B0 + STRAY / 3.0 * uB, B3 - STRAY / 3.0 * wB
+        # the slope of K along the cubic has the Bernstein coefficients uK, 2 m, wK: with one sign K does not turn
         m = 1.5 * (K3 - K0) - 0.5 * (uK + wK)
         one_sign = (uK * wK > 0.0) & (m * uK > MARGIN * uK * uK) & (m * uK > MARGIN * uK * wK)
         returns = (K0 * K3 > 0.0) & ((K0 * K1 < 0.0) | (K3 * K2 < 0.0))

@@ -45,6 +45,7 @@ def search_fastest(loops: LoopTable, i: int, memory: EdgeMemory) -> int:
     fastest[0], fastest[1], fastest[2] = np.nan, np.nan, np.inf
     _search_double_roots(loops, i, memory)
     for _ in range(ROUNDS):
+        # only walls that decay faster than the best so far, by the share FASTER of its decay, count from here on
         radius = 1.0 - (1.0 - fastest[2]) * (1.0 + FASTER) if fastest[2] < 1.0 else 1.0
         if not radius > 0.0:
             return FOUND if _keeps_digits(loops, i, memory) else DOUBTFUL
@@ -86,6 +87,7 @@ def double_root_excess(loops: LoopTable, i: int, root: float, radius: float, mem
     if not (known and np.isfinite(K + B)):
         return np.inf
     polynomials, N = memory.polynomials.coefficients, memory.circle.sizes[DEGREE]
+    # s^2 is a factor for the double root s = 0; that at s = inf leaves the two highest coefficients at zero
     rest, roots, low = memory.room[0, : N - 1], memory.features.roots[: N - 2], 2 if root == 0.0 else 0
     for k in range(N - 1):
         rest[k] = polynomials[0, k + low] + K * polynomials[1, k + low] + B * polynomials[2, k + low]
@@ -111,6 +113,7 @@ def solve_double_root(loops: LoopTable, i: int, root: float, low: float, high: f
             break
         if value * at_high < 0.0:
             low, at_low = x, value
+            # Illinois: an end that stays twice running has its value halved, else it would stay for good
             at_high *= 0.5 if last == -1 else 1.0
             last = -1
         else:

@@ -66,12 +66,14 @@ def _add_pair_arc(memory: EdgeMemory, low: int, high: int) -> bool:
     k = memory.counts[ARCS]
     if k >= MOST_ARCS:
         return False
+    # a corner that was solved for may lie beyond the sample next to it
     while low <= high and t[low] <= start:
         low += 1
     while high >= low and t[high] >= end:
         high -= 1
     arcs.samples[k, 0], arcs.samples[k, 1] = low, high + 1
     arcs.kind[k] = PAIR
+    # arcs run with the stable walls on their left, which makes rings counter-clockwise
     if stable_on_left(memory, t[(low + high) // 2]):
         arcs.start[k], arcs.end[k] = start, end
         arcs.first[k, 0], arcs.first[k, 1], arcs.last[k, 0], arcs.last[k, 1] = K0, B0, K1, B1
@@ -159,6 +161,7 @@ def _fill_nodes(memory: EdgeMemory, root: float) -> int:
     line, samples, nodes = line_of(memory, root), memory.samples, memory.pieces.nodes
     a, s, v = line
     n = 0
+    # the curve's two ends, and where both lines meet, if they are on this line: no sample is
     for which in range(3):
         if which == 2:
             K, B, known = line_crossing(memory)
@@ -172,6 +175,7 @@ def _fill_nodes(memory: EdgeMemory, root: float) -> int:
     for i in range(memory.counts[SAMPLES]):
         K, B = samples.K[i], samples.B[i]
         side = a + s * K + v * B
+        # beside the line rounding decides the side: the next sample away from it tells of a crossing
         if not abs(side) > UNSURE_SIDE * (abs(a) + abs(s * K) + abs(v * B)):
             continue
         if before * side < 0.0:
@@ -291,12 +295,14 @@ def _next_arc(memory: EdgeMemory, k: int, begin: int) -> int:
     begin  the arc with which the walk began, which may end it
     """
     arcs, T = memory.arcs, memory.size[1]
+    # directions are compared with K T against B, which have one unit
     back = np.arctan2(arcs.first[k, 1] - arcs.last[k, 1], (arcs.first[k, 0] - arcs.last[k, 0]) * T)
     best, least = -1, np.inf
     for j in range(memory.counts[ARCS]):
         if arcs.node[j, 0] != arcs.node[k, 1] or (arcs.next_arc[j] != -2 and j != begin):
             continue
         onward = np.arctan2(arcs.last[j, 1] - arcs.first[j, 1], (arcs.last[j, 0] - arcs.first[j, 0]) * T)
+        # the first arc that is met when turning from where we came across the left, stable side
         turn = (back - onward) % (2.0 * np.pi)
         if turn < least:
             best, least = j, turn

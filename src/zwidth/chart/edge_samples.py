@@ -96,6 +96,7 @@ def add_samples_between_corners(memory: EdgeMemory) -> bool:
     for k in range(min(memory.counts[CROSSINGS], most - m)):
         places[m] = memory.pieces.crossing_t[k]
         m += 1
+    # insertion sort: there are few places, and nothing is allocated
     for k in range(1, m):
         place, i = places[k], k
         while i > 0 and places[i - 1] > place:
@@ -113,6 +114,7 @@ def add_samples_between_corners(memory: EdgeMemory) -> bool:
             added += 1
     if added == 0 or n + added >= len(samples.t):
         return False
+    # both lists ascend: merged in place from the end
     i, k = n - 1, added - 1
     for place in range(n + added - 1, -1, -1):
         if k >= 0 and (i < 0 or new[k] > samples.t[i]):
@@ -150,6 +152,7 @@ def walls_again(memory: EdgeMemory) -> None:
     for i in range(n):
         beside[0, i] = samples.t[i] * (1.0 + BESIDE)
     walls_of_samples(memory.circle, beside[0], n, beside[1], beside[2], memory.lanes)
+    # slopes per ln t, by differences with walls beside: refining needs no more digits
     for i in range(n):
         samples.slope_K[i] = (beside[1, i] - samples.K[i]) * (1.0 / BESIDE)
     for i in range(n):

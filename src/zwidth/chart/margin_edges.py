@@ -147,6 +147,7 @@ def _add_turns(
         one = zero_between(circle, OF_SLOPE, NO_LINE, at, then)
     if of_B:
         other = zero_between(circle, OF_SLOPE_B, NO_LINE, at, then)
+    # nodes stand in the order in which the curve is walked
     if of_K and of_B and abs(other - at) < abs(one - at):
         one, other = other, one
     if of_K or of_B:
@@ -181,6 +182,7 @@ def add_crossings(
                 k0, k1 = nodes.K[k], nodes.K[k + 1]
                 if not (k0 - side) * (k1 - side) < 0.0:
                     continue
+                # nodes of one loop stand together, so that its factors are filled once
                 if filled != d:
                     own = i + d * step
                     fill_computer(loops, loops.computer[own], 1.0, circle)
@@ -253,6 +255,7 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
             continue
         x0, y0, y1 = _piece_between(k0, k1, b0, b1, low, high)
         least, largest = min(y0, y1), max(y0, y1)
+        # pieces that go on one from another within the band cover one interval of damping
         if last == i - 1 and x0 == k0 and m > 0:
             parts[m - 1, 0], parts[m - 1, 1] = min(parts[m - 1, 0], least), max(parts[m - 1, 1], largest)
         elif m >= len(parts):
@@ -270,7 +273,9 @@ def fits(nodes: EdgeNodes, count: int, K: float, factor: float, damping_factor: 
     top = 0.0
     for k in range(m):
         bottom = parts[k, 0]
+        # B / b and B b both fit into the gap if its ends are b^2 apart
         if bottom > top and bottom >= damping_factor * damping_factor * top:
+            # its geometric middle is as many times away from either end
             middle = np.sqrt(top * bottom) if top > 0.0 else 0.5 * bottom
             if _is_inside(nodes, count, K, middle):
                 nodes.gap[0], nodes.gap[1] = top, bottom

@@ -220,6 +220,7 @@ def _has_stiffer_turn(memory: EdgeMemory) -> bool:
     for i in range(memory.counts[SAMPLES] - 1):
         j, third = i + 1, STRAY * 2.0 / 3.0 * (samples.t[i + 1] - samples.t[i]) / (samples.t[i + 1] + samples.t[i])
         first, last = K[i] + third * samples.slope_K[i], K[j] - third * samples.slope_K[j]
+        # bounds of the cubic's control points, which hold the piece of the curve
         high = max(max(K[i], K[j]), max(first, last))
         if not high > memory.peak[0]:
             continue
@@ -233,6 +234,7 @@ def _has_stiffer_turn(memory: EdgeMemory) -> bool:
         box[0, count], box[1, count] = min(min(K[i], K[j]), min(first, last)), high
         box[2, count], box[3, count] = min(min(B[i], B[j]), min(above, below)), top
         for k in range(count):
+            # neighbouring pieces meet in their common sample, which is no crossing
             apart = box[1, k] < box[0, count] or box[0, k] > high or box[3, k] < box[2, count] or box[2, k] > top
             if not apart and number[k] < i - 1 and _is_edge_where_they_cross(memory, number[k], i):
                 return True
@@ -282,6 +284,7 @@ def _is_edge_where_they_cross(memory: EdgeMemory, i: int, j: int) -> bool:
                 continue
             share = ((L0 - K0) * eB - (C0 - B0) * eK) / det
             other = ((L0 - K0) * dB - (C0 - B0) * dK) / det
+            # the chords are not the curve: a crossing may lie a little beyond their ends
             if not (-BEYOND_CHORD <= share <= 1.0 + BEYOND_CHORD and -BEYOND_CHORD <= other <= 1.0 + BEYOND_CHORD):
                 continue
             if K0 + share * dK < memory.peak[0] * (1.0 - BEYOND_CHORD) or _is_unstable_around(

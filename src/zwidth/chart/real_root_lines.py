@@ -92,6 +92,7 @@ def wall_on_line(circle: CircleFactors, line: tuple[float, float, float], t: flo
     off, slope = a + s * K + v * B, s * dK + v * dB
     for beside in (t * (1.0 - LAST_DIGITS), t * (1.0 + LAST_DIGITS)):
         k, b = wall_on_circle(circle, beside)
+        # t is the crossing to its last digit only if the curve is farther from the line on either side
         if not abs(a + s * k + v * b) > abs(off):
             return K, B
     step = -off / slope if slope != 0.0 else 0.0

@@ -127,6 +127,7 @@ def _times_factor(row: Floats, n: int, w: Floats) -> None:
     """Rows W_X, W_Y over W times one factor, as in `circle_factors.factor_product`."""
     n0, n1, n2, d0, d1, d2 = row[1], row[2], row[3], row[4], row[5], row[6]
     if row[0] == 1.0:
+        # numerator times the conjugate denominator, over the square of the latter: rows stay free of divisions
         a, b, c, p, q = n0 * d0, n1 * d1, n1 * d0 - n0 * d1, d0 * d0, d1 * d1
         for k in range(n):
             cc, ss, sc, x, y = w[CC + k], w[SS + k], w[SC + k], w[W_X + k], w[W_Y + k]
@@ -201,6 +202,7 @@ def _find_negative(polynomials: Floats, N: int, n: int, w: Floats) -> None:
         rs, rv = ROUNDING * (abs(s) + polynomials[3, i]), ROUNDING * (abs(v) + polynomials[4, i])
         for k in range(n):
             K, B, outside = w[K_ + k], w[B_ + k], w[OUTSIDE + k]
+            # all roots inside: all coefficients of one sign; what rounding may have turned tells nothing
             negative = a + K * s + B * v < -(ra + abs(K) * rs + abs(B) * rv)
             w[OUTSIDE + k] = 1.0 if negative else outside
 
@@ -230,6 +232,7 @@ def _sum_polynomials(polynomials: Floats, N: int, n: int, w: Floats) -> None:
         p, e = COEFFICIENTS + i * LANES, ERRORS + i * LANES
         for k in range(n):
             K, B, power = w[K_ + k], w[B_ + k], w[POWER + k]
+            # in s / t, where the pair on the circle is at +-i whatever its angle
             w[p + k] = (a + K * s + B * v) * power
             w[e + k] = (ra + abs(K) * rs + abs(B) * rv) * power
             w[POWER + k] = power * w[T + k]

@@ -234,6 +234,7 @@ def estimate_velocity(computer: Computer, signals: Signals, s: int, reading: flo
     """The estimated velocity of coordinate s, which stood where it was first read before sample 0."""
     if sample == 0:
         signals.first[s] = reading
+    # counted from the first reading: a memory of zeros is then a device that has stood still before
     past, moved = signals.past[s], reading - signals.first[s]
     if computer.method == FOAW:
         speed = foaw_estimate(past, computer.tuning, moved, computer.period)

@@ -145,6 +145,7 @@ def enter_sample(
     entries, last = book.entries, book.last
     if last[BEGUN] > 0.0:
         dy = truth - last[LAST_TRUTH]
+        # the trapezoid is what a continuous spring would do; the rest of the held force is charged to the hold
         wall = 0.5 * (last[LAST_IDEAL_FORCE] + ideal_force) * dy
         entries[WALL] += wall
         entries[HOLD] += last[LAST_IDEAL_FORCE] * dy - wall

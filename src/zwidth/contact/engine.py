@@ -197,6 +197,7 @@ def advance_interval(
             command += memory.queue[feedback.delays[d, 1] + (fast_part if feedback.splits[d] != 0 else 0)]
             command = clip(command, computer.limit)
         memory.first[2] = command
+        # forces that vary are renewed at each substep; where none does, all substeps are taken in one go
         stride = 1 if varies else max(count, 1)
         for k in range(0, count, stride):
             if varies:

@@ -206,6 +206,7 @@ def step_brakes_and_reflexes(
         if role == BRAKE:
             wanted, lag, now = memory[e, 2], devices.numbers[d, e, 2], memory[e, 3]
             fade = exp(-h / lag) if lag > 0.0 else 0.0
+            # the mean over the substep of the exponential approach to what is wanted
             memory[e, 1] = wanted + (now - wanted) * ((1.0 - fade) * lag / h)
             memory[e, 3] = wanted + (now - wanted) * fade
         elif memory[e, 3] < 0.0:

@@ -120,6 +120,7 @@ def passivity_force(memory: Floats, parameters: Floats, force: float, position: 
     held = parameters[HELD] > 0.0
     energy = memory[ENERGY] - (memory[LAST_FORCE] if held else force) * moved
     if held:
+        # b (moved)^2 / T is the least that the damper takes on this way: at constant speed
         energy += parameters[DEVICE_DAMPING] * moved * moved / period
     missing = parameters[REFERENCE] - energy
     extra = 0.0

@@ -177,6 +177,7 @@ def step_with_frictions(
             solve_forces(devices, d, part, True, here)
         step(A, inputs, d, part, here)
         here = swapped(here)
+    # states alternate between two arrays, and are left in the other one
     if count % 2:
         keep_swapped(state)
 
@@ -344,6 +345,7 @@ def _quotient(cubic: float, excess: float, kink: float, q0: float, q1: float) ->
     if q0 <= 0.0 and q1 <= 0.0:
         return mean + 0.5 * excess * (q0 + q1), slope + 0.5 * excess
     if q0 < 0.0 or q1 < 0.0:
+        # one end is beyond the kink: only back^2/2 of the way to or from it bends the excess
         back = min(q0, q1)
         share = back / abs(q1 - q0)
         mean += 0.5 * excess * back * abs(share)

@@ -371,6 +371,7 @@ def fastest_vibration(
         if len(roots) == 0:
             break
         k = np.argmax(np.abs(roots))
+        # at these sizes another root may grow faster than the one that was followed; then follow that one
         if abs(roots[k]) <= abs(z) + 1e-6:
             break
         faster, other, changed = iterate_vibration(loop, roots[k], all_sizes[k].copy(), size, by_velocity, same)

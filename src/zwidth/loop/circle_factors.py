@@ -93,6 +93,7 @@ def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
         bilinear(loops.rows[i, k, 2], loops.rows[i, k, 3], loops.rows[i, k, 4], 2, radius, out.plant[k, 3:6])
         bilinear(loops.rows[i, k, 5], loops.rows[i, k, 6], loops.rows[i, k, 7], 2, radius, out.plant[k, 6:9])
         out.plant[k, 9] = loops.rows[i, k, 8]
+    # sections have two poles each; the delay, its split and the window add theirs at z = 0
     degree = 2 * m + out.sizes[WHOLE_DELAY] + out.sizes[SPLIT] + out.sizes[WINDOW] - 1
     for k in range(out.sizes[FORCE]):
         degree += int(out.force[k, 0])
@@ -241,6 +242,7 @@ def wall_with_slopes(f: CircleFactors, t: float) -> tuple[float, float, float, f
     dh = (dX - h * dN) * inverse
     w = scaled_factors(Y, 1.0 / Q)
     dw = scaled_factors(dY - scaled_factors(w, dQ), 1.0 / Q)
+    # h = K + B w, h = -1/P: the imaginary part alone gives B
     across = 1.0 / w.imag
     B = h.imag * across
     dB = (dh.imag - B * dw.imag) * across

@@ -75,10 +75,12 @@ def denominator(decay: float, squared: float, period: float) -> tuple[float, flo
     gap = squared - a * a
     if gap > 0.0:
         swing = sqrt(gap) * T
+        # exp(s T) - 1 without cancellation: expm1(a) cos(b) - 2 sin(b/2)^2 is the real part
         real = expm1(-a * T) * cos(swing) - 2.0 * sin(swing / 2.0) ** 2
         imag = exp(-a * T) * sin(swing)
         return -2.0 * real, real * real + imag * imag
     root = sqrt(-gap)
+    # the root without cancellation, and the other from the product
     large = -a - root if a >= 0.0 else -a + root
     small = squared / large if large != 0.0 else 0.0
     first, second = expm1(large * T), expm1(small * T)

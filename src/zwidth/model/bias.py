@@ -112,6 +112,7 @@ def point_acceleration(
     bx, by, bz = b[link, 0], b[link, 1], b[link, 2]
     rx, ry, rz = p[0] - o[link, 0], p[1] - o[link, 1], p[2] - o[link, 2]
     along, square = wx * rx + wy * ry + wz * rz, wx * wx + wy * wy + wz * wz
+    # a + alpha x r + w x (w x r), the last as w (w . r) - r w^2
     return (
         a[link, 0] + by * rz - bz * ry + wx * along - rx * square,
         a[link, 1] + bz * rx - bx * rz + wy * along - ry * square,

@@ -193,6 +193,7 @@ def newton_step(mech: MechanismArrays, design: int, work: WorkingMemory) -> floa
     basis, rows, sides, gaps, unit = work.basis, work.rows, work.sides, work.gaps, mech.unit
     m, count = rows.shape[0], gaps.size
     moved = m - mech.free
+    # in the unit of each unknown, so that angles and ways weigh alike
     for u in range(moved):
         for r in range(count):
             basis[u, r] = unit[design, u] * rows[u, r]
@@ -289,6 +290,7 @@ def step_again(mech: MechanismArrays, work: WorkingMemory, unknowns: int, rows: 
     most = 0.0
     for j in range(unknowns):
         size = abs(x[0, j])
+        # nan counts as the largest
         if size > most or size != size:
             most = size
     for j in range(unknowns, mech.joint.size):

@@ -233,6 +233,7 @@ def joint_beyond_limit(mech: MechanismArrays, design: int, angles: Floats) -> in
             continue
         beyond = max(low - angles[i], angles[i] - high)
         if kind[i] == REVOLUTE and beyond > 0.0:
+            # the first whole turn that brings the angle above its lower limit
             turns = np.ceil((low - angles[i]) / (2.0 * np.pi) - ROUNDING)
             beyond = angles[i] + 2.0 * np.pi * turns - high
         if beyond > LIMIT_TOLERANCE * (mech.size[design] if kind[i] == PRISMATIC else 1.0):
@@ -377,6 +378,8 @@ def moved_posture(mech: MechanismArrays, angles: Floats, step: Floats) -> Floats
 
 @compiled
 def _move(mech: MechanismArrays, angles: Floats, step: Floats, parts: int) -> bool:
+    """Move the independent coordinates `parts` times by a step (c,), closing the loops (n,) in place; False where
+    they do not close."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)

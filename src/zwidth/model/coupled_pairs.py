@@ -153,6 +153,7 @@ def _fill_pairs(
         for k in range(2 * n):
             largest = max(largest, abs(poles[i, k]))
         for k in range(2 * n):
+            # one of each conjugate pair tells of both
             if poles[i, k].imag >= 0.0:
                 p[count], r[count], sure = _pole_and_residue(
                     M[i], B[i], K[i], ends[:, i], poles[i, k], largest, A, x
@@ -337,6 +338,7 @@ def _settle(
     for k in range(n):
         sum_v += velocity[k]
         at_v = k if abs(velocity[k]) > abs(velocity[at_v]) else at_v
+    # taken off the largest, of which it is the smallest share
     velocity[at_v] -= sum_v
     for k in range(n):
         sum_x += position[k] - 2.0 * decay[k] * velocity[k] - ends[1, k] * x[k].real
@@ -371,6 +373,7 @@ def _add_up(
         for k in range(n):
             whole += ends[1, k] * x[k]
             total += (position[k] + velocity[k] * s) / ((s + 2.0 * decay[k]) * s + squared[k])
+        # so put that nan is no agreement
         if not abs(total - whole) <= AGREEMENT * abs(whole):
             return False
     return True

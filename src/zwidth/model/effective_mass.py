@@ -194,6 +194,7 @@ def inverse_form(A: Floats, h: Floats, d: int) -> float:
     total = 0.0
     for j in range(d):
         pivot = A[j, j]
+        # with A = L D L^T the form is the sum of (L^-1 h)_j^2 / D_j: no way back is needed
         total += h[j] * h[j] / pivot
         for i in range(j + 1, d):
             factor = A[i, j] / pivot

@@ -74,6 +74,8 @@ def _regressors(
     angles: Floats,
     out: Floats,
 ) -> int:
+    """Fill the regressors `out` and joint coordinates `angles` of a series of postures, each begun from the one
+    before. Returns how many were done before one whose loops do not close."""
     work, flow = working_memory(mech), new_link_accelerations(mech)
     present = start.copy()
     place_links(mech, 0, present, work)

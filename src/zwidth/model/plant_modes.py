@@ -166,6 +166,7 @@ def relative(root: Floats, A: Floats, out: Floats) -> None:
             out[r, c] = value / root[c, c]
     for r in range(n):
         for c in range(r):
+            # the eigenvalues are taken of a matrix that is symmetric to the last digit
             out[r, c] = out[c, r] = 0.5 * (out[r, c] + out[c, r])
 
 

@@ -280,6 +280,7 @@ def invert(A: Floats, out: Floats) -> None:
         for j in range(d):
             out[i, j] = 1.0 if i == j else 0.0
     for p in range(d):
+        # no exchange of rows: the pivots of a positive definite matrix do not vanish
         over = 1.0 / A[p, p]
         for j in range(d):
             A[p, j] *= over
@@ -307,10 +308,12 @@ def jacobi(A: Floats, V: Floats) -> None:
         turned = False
         for p in range(n - 1):
             for q in range(p + 1, n):
+                # small beside its own two diagonal entries, not the largest: that is what keeps small eigenvalues
                 if not abs(A[p, q]) > 1e-17 * np.sqrt(abs(A[p, p] * A[q, q])):
                     continue
                 turned = True
                 slope = (A[q, q] - A[p, p]) / (2.0 * A[p, q])
+                # the smaller of both angles that make A[p, q] zero, by its tangent
                 t = np.copysign(1.0, slope) / (abs(slope) + np.sqrt(1.0 + slope * slope))
                 c = 1.0 / np.sqrt(1.0 + t * t)
                 s = t * c

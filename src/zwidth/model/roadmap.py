@@ -188,6 +188,7 @@ def turn_drive(
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)
     of_drives, of_handle = orientations(mech, work)
+    # a determinant that has changed its sign has passed a singularity
     if of_drives <= 0.0 or of_handle <= 0.0:
         return False
     return bool(min(passive_rates(mech, 0, work), newton_step(mech, 0, work)) >= margin)

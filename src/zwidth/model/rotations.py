@@ -149,6 +149,7 @@ def vector_between_axes(
         return share * x, share * y, share * z
     if cosine > 0.0:
         return 0.0, 0.0, 0.0
+    # opposite axes: any vector across a, made of its larger components
     if abs(a[0]) < 0.6:
         y, z = a[2], -a[1]
     else:

@@ -231,6 +231,7 @@ def apply_command(
         if lagging[k] >= 0:
             follow[k] = arrived_command(computer, rendering.signals, lagging[k], part)
             straight = False
+    # a motor behind a lag follows its command by a state of its own
     if straight:
         for i in range(motor.size):
             held[motor[i]] = arrived_command(computer, rendering.signals, i, part)

@@ -252,6 +252,7 @@ def release(system: System, memory: Memory, x: Floats, trial: Floats, resting: F
         memory.hold[at] -= friction[i]
         if resting[i] == 1.0:
             trial[n + at] = 0.0
+            # at rest from beginning to end it has not moved, whatever rounding says
             if x[n + at] == 0.0:
                 trial[at] = x[at]
         work -= friction[i] * (trial[at] - x[at])
@@ -328,6 +329,7 @@ def configure(system: System, memory: Memory, x: Floats) -> float:
     for i in range(d):
         for j in range(i + 1):
             total = mass[0, i, j]
+            # a rotor on a rigid drive turns with its joint; one behind a spring is a coordinate of its own
             if i == j and motor[i] == i:
                 total += rotor[i]
             for k in range(j):
@@ -388,5 +390,6 @@ def solve_small(system: System, memory: Memory, forces: Floats, first: int) -> N
             forces[first + i] -= L[k, i] * forces[first + k]
         forces[first + i] /= L[i, i]
     for i in range(d):
+        # rotors behind springs couple to nothing by mass
         if motor[i] != i:
             forces[first + motor[i]] /= rotor[i]

@@ -177,6 +177,7 @@ def _box(surface: Floats, dx: float, dy: float, dz: float) -> tuple[float, float
         sign = 1.0 if along >= 0.0 else -1.0
         if over > nearest:
             nearest, face, side = over, i, sign
+        # outside, every axis along which the point is beyond adds to the way to the box's nearest point
         if over > 0.0:
             squared += over * over
             nx, ny, nz = nx + sign * over * ax, ny + sign * over * ay, nz + sign * over * az

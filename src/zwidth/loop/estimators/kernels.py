@@ -35,6 +35,7 @@ def foaw_estimate(memory: Floats, parameters: Floats, reading: float, period: fl
         memory[ORIGIN] = reading
     size = longest + 1
     place = RING + count % size
+    # each reading stands twice, a ring apart, so that the latest N + 1 are always one run
     memory[place] = memory[place + size] = reading - memory[ORIGIN]
     memory[COUNT] = count + 1.0
     if parameters[2] == 0.0:
@@ -99,6 +100,7 @@ def levant_estimate(memory: Floats, parameters: Floats, reading: float, period: 
         memory[VELOCITY] = (position - memory[POSITION]) / period
         memory[POSITION] = position
     else:
+        # the positive root of s^2 + brake s = excess, in the form without cancellation
         root = 2.0 * excess / (brake + sqrt(brake * brake + 4.0 * excess))
         memory[VELOCITY] -= copysign(turn, ahead)
         memory[POSITION] = position + copysign(root * root, ahead)
