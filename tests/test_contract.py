@@ -13,12 +13,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from cli.command_runner import CommandResult, parse_strict_json, run_command
-from cli.test_cli_import import ARM
-from identify.spring_bench import bench_record
-from undrawn_figures import leave_undrawn
 
 import zwidth
+from tests.cli.command_runner import CommandResult, parse_strict_json, run_command
+from tests.cli.test_cli_import import ARM
+from tests.identify.spring_bench import bench_record
+from tests.undrawn_figures import leave_undrawn
 from zwidth.measures import MEASURES
 from zwidth.show import csv_text
 from zwidth.show import zwidth as group

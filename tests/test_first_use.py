@@ -14,8 +14,8 @@ from time import sleep
 
 import numpy as np
 import pytest
-from cli.command_runner import document_of
 
+from tests.cli.command_runner import document_of
 from zwidth import compile_events, machine_code
 from zwidth import compiled as compiled_module
 from zwidth.compile_events import compiling, listening
