@@ -38,6 +38,27 @@ verdict. `make docs` writes the page again, and a test holds it to what the code
 hold; they are known by two routes that share no code, as a rule zwidth and [a judge](../gallery/brute_force.py) by
 matrix exponential, eigenvalues and bisection. [Not covered](#not-covered) is the rest.
 
+## The thesis
+
+*The thesis*, wherever these pages and the device files say so, is a doctoral thesis on how the mechanics of a
+haptic device decide which virtual walls it can render: a framework of mechanical models, closed-form stability
+conditions, experiments with a five-bar device, and measures of performance. It was read in a scan without its
+title page, so that author, title, year and school are not known here, and left out rather than guessed. The
+newest work that it cites is of 2013. Whoever has the original finds these parts in it, by which it is cited:
+
+- an abstract in English and in French;
+- 1, Introduction: literature, motivations, objectives;
+- 2, Dynamics Formulation and Modelling: the haptic equilibrium, rendered directions, effective masses, the
+  sampled loop;
+- 3, Experimental Evaluation: a five-bar device (Tables 3.1 to 3.4), a two-sided wall, a one-sided wall with an
+  operator;
+- 4, Haptic System Analysis: stability conditions of the rigid model, without and with delay, and with
+  flexibility;
+- 5, Performance Measures in Haptics and Effects of Design Parameters: measures, and their maps over the
+  workspace;
+- 6, Conclusions and Recommendations for Future Research;
+- appendices A and B: the Routh-Hurwitz criterion, and kinematic and dynamic modelling of the five-bar.
+
 ## Verdicts
 """
 

@@ -134,7 +134,7 @@ def test_the_index_names_each_word_once_in_alphabetical_order():
 
 def glossary_rows() -> list[list[str]]:
     """Term, meaning, unit, what computes it and link of each row."""
-    text = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    text = (DOCS / "glossary.md").read_text(encoding="utf-8").partition("## Words that are not used")[0]
     rows = [re.split(r" *(?<!\\)\| *", line)[1:-1] for line in text.splitlines() if line.startswith("| ")]
     return [row for row in rows if row[0] != "Term"]
 

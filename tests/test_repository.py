@@ -177,7 +177,7 @@ def readme_numbers(line: str) -> list[str]:
     page = text("README.md")
     beside = re.search(rf"^{re.escape(line)} +# (.*)$", page, re.MULTILINE)
     about = beside[1] if beside else page.partition("The third line ")[2] if "motor-right" in line else ""
-    return re.findall(r"[\d.]+ k?(?:N/m|Hz|cm\^2)", about.partition("\n\n")[0])
+    return re.findall(r"[\d.]+ k?(?:N/m|Hz|cm²)", about.partition("\n\n")[0])
 
 
 # `zwidth compile` runs in test_first_use; the workbench goes on until ctrl-C, and runs in tests/app

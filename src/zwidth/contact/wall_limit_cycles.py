@@ -344,6 +344,7 @@ class LimitCycleAnswer:
         """The numbers by key and unit."""
         predicted = self.predicted
         return _cycle_document(self.cycle) | {
+            "sensor_amplitude_m": self.cycle.amplitude,
             "from": self.source,
             "confirmed": self.confirmed,
             "predicted": predicted
