@@ -16,6 +16,7 @@ from zwidth.device.load import load
 from zwidth.measures import MEASURES, STATUS
 from zwidth.show.cli.options import EXTREMES
 from zwidth.study.workspace import extreme_direction
+from zwidth.unit_text import unit_text
 
 FEW = ("--cells", "7,5")
 DOCS = Path(__file__).parents[2] / "docs"
@@ -252,7 +253,7 @@ def test_the_help_lists_every_measure_with_its_unit():
     for measure in MEASURES.values():
         line = next(line for line in out.splitlines() if line.split()[:1] == [measure.name])
         assert measure.title in line
-        assert not measure.unit or f"[{measure.unit}]" in line
+        assert not measure.unit or f"[{unit_text(measure.unit)}]" in line
 
 
 def test_the_extremes_offered_are_those_there_are():
@@ -281,7 +282,7 @@ def test_the_page_s_python_says_what_it_comes_to(tmp_path, monkeypatch):
             assert (ran.code, ran.err) == (0, "")
     assert "379 cm²" in page
     assert (
-        "common area            378.9 cm^2, 25.73 %"
+        "common area            378.9 cm², 25.73 %"
         in run_command(
             "map",
             "five-bar",

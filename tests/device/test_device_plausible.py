@@ -64,15 +64,15 @@ def paddle(tmp_path):
 LINK, DRIVE, LOOP = "mechanism.links.paddle.", "mechanism.drives.motor.", "loop."
 
 WRONG_UNITS = [
-    (LINK + "inertia_kg_m2", 600, "a radius of gyration of 115 m on a device of 75 mm", "g cm^2, write 6e-05"),
-    (LINK + "inertia_kg_m2", 0.6, "a radius of gyration of 3.65 m", "kg cm^2, write 6e-05"),
-    (LINK + "inertia_kg_m2", [1e4, 6e4, 6e4], "a radius of gyration of", "g mm^2, write 6e-05"),
+    (LINK + "inertia_kg_m2", 600, "a radius of gyration of 115 m on a device of 75 mm", "g cm², write 6e-05"),
+    (LINK + "inertia_kg_m2", 0.6, "a radius of gyration of 3.65 m", "kg cm², write 6e-05"),
+    (LINK + "inertia_kg_m2", [1e4, 6e4, 6e4], "a radius of gyration of", "g mm², write 6e-05"),
     (LINK + "mass_kg", 45, "no metal is so dense", "g, write 0.045"),
     ("mechanism.assemblies.only.joints_rad.paddle", 70, "more than a full turn", "degrees, write 1.222"),
     ("mechanism.assemblies.only.joints_rad.paddle", -160, "more than a full turn", "degrees, write -2.793"),
     (LINK + "orientation_rad", [0, 0, 90], "more than a full turn", "degrees, write 1.571"),
     (LINK + "center_of_mass_m", [20], "looks wrong for a device", "mm, write 0.02"),
-    (DRIVE + "motor_inertia_kg_m2", 11, "looks wrong for a rotor", "g cm^2, write 1.1e-06"),
+    (DRIVE + "motor_inertia_kg_m2", 11, "looks wrong for a rotor", "g cm², write 1.1e-06"),
     (DRIVE + "transmission_ratio", 0.087, "motor turns per joint turn", "per motor turn, write 11.49"),
     (DRIVE + "torque_constant_Nm_per_A", 23.4, "looks wrong for a motor", "mN m/A, write 0.0234"),
     (DRIVE + "torque_limit_Nm", 80, "1.2e+04 N at the handle", "mN m, write 0.08"),

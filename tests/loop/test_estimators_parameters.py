@@ -32,7 +32,7 @@ REFUSED = [
     (AlphaBeta, (2.5, 0.1), "else the filter is unstable"),
     (AlphaBeta, (0.5, 1e-4), "the filter would remember for too long"),
     (AlphaBeta, (1e-4, 1e-3), "the filter would remember for too long"),
-    (Kalman, (0.0, 1e-6), "acceleration_noise must be positive and finite, got 0.0 m/s\\^2"),
+    (Kalman, (0.0, 1e-6), "acceleration_noise must be positive and finite, got 0.0 m/s²"),
     (Kalman, (1.0, np.inf), "position_noise must be positive and finite, got inf m"),
     (Kalman.of_encoder, (1.0, 0.0), "the encoder's resolution must be positive and finite, got 0.0 m"),
 ]

@@ -33,7 +33,7 @@ from zwidth.model import Load
         ({"force": "down"}, "force must be two or three finite numbers"),
         ({"force": [0.0, np.nan]}, "force must be two or three finite numbers"),
         ({"moment": [0.0, np.inf]}, r"moment must be two or three finite numbers \[N m\]"),
-        ({"gravity": 9.81}, r"gravity must be two or three finite numbers \[m/s\^2\], got 9.81"),
+        ({"gravity": 9.81}, r"gravity must be two or three finite numbers \[m/s²\], got 9.81"),
         ({"push": np.inf}, r"push must be a finite number \[N\], got inf"),
         ({"push": True}, r"push must be a finite number \[N\], got True"),
         ({"surface_radius": True}, "surface_radius must be a number but 0.*got True"),

@@ -124,10 +124,10 @@ def test_why_no_cell_has_a_value(device, map_dataset):
 def test_what_they_show_of_themselves_is_short(device, area):
     common = area.common
     assert repr(area).startswith(
-        f"CommonArea: {common.area:.4g} m^2, {100 * common.share:.4g} % of the reachable area"
+        f"CommonArea: {common.area:.4g} m², {100 * common.share:.4g} % of the reachable area"
     )
     assert repr(area).endswith("with isotropy<=2")
-    assert repr(common) == f"PlaneArea: {common.area:.4g} m^2, {100 * common.share:.4g} % of the reachable area"
+    assert repr(common) == f"PlaneArea: {common.area:.4g} m², {100 * common.share:.4g} % of the reachable area"
     job = map_job(device, ["stiffness", "isotropy"], plane_of(device, cells=COUNTS))
     assert repr(job) == "MapJob: stiffness, isotropy of 'five-bar' in 7 x 5 cells"
 
