@@ -13,7 +13,6 @@ from pydantic import ValidationError
 
 from zwidth.arrays import Floats
 from zwidth.device import address, build
-from zwidth.device.consistency import DEVICE_KEYS, STUDY_KEYS, inconsistencies
 from zwidth.device.device import Device
 from zwidth.device.faults import Fault, KeyPath, dotted, fail
 from zwidth.device.legs import members
@@ -21,7 +20,8 @@ from zwidth.device.operator_choice import NOBODY, document_held_by, document_und
 from zwidth.device.plausibility import warn_of_implausible
 from zwidth.device.posture_arguments import screws
 from zwidth.device.read import bundled, read
-from zwidth.device.schema.device_file import DeviceFile, schema
+from zwidth.device.rules.table import device_faults
+from zwidth.device.schema.device_file import DEVICE_KEYS, STUDY_KEYS, DeviceFile, schema
 from zwidth.device.schema.mechanism import MechanismSection, ReferenceSection
 from zwidth.device.schema.operator import ArmSection
 from zwidth.device.text_file import check_not_newer, without_version
@@ -164,14 +164,14 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
         checked = DeviceFile.model_validate(cleaned)
     except ValidationError as error:
         faults += validation_messages(error, cleaned)
-    faults += inconsistencies(cleaned, document)
+    faults += device_faults(cleaned)
     if faults or checked is None:
         raise DeviceError(in_order(faults, document, label))
     return checked, without_version(document)
 
 
 def _assembled(device: Device) -> bool:
-    from zwidth.device.design_checks import assembles
+    from zwidth.device.mechanism_check import assembles
 
     assert device.mechanism is not None
     return assembles(device.mechanism, device.reference_assembly)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
-from zwidth.device.consistency import DEVICE_KEYS, operator_faults
 from zwidth.device.faults import Fault, dotted, fail
 from zwidth.device.read import OPERATORS, read
+from zwidth.device.rules.plant import operator_faults
+from zwidth.device.schema.device_file import DEVICE_KEYS
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.value_types import VERSION, Section, WholeNumber
 from zwidth.device.text_file import KEY, without_version

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from zwidth.arrays import Floats
 from zwidth.device.build_mechanism import mechanism as build_mechanism
 from zwidth.device.faults import Fault, comma_list, dotted, fail, suggestion
-from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, check_loops_close, closed_nearby, null_space
+from zwidth.device.mechanism_check import CLOSED, INDEPENDENT, close_loops, closed_nearby, null_space
 from zwidth.device.robot_files.followers import settle_followers, write_linkages
 from zwidth.device.robot_files.links import LinkTree, Shape, link_tree, listed, merge_universal, moving_bodies
 from zwidth.device.robot_files.robot import BASE, UNMOVED, Motor, Place, Robot
@@ -514,7 +514,7 @@ def mechanism_motions(section: dict[str, Any], label: str) -> FreeMotions:
         raise DeviceError(faults) from None
     mechanism = build_mechanism(checked)
     mech = pack(mechanism)
-    angles, gaps = check_loops_close(mechanism, mech)
+    angles, gaps = close_loops(mechanism, mech)
     names = [mechanism.links.names[i] for i in mech.joint]
     places = [_configuration(mech, place) for place in closed_nearby(mech, angles)]
     size = float(mech.size[0])

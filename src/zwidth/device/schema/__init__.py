@@ -10,5 +10,5 @@
     device_file  the whole file, and its JSON Schema
 
 What needs two keys to be judged (sizes, names that refer to names, either-or) is checked in
-`device.consistency`, so that a fault in one key hides none in another.
+`device.rules`, so that a fault in one key hides none in another.
 """

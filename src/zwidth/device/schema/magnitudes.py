@@ -6,11 +6,14 @@ squared, divided and summed in double precision with digits to spare.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from pydantic import AfterValidator
+
+from zwidth.arrays import Floats
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -65,60 +68,82 @@ def within(least: float, most: float, unit: str, besides: str = "") -> AfterVali
     return AfterValidator(check)
 
 
+Judgement = tuple[Any, Callable[[], str]]
+
+
+@dataclass(frozen=True)
+class ValueRule:
+    """What a vector or a matrix must be, of a file or of many designs.
+
+    judge  of (..., n) or (..., n, n): whether each breaks the rule (...), and what to say of one that does
+    """
+
+    judge: Callable[[Floats], Judgement]
+
+    def __call__(self, value: Any) -> Any:
+        """The numbers of a file, checked. Raises ValueError."""
+        with np.errstate(all="ignore"):  # of numbers that other rules call too large
+            broken, sentence = self.judge(np.array(value))
+        if broken:
+            raise ValueError(sentence())
+        return value
+
+
 def principal_within(least: float, most: float, unit: str) -> AfterValidator:
     """A positive definite matrix whose eigenvalues, the masses of its principal motions, lie between bounds."""
 
-    def check(rows: Rows) -> Rows:
-        values = np.linalg.eigvalsh(np.array(rows))
-        if not (least <= values[0] and values[-1] <= most):
-            got = f"{rows[0][0]:.6g}" if len(rows) == 1 else f"masses from {values[0]:.6g} to {values[-1]:.6g}"
-            of = "" if len(rows) == 1 else " for every motion"
-            raise ValueError(f"must be {_between(least, most, unit)}{of}, got {got}; is the unit right?")
-        return rows
+    def judge(matrix: Floats) -> Judgement:
+        values = np.linalg.eigvalsh(matrix)
+        low, high = values[..., 0], values[..., -1]
 
-    return AfterValidator(check)
+        def sentence() -> str:
+            one = matrix.shape[-1] == 1
+            got = f", got {low:.6g}" if one else f" for every motion, got masses from {low:.6g} to {high:.6g}"
+            return f"must be {_between(least, most, unit)}{got}; is the unit right?"
+
+        return ~((least <= low) & (high <= most)), sentence
+
+    return AfterValidator(ValueRule(judge))
 
 
 def largest_within(least: float, most: float, unit: str, besides: str) -> AfterValidator:
     """A matrix that is zero, or has its largest eigenvalue between bounds: a body's moments of inertia."""
 
-    def check(rows: Rows) -> Rows:
-        moment = float(np.linalg.eigvalsh(np.array(rows))[-1])
-        if moment > 0 and not least <= moment <= most:
-            raise ValueError(
-                f"must be {besides}{_between(least, most, unit)}, got {moment:.6g}; is the unit right?"
-            )
-        return rows
+    def judge(matrix: Floats) -> Judgement:
+        moment = np.linalg.eigvalsh(matrix)[..., -1]
+        return (moment > 0.0) & ~(
+            (least <= moment) & (moment <= most)
+        ), lambda: f"must be {besides}{_between(least, most, unit)}, got {moment:.6g}; is the unit right?"
 
-    return AfterValidator(check)
+    return AfterValidator(ValueRule(judge))
 
 
 def elements_up_to(most: float, unit: str) -> AfterValidator:
     """A matrix without elements beyond a bound, in either sign."""
 
-    def check(rows: Rows) -> Rows:
-        worst = _largest([value for row in rows for value in row])
-        if abs(worst) > most:
-            raise ValueError(f"must be at most {most:g} {unit} in size, got {worst:.6g}; is the unit right?")
-        return rows
+    def judge(matrix: Floats) -> Judgement:
+        return (
+            np.abs(matrix).max(axis=(-2, -1)) > most,
+            lambda: f"must be at most {most:g} {unit} in size, got {_largest(matrix):.6g}; is the unit right?",
+        )
 
-    return AfterValidator(check)
+    return AfterValidator(ValueRule(judge))
 
 
 def largest_share_within(least: float, most: float) -> AfterValidator:
-    """A vector whose largest component has a size between bounds."""
+    """A vector whose largest component has a size between bounds; one of zeros is left to another rule."""
 
-    def check(vector: tuple[float, ...]) -> tuple[float, ...]:
-        worst = _largest(vector)
-        if worst and not least <= abs(worst) <= most:
-            raise ValueError(f"must have a largest number of size {least:g} to {most:g}, got {worst:.6g}")
-        return vector
+    def judge(vector: Floats) -> Judgement:
+        size = np.abs(vector).max(axis=-1)
+        return (size != 0.0) & ~(
+            (least <= size) & (size <= most)
+        ), lambda: f"must have a largest number of size {least:g} to {most:g}, got {_largest(vector):.6g}"
 
-    return AfterValidator(check)
+    return AfterValidator(ValueRule(judge))
 
 
-def _largest(values: Sequence[float]) -> float:
-    return max(values, key=abs)
+def _largest(values: Floats) -> float:
+    return max(values.ravel().tolist(), key=abs)
 
 
 def _between(least: float, most: float, unit: str) -> str:

@@ -6,6 +6,7 @@ stand for a vector or a matrix (one number for n = 1, three moments for an inert
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
@@ -20,6 +21,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
+from zwidth.arrays import Floats
 from zwidth.device.faults import quote
 from zwidth.device.schema import magnitudes
 from zwidth.device.text_file import FILE_VERSION
@@ -65,18 +67,19 @@ def _thinkable(value: float) -> float:
     return value
 
 
-def _not_zero(vector: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(vector):
-        raise ValueError(f"must not be all zeros, got {quote(list(vector))}")
-    return vector
+def _zeros(vector: Floats) -> Any:
+    """Whether vectors (..., n) are all zeros."""
+    return ~(vector != 0.0).any(axis=-1)
 
 
-def _has_length(vector: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(vector):
-        raise ValueError(
-            f"has zero length, got {quote(list(vector))}; give any vector along it, such as [0, 1, 0]"
-        )
-    return vector
+def _not_zero(vector: Floats) -> magnitudes.Judgement:
+    return _zeros(vector), lambda: f"must not be all zeros, got {quote(vector.tolist())}"
+
+
+def _has_length(vector: Floats) -> magnitudes.Judgement:
+    return _zeros(
+        vector
+    ), lambda: f"has zero length, got {quote(vector.tolist())}; give any vector along it, such as [0, 1, 0]"
 
 
 def _rising(bounds: tuple[float, ...]) -> tuple[float, ...]:
@@ -140,52 +143,65 @@ def _square(rows: Rows) -> Rows:
     return rows
 
 
-def _symmetric(rows: Rows) -> Rows:
-    matrix = np.array(rows)
-    with np.errstate(over="ignore"):
-        gap = np.abs(matrix - matrix.T)
-    if gap.max() > SYMMETRY_TOLERANCE * np.abs(matrix).max():
+def _symmetric(matrix: Floats) -> magnitudes.Judgement:
+    """Matrices (..., n, n) are symmetric, but for rounding."""
+    gap = np.abs(matrix - np.swapaxes(matrix, -1, -2))
+
+    def sentence() -> str:
         i, j = (int(k) for k in np.unravel_index(int(gap.argmax()), gap.shape))
-        raise ValueError(
-            f"must be symmetric, but row {i} column {j} holds {rows[i][j]:.10g} "
-            f"and row {j} column {i} holds {rows[j][i]:.10g} (counted from 0); make them equal"
+        return (
+            f"must be symmetric, but row {i} column {j} holds {matrix[i, j]:.10g} "
+            f"and row {j} column {i} holds {matrix[j, i]:.10g} (counted from 0); make them equal"
         )
-    return rows
+
+    return gap.max(axis=(-2, -1)) > SYMMETRY_TOLERANCE * np.abs(matrix).max(axis=(-2, -1)), sentence
 
 
-def _positive_definite(rows: Rows) -> Rows:
-    size = len(rows)
-    with np.errstate(all="ignore"):
-        eigenvalues = np.linalg.eigvalsh(np.array(rows))
-    if not eigenvalues[0] > size * np.finfo(float).eps * abs(eigenvalues[-1]):
-        if size == 1:
-            raise ValueError(f"must be greater than 0, got {rows[0][0]:.10g}")
-        raise ValueError(
-            f"must be positive definite, but its least eigenvalue is {eigenvalues[0]:.4g}; "
+def _positive_definite(matrix: Floats) -> magnitudes.Judgement:
+    """Symmetric matrices (..., n, n) are positive definite, but for rounding."""
+    size, eigenvalues = matrix.shape[-1], np.linalg.eigvalsh(matrix)
+    least = eigenvalues[..., 0]
+    return (
+        ~(least > size * np.finfo(float).eps * np.abs(eigenvalues[..., -1])),
+        lambda: (
+            f"must be greater than 0, got {least:.10g}"
+            if size == 1
+            else f"must be positive definite, but its least eigenvalue is {least:.4g}; "
             "every motion needs a mass: check the off-diagonal terms, or leave a massless coordinate out"
-        )
+        ),
+    )
+
+
+def _one_or_three(rows: Rows) -> Rows:
+    """The moments of inertia of a body: one, or a matrix of three rows."""
+    if len(rows) not in (1, 3):
+        raise ValueError(f"must be {INERTIA_FORMS}, got {len(rows)} rows")
     return rows
 
 
-def _possible_body(rows: Rows) -> Rows:
-    """Principal moments of a body: none negative, none larger than the sum of the other two."""
-    if len(rows) == 1:
-        if rows[0][0] < 0:
-            raise ValueError(f"must be at least 0, got {rows[0][0]:.10g}")
-        return rows
-    if len(rows) != 3:
-        raise ValueError(f"must be {INERTIA_FORMS}, got {len(rows)} rows")
-    moments = np.linalg.eigvalsh(np.array(rows))
-    slack = SYMMETRY_TOLERANCE * float(np.abs(moments).max())
-    listed = ", ".join(f"{moment:.6g}" for moment in moments)
-    if moments[0] < -slack:
-        raise ValueError(f"must have no negative principal moment, got {listed}; no body has one")
-    if moments[2] > moments[0] + moments[1] + slack:
-        raise ValueError(
+def _possible_body(matrix: Floats) -> magnitudes.Judgement:
+    """Of the principal moments of bodies none is negative and none of three above the sum of the others, but for
+    rounding."""
+    if matrix.shape[-1] == 1:
+        return matrix[..., 0, 0] < 0.0, lambda: f"must be at least 0, got {matrix[0, 0]:.10g}"
+    moments = np.linalg.eigvalsh(matrix)
+    slack = SYMMETRY_TOLERANCE * np.abs(moments).max(axis=-1)
+    negative = moments[..., 0] < -slack
+
+    def sentence() -> str:
+        listed = ", ".join(f"{moment:.6g}" for moment in moments)
+        if negative:
+            return f"must have no negative principal moment, got {listed}; no body has one"
+        return (
             f"must have no principal moment above the sum of the other two, got {listed}; no body has such "
             "moments: check the units, or give one number, the moment about the joint axis"
         )
-    return rows
+
+    return negative | (moments[..., 2] > moments[..., 0] + moments[..., 1] + slack), sentence
+
+
+def _rule(judge: Callable[[Floats], magnitudes.Judgement]) -> AfterValidator:
+    return AfterValidator(magnitudes.ValueRule(judge))
 
 
 _NUMBER: Final[dict[str, Any]] = {"type": "number"}
@@ -243,15 +259,15 @@ Triple = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
 Several = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Position = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Offset = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
-Direction = Annotated[Position, AfterValidator(_has_length)]
-Axis = Annotated[Triple, AfterValidator(_has_length)]
+Direction = Annotated[Position, _rule(_has_length)]
+Axis = Annotated[Triple, _rule(_has_length)]
 Bounds = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), AfterValidator(_rising)]
 Increasing = Annotated[tuple[Number, ...], AfterValidator(_increasing)]
 
 Vector = Annotated[
     tuple[Number, ...],
     BeforeValidator(_as_vector),
-    AfterValidator(_not_zero),
+    _rule(_not_zero),
     magnitudes.largest_share_within(magnitudes.LEAST_SHARE, magnitudes.LARGEST_SHARE),
     WithJsonSchema({"anyOf": [_NUMBER, _LIST]}),
 ]
@@ -263,12 +279,12 @@ SymmetricMatrix = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_matrix),
     AfterValidator(_square),
-    AfterValidator(_symmetric),
+    _rule(_symmetric),
     WithJsonSchema({"anyOf": [_NUMBER, _MATRIX]}),
 ]
 MassMatrix = Annotated[
     SymmetricMatrix,
-    AfterValidator(_positive_definite),
+    _rule(_positive_definite),
     magnitudes.principal_within(magnitudes.LIGHTEST, magnitudes.HEAVIEST, "kg"),
 ]
 DampingMatrix = Annotated[SymmetricMatrix, magnitudes.elements_up_to(magnitudes.STRONGEST_DAMPING, "N s/m")]
@@ -277,8 +293,9 @@ Inertia = Annotated[
     tuple[tuple[Number, ...], ...],
     BeforeValidator(_as_inertia),
     AfterValidator(_square),
-    AfterValidator(_symmetric),
-    AfterValidator(_possible_body),
+    _rule(_symmetric),
+    AfterValidator(_one_or_three),
+    _rule(_possible_body),
     magnitudes.largest_within(magnitudes.LEAST_INERTIA, magnitudes.LARGEST_INERTIA, "kg m²", "0 (no inertia) or "),
     WithJsonSchema({"anyOf": [_NUMBER, _THREE, _THREE_BY_THREE]}),
 ]

@@ -16,10 +16,10 @@ import numpy as np
 
 from zwidth.arrays import Floats, Ints
 from zwidth.device import address
-from zwidth.device.design_checks import masses_moved
 from zwidth.device.device import Device
 from zwidth.device.faults import plural
 from zwidth.device.load import from_document
+from zwidth.device.mechanism_check import masses_moved
 from zwidth.errors import (
     BeyondLimit,
     DeviceError,
