@@ -109,7 +109,7 @@ def _noise(document: Document, section: str) -> KeyMessages:
 
 
 def _acceleration(velocity: Numbers) -> Any:
-    """Of a Kalman filter the accelerations that it expects [m/s^2]."""
+    """Of a Kalman filter the accelerations that it expects [m/s²]."""
     return velocity.number("acceleration_noise_m_per_s2") if velocity.held("method") == "kalman" else None
 
 
@@ -122,7 +122,7 @@ def _position_noise(velocity: Numbers) -> Any:
 
 
 def _unusable_index(acceleration: Any, noise: Any, T: Any) -> Any:
-    """Whether noise figures [m/s^2], [m] that may be by themselves make no filter at sampling periods [s]."""
+    """Whether noise figures [m/s²], [m] that may be by themselves make no filter at sampling periods [s]."""
     index = acceleration * T**2 / noise
     possible = (acceleration > 0) & (acceleration <= LARGEST) & (noise > 0) & (noise <= LARGEST)
     return possible & ~((index >= INDEX[0]) & (index <= INDEX[1]))
