@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -13,7 +13,7 @@ from zwidth.arrays import Floats
 from zwidth.chart.arcs import Window, window_of
 from zwidth.chart.decay import FastestDecay
 from zwidth.chart.verdict import WallVerdicts
-from zwidth.result import Result
+from zwidth.result import Result, documented, entry
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,13 +51,13 @@ class Chart(Result, ABC):
     fastest_decay_in_first_quadrant   the same over K >= 0, B >= 0
     """
 
-    stiffness_max: float
-    damping_at_stiffness_max: float
-    frequencies_at_stiffness_max: tuple[float, ...]
-    damping_max: float
-    stable_area: float
-    fastest_decay: FastestDecay | None = None
-    fastest_decay_in_first_quadrant: FastestDecay | None = None
+    stiffness_max: float = field(metadata=entry("N/m"))
+    damping_at_stiffness_max: float = field(metadata=entry("N s/m"))
+    frequencies_at_stiffness_max: tuple[float, ...] = field(metadata=entry("Hz", empty="null"))
+    damping_max: float = field(metadata=entry("N s/m"))
+    stable_area: float = field(metadata=entry("N^2 s/m^2"))
+    fastest_decay: FastestDecay | None = field(default=None, metadata=entry())
+    fastest_decay_in_first_quadrant: FastestDecay | None = field(default=None, metadata=entry())
 
     # Numbers of each wall on the edge: key -> attribute of `BoundaryArc`.
     _edge_columns: ClassVar[dict[str, str]] = {
@@ -68,11 +68,13 @@ class Chart(Result, ABC):
 
     @property
     @abstractmethod
+    @documented(lists=True, before="stiffness_max")
     def regions(self) -> tuple[Floats, ...]:
         """Closed rings (k, 2) of [stiffness, damping], counter-clockwise; their union is the set."""
 
     @property
     @abstractmethod
+    @documented(before="stiffness_max")
     def boundary(self) -> tuple[BoundaryArc, ...]:
         """Arcs of the set's edge, with frequency."""
 
@@ -86,6 +88,13 @@ class Chart(Result, ABC):
         return self
 
     @property
+    @documented("Hz", before="frequencies_at_stiffness_max")
+    def frequency_at_stiffness_max(self) -> float | None:
+        """The lower one [Hz]; None if there is none."""
+        return min(self.frequencies_at_stiffness_max, default=None)
+
+    @property
+    @documented()
     def unobserved_modes(self) -> tuple[str, ...]:
         """Motions that no wall moves, by name; they were left out and do not count."""
         return ()
@@ -101,22 +110,11 @@ class Chart(Result, ABC):
 
     def document(self) -> dict[str, Any]:
         """The chart as numbers and lists, under the keys of `zwidth chart --json`; nan where there is none."""
-        fastest, buildable = self.fastest_decay, self.fastest_decay_in_first_quadrant
-        return {
-            "regions": [ring.tolist() for ring in self.regions],
+        return super().document() | {
             "boundary": [
                 {key: _plain(getattr(arc, name)) for key, name in self._edge_columns.items()}
                 for arc in self.boundary
-            ],
-            "stiffness_max_N_per_m": self.stiffness_max,
-            "damping_at_stiffness_max_Ns_per_m": self.damping_at_stiffness_max,
-            "frequency_at_stiffness_max_Hz": min(self.frequencies_at_stiffness_max, default=None),
-            "frequencies_at_stiffness_max_Hz": list(self.frequencies_at_stiffness_max) or None,
-            "damping_max_Ns_per_m": self.damping_max,
-            "stable_area_N2s_per_m2": self.stable_area,
-            "fastest_decay": fastest and fastest.document(),
-            "fastest_decay_in_first_quadrant": buildable and buildable.document(),
-            "unobserved_modes": list(self.unobserved_modes),
+            ]
         }
 
     def table(self) -> dict[str, list[Any]]:

@@ -10,7 +10,7 @@ looking for such edges.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from zwidth.chart.edge_by_eigenvalues import decided_trace
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SIMPLEX_SIZES, edge_memory
 from zwidth.chart.tracer import Tracer
 from zwidth.loop.loop import Loop
+from zwidth.result import Documented, entry
 
 # How much faster than the best found (in shares of 1 - radius) the next wall is looked for. A larger step finds
 # other cells of faster walls sooner, a smaller one those that are hardly faster.
@@ -36,24 +37,16 @@ VALLEYS = 4  # minima along an axis whose intervals are narrowed
 
 
 @dataclass(frozen=True)
-class FastestDecay:
+class FastestDecay(Documented):
     """The wall K [N/m], B [N s/m] whose slowest motion decays fastest, and its spectral radius.
 
     Its slowest root is mostly a double one: the eigenvalues of the wall rounded to double precision then differ
     from the radius by the square root of the rounding, about 1e-8 (a triple root: 1e-5).
     """
 
-    stiffness: float
-    damping: float
-    spectral_radius: float
-
-    def document(self) -> dict[str, float]:
-        """The numbers under the keys of --json."""
-        return {
-            "stiffness_N_per_m": self.stiffness,
-            "damping_Ns_per_m": self.damping,
-            "spectral_radius": self.spectral_radius,
-        }
+    stiffness: float = field(metadata=entry("N/m"))
+    damping: float = field(metadata=entry("N s/m"))
+    spectral_radius: float = field(metadata=entry())
 
 
 def fastest_decay(tracer: Tracer, outlines: Callable[[], list[Floats]]) -> FastestDecay | None:

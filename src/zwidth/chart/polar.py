@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +23,7 @@ from zwidth.model.argument_checks import check_choice, check_kind
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.progress import Progress
-from zwidth.result import Result
+from zwidth.result import Result, documented, entry
 
 OK, NO_WALL = "ok", "no stable wall"
 OUT_OF_MOTION = "out of motion: the handle cannot move along the direction"
@@ -46,14 +46,15 @@ class ByDirection(Result):
     plane       "xy", "xz" or "yz" where the directions go evenly round that plane; "" for other directions
     """
 
-    directions: Floats
-    stiffness: Floats
-    damping: Floats
-    frequency: Floats
-    status: tuple[str, ...]
-    plane: str = ""
+    directions: Floats = field(metadata=entry())
+    stiffness: Floats = field(metadata=entry("N/m", name="stiffness_max"))
+    damping: Floats = field(metadata=entry("N s/m", name="damping_at_stiffness_max"))
+    frequency: Floats = field(metadata=entry("Hz", name="frequency_at_stiffness_max"))
+    status: tuple[str, ...] = field(metadata=entry())
+    plane: str = field(default="", metadata=entry(empty="null", before="directions"))
 
     @property
+    @documented("deg", name="angle", before="stiffness")
     def angles(self) -> Floats:
         """(k,) from the plane's first axis towards its second [deg]; nan for directions round no plane."""
         count = len(self.stiffness)
@@ -66,18 +67,6 @@ class ByDirection(Result):
             return None
         reasons = sorted(set(self.status))
         return NONE_STABLE if reasons == [NO_WALL] else "; ".join(reasons)
-
-    def document(self) -> dict[str, Any]:
-        """The walls by key and unit, lists of one entry for each direction."""
-        return {
-            "plane": self.plane or None,
-            "directions": self.directions,
-            "angle_deg": self.angles,
-            "stiffness_max_N_per_m": self.stiffness,
-            "damping_at_stiffness_max_Ns_per_m": self.damping,
-            "frequency_at_stiffness_max_Hz": self.frequency,
-            "status": list(self.status),
-        }
 
     def table(self) -> dict[str, Any]:
         """The walls as columns, one direction a row."""

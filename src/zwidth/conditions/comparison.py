@@ -5,7 +5,7 @@ All published conditions on one loop, side by side.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isinf, nan
 from typing import Any
 
@@ -37,7 +37,7 @@ from zwidth.errors import ChartError
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_kind, check_number
-from zwidth.result import Result
+from zwidth.result import Result, documented, entry
 
 # Keys of a bound that are left out of tables: one is the same for every device, the other is itself a table.
 NO_COLUMNS = ("assumptions", "taken")
@@ -55,12 +55,13 @@ class BoundsComparison(Result):
     """
 
     bounds: tuple[Bound, ...]
-    damping: float
-    exact: float
-    chart: StabilityChart | None
-    undecided: str = ""
+    damping: float = field(metadata=entry("N s/m"))
+    exact: float = field(metadata=entry("N/m"))
+    chart: StabilityChart | None = field(metadata=entry(name="decided", value=lambda chart: chart is not None))
+    undecided: str = field(default="", metadata=entry(empty="left out"))
 
     @property
+    @documented("N/m", name="exact_largest", before="chart")
     def largest(self) -> float:
         """Largest stable stiffness over all B >= 0 [N/m]: 0 if no wall is stable, nan without a chart."""
         if self.chart is None:
@@ -68,6 +69,7 @@ class BoundsComparison(Result):
         return self.chart.stiffness_max if self.chart.stiffness_max > 0.0 else 0.0
 
     @property
+    @documented("N s/m", name="exact_damping_at_largest", before="chart")
     def damping_at_largest(self) -> float:
         """Damping of the stiffest stable wall [N s/m]; nan if no wall is stable, or without a chart."""
         return nan if self.chart is None else self.chart.damping_at_stiffness_max
@@ -82,16 +84,7 @@ class BoundsComparison(Result):
 
     def document(self) -> dict[str, Any]:
         """The conditions and the exact limit by key and unit."""
-        undecided = {} if self.chart is not None else {"undecided": self.undecided}
-        return {
-            "bounds": [self._entry(bound) for bound in self.bounds],
-            "damping_Ns_per_m": self.damping,
-            "exact_N_per_m": self.exact,
-            "exact_largest_N_per_m": self.largest,
-            "exact_damping_at_largest_Ns_per_m": self.damping_at_largest,
-            "decided": self.chart is not None,
-            **undecided,
-        }
+        return {"bounds": [self._entry(bound) for bound in self.bounds]} | super().document()
 
     def table(self) -> dict[str, list[Any]]:
         """The conditions as columns, one condition a row; several sentences are joined in one cell."""

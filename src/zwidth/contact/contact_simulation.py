@@ -244,7 +244,7 @@ class ContactSimulation(Result):
                 "off_the_path_m": self.distance_from_path,
                 "inside": self.starts_inside,
             },
-            "hand": _hand_document(self.hand),
+            "hand": self.hand.document(),
             "duration_s": float(self.time[-1]),
             "duration_asked_s": self.length.seconds,
             "substeps": self.substeps,
@@ -304,24 +304,6 @@ class ContactSimulation(Result):
 
 def _felt_stiffness(response: TimeResponse) -> float:
     return rendered_stiffness(response.reading, response.force, response.wall_position)
-
-
-def _hand_document(hand: Hand) -> dict[str, Any]:
-    tremor, reach, reflex = hand.tremor, hand.reach, hand.reflex
-    return {
-        "push_N": hand.push,
-        "ramp_s": hand.ramp,
-        "tremor": tremor and {"amplitude_N": tremor.amplitude, "frequency_Hz": tremor.frequency},
-        "reach": reach and {"distance_m": reach.distance, "start_s": reach.start, "duration_s": reach.duration},
-        "reflex": reflex
-        and {
-            "threshold_N": reflex.threshold,
-            "stiffness_N_per_m": reflex.arm_stiffness,
-            "damping_Ns_per_m": reflex.arm_damping,
-            "latency_s": reflex.latency,
-            "rise_s": reflex.rise,
-        },
-    }
 
 
 MOST: Final = 60.0  # s of a run

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import exp, inf, isfinite, pi, sin
 from typing import Final
 
@@ -13,6 +13,7 @@ from zwidth.compiled import compiled_lean
 from zwidth.contact.computer import PlantArrays
 from zwidth.contact.plant_step import VARYING
 from zwidth.model.operator import Operator
+from zwidth.result import Documented, entry
 
 # What stands in the first number of an element that varies.
 BRAKE: Final = 0.0
@@ -24,7 +25,7 @@ REFLEX_NUMBERS: Final = 7
 
 
 @dataclass(frozen=True)
-class Reach:
+class Reach(Documented):
     """A reaching movement: the arm's rest position moves by minimum jerk (Flash and Hogan 1985).
 
         x_0(t) = distance (10 s^3 - 15 s^4 + 6 s^5),   s = (t - start)/duration
@@ -33,9 +34,9 @@ class Reach:
     Raises    ValueError  for a distance that is not finite, a negative start, a duration that is not positive
     """
 
-    distance: float
-    start: float = 0.0
-    duration: float = 0.5
+    distance: float = field(metadata=entry("m"))
+    start: float = field(default=0.0, metadata=entry("s"))
+    duration: float = field(default=0.5, metadata=entry("s"))
 
     def __post_init__(self) -> None:
         _check("distance", self.distance, "m", -inf)
@@ -44,15 +45,15 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class Tremor:
+class Tremor(Documented):
     """A force amplitude sin(2 pi f t + phase); physiological tremor has 8 to 12 Hz.
 
     amplitude [N], frequency [Hz], phase [rad]
     Raises    ValueError  for a negative amplitude or frequency, or one that is not finite
     """
 
-    amplitude: float
-    frequency: float = 10.0
+    amplitude: float = field(metadata=entry("N"))
+    frequency: float = field(default=10.0, metadata=entry("Hz"))
     phase: float = 0.0
 
     def __post_init__(self) -> None:
@@ -62,7 +63,7 @@ class Tremor:
 
 
 @dataclass(frozen=True)
-class Reflex:
+class Reflex(Documented):
     """A hand that stiffens: once the device's force has exceeded a threshold, stiffness and damping of arm and
     grasp grow after the latency towards their extra amounts, 1 - exp(-t/rise), about where the hand then is.
 
@@ -73,11 +74,11 @@ class Reflex:
     Raises           ValueError  for numbers that are negative or not finite
     """
 
-    threshold: float
-    latency: float = 0.05
-    rise: float = 0.05
-    arm_stiffness: float = 0.0
-    arm_damping: float = 0.0
+    threshold: float = field(metadata=entry("N"))
+    latency: float = field(default=0.05, metadata=entry("s"))
+    rise: float = field(default=0.05, metadata=entry("s"))
+    arm_stiffness: float = field(default=0.0, metadata=entry("N/m", name="stiffness", before="latency"))
+    arm_damping: float = field(default=0.0, metadata=entry("N s/m", name="damping", before="latency"))
     grasp_stiffness: float = 0.0
     grasp_damping: float = 0.0
 
@@ -92,7 +93,7 @@ class Reflex:
 
 
 @dataclass(frozen=True)
-class Hand:
+class Hand(Documented):
     """The operator at the handle and his movements: push, tremor, reach, reflex.
 
     operator   his passive arm and grasp; None: nobody, or the loop's plant has him already
@@ -103,11 +104,11 @@ class Hand:
     """
 
     operator: Operator | None = None
-    push: float = 0.0
-    ramp: float = 0.0
-    reach: Reach | None = None
-    tremor: Tremor | None = None
-    reflex: Reflex | None = None
+    push: float = field(default=0.0, metadata=entry("N"))
+    ramp: float = field(default=0.0, metadata=entry("s"))
+    reach: Reach | None = field(default=None, metadata=entry())
+    tremor: Tremor | None = field(default=None, metadata=entry(before="reach"))
+    reflex: Reflex | None = field(default=None, metadata=entry())
 
     def __post_init__(self) -> None:
         _check("push", self.push, "N", -inf)

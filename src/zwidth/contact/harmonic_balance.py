@@ -22,8 +22,9 @@ describing function's answer. With all harmonics this is exact for vibrations th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import pi
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +43,7 @@ from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.nonlinear import Counter, Friction, Nonlinear
 from zwidth.progress import Progress
+from zwidth.result import Documented, documented, entry
 
 STAGE = "vibrations by amplitude"
 PER_DECADE = 24
@@ -56,7 +58,7 @@ FOLDED = 40  # steps by a fifth in velocity
 
 
 @dataclass(frozen=True)
-class LimitCycle:
+class LimitCycle(Documented):
     """A limit cycle: a vibration whose amplitude stays the same.
 
     amplitude            of the sensor's motion, before rounding [m]
@@ -67,21 +69,28 @@ class LimitCycle:
     largest_motion       as far as the device can move to either side [m]
     """
 
-    amplitude: float
-    frequency_Hz: float
-    stable: bool
-    force_amplitude: float
+    amplitude: float = field(metadata=entry("m"))
+    frequency_Hz: float = field(metadata=entry("Hz", name="frequency"))
+    stable: bool = field(metadata=entry())
+    force_amplitude: float = field(metadata=entry("N", name="force"))
     velocity_amplitudes: Floats
     largest_motion: float = LARGEST_MOTION
 
     @property
+    @documented(before="force_amplitude")
     def within_range(self) -> bool:
         """Whether the device can move so far; a cycle beyond its range cannot happen."""
         return self.amplitude <= self.largest_motion
 
+    @property
+    @documented("m/s", name="velocity")
+    def speed(self) -> float:
+        """Velocity amplitude at the sensor, of the sine [m/s]."""
+        return 2.0 * pi * self.frequency_Hz * self.amplitude
+
 
 @dataclass(frozen=True)
-class HarmonicBalance:
+class HarmonicBalance(Documented):
     """Growth of vibrations over their amplitude.
 
     amplitude     (p,)  of the sensor's motion [m], ascending
@@ -92,9 +101,9 @@ class HarmonicBalance:
     largest_motion  as far as the device can move to either side [m]; larger vibrations are those of no device
     """
 
-    amplitude: Floats
-    growth: Floats
-    frequency_Hz: Floats
+    amplitude: Floats = field(metadata=entry("m"))
+    growth: Floats = field(metadata=entry(name="growth_per_s"))
+    frequency_Hz: Floats = field(metadata=entry("Hz", name="frequency"))
     cycles: tuple[LimitCycle, ...]
     largest_motion: float = LARGEST_MOTION
 

@@ -18,16 +18,16 @@ has none of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from zwidth.arrays import Flags, Floats
 from zwidth.contact.computer import FORCE, HANDLE, READING, TRUTH, VELOCITY, Records
 from zwidth.model.argument_checks import check_kind
-from zwidth.result import Result
+from zwidth.result import Result, documented, entry
 
 # The ledger's entries, in the engine's order; the last is what the plant has stored.
 SOURCES: Final = (
@@ -86,18 +86,18 @@ class TimeResponse(Result):
     """
 
     period: float
-    wall_position: float
-    time: Floats
-    reading: Floats
+    wall_position: float = field(metadata=entry("m"))
+    time: Floats = field(metadata=entry("s"))
+    reading: Floats = field(metadata=entry("m", name="position"))
     truth: Floats
-    velocity: Floats
-    force: Floats
-    handle: Floats
+    velocity: Floats = field(metadata=entry("m/s"))
+    force: Floats = field(metadata=entry("N"))
+    handle: Floats = field(metadata=entry("m"))
     trail_time: Floats
     trail: Floats
     energies: Floats
-    stored: Floats
-    given_up: bool
+    stored: Floats = field(metadata=entry("J", name="energy", empty="left out"))
+    given_up: bool = field(metadata=entry(before="time"))
     quantum: float
     noise: float
     linear: bool
@@ -133,6 +133,7 @@ class TimeResponse(Result):
         )
 
     @property
+    @documented("m", before="velocity")
     def penetration(self) -> Floats:
         """(S,) of the reading into the environment [m]; negative outside."""
         return self.reading - self.wall_position
@@ -145,10 +146,6 @@ class TimeResponse(Result):
         gap = np.abs(self.energies.sum(axis=1) - self.stored)
         return float(gap.max() / max(np.abs(self.energies).max(), np.abs(self.stored).max(), 1e-300))
 
-    def document(self) -> dict[str, Any]:
-        """The motion by key and unit, and whether it was stopped early."""
-        return {"wall_position_m": self.wall_position, "given_up": self.given_up, **self.series}
-
     def table(self) -> dict[str, Floats]:
         """The motion in time as columns; where it is kept, each entry of the energy ledger with its own."""
         entries = enumerate(SOURCES if self.energies.size else ())
@@ -157,16 +154,7 @@ class TimeResponse(Result):
     @property
     def series(self) -> dict[str, Floats]:
         """The records of each sample, by key and unit; energies where they were recorded."""
-        energy = {"energy_J": self.stored} if self.stored.size else {}
-        return {
-            "time_s": self.time,
-            "position_m": self.reading,
-            "penetration_m": self.penetration,
-            "velocity_m_per_s": self.velocity,
-            "force_N": self.force,
-            "handle_m": self.handle,
-            **energy,
-        }
+        return dict(super().table())
 
     def __repr__(self) -> str:
         largest = float(np.max(np.abs(self.force), initial=0.0))

@@ -12,8 +12,8 @@ where the two part, the simulation is the answer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import inf, log, nan, pi
+from dataclasses import dataclass, field, replace
+from math import inf, log, nan
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_kind, check_number
 from zwidth.model.modes import least_deforming_motion
 from zwidth.progress import Progress
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry, keys_of
 
 NOT_PREDICTED: Final = ("noise", "programmable brakes")
 STARTS: Final = (0.7, 1.4)  # of the predicted amplitude; the run that ends nearer to it is reported
@@ -291,13 +291,12 @@ def _middle(loop: Loop, offset: float) -> tuple[Floats, float]:
     return middle, float(loop.plant.sensor @ middle)
 
 
-CYCLE_KEYS: Final = ("amplitude_m", "frequency_Hz", "stable", "within_range", "force_N", "velocity_m_per_s")
 CycleSource = Literal["describing function", "simulation"]
 MOST_TOLD: Final = 4  # cycles that a prediction shows of itself
 
 
 @dataclass(frozen=True)
-class SimulatedVibration:
+class SimulatedVibration(Documented):
     """Vibration that a simulation ends in.
 
     start, duration  [m] from the middle of the vibration, [s]
@@ -305,25 +304,19 @@ class SimulatedVibration:
     amplitude        of the sensor's motion in the last quarter [m];   frequency  [Hz]
     """
 
-    start: float
-    duration: float
-    behaviour: str
-    amplitude: float
-    frequency: float
+    start: float = field(metadata=entry("m"))
+    duration: float = field(metadata=entry("s"))
+    behaviour: str = field(metadata=entry(before="start"))
+    amplitude: float = field(metadata=entry("m", before="start"))
+    frequency: float = field(metadata=entry("Hz", before="start"))
 
-    def document(self) -> dict[str, Any]:
-        """The numbers by key and unit."""
-        return {
-            "behaviour": self.behaviour,
-            "amplitude_m": self.amplitude,
-            "frequency_Hz": self.frequency,
-            "start_m": self.start,
-            "duration_s": self.duration,
-        }
+
+def _predicted_tone(cycle: LimitCycle | None) -> dict[str, float] | None:
+    return None if cycle is None else {"amplitude_m": cycle.amplitude, "frequency_Hz": cycle.frequency_Hz}
 
 
 @dataclass(frozen=True)
-class LimitCycleAnswer:
+class LimitCycleAnswer(Documented):
     """One limit cycle, and what it rests on.
 
     cycle      the answer
@@ -334,23 +327,17 @@ class LimitCycleAnswer:
     predicted  what harmonic balance predicts in its place; None: nothing
     """
 
-    cycle: LimitCycle
-    source: CycleSource
-    confirmed: bool | None
-    simulated: SimulatedVibration | None
-    predicted: LimitCycle | None
+    cycle: LimitCycle = field(metadata=entry(spread=True))
+    source: CycleSource = field(metadata=entry(name="from"))
+    confirmed: bool | None = field(metadata=entry())
+    simulated: SimulatedVibration | None = field(metadata=entry())
+    predicted: LimitCycle | None = field(metadata=entry(value=_predicted_tone, before="simulated"))
 
-    def document(self) -> dict[str, Any]:
-        """The numbers by key and unit."""
-        predicted = self.predicted
-        return _cycle_document(self.cycle) | {
-            "sensor_amplitude_m": self.cycle.amplitude,
-            "from": self.source,
-            "confirmed": self.confirmed,
-            "predicted": predicted
-            and {"amplitude_m": predicted.amplitude, "frequency_Hz": predicted.frequency_Hz},
-            "simulated": self.simulated and self.simulated.document(),
-        }
+    @property
+    @documented("m", before="source")
+    def sensor_amplitude(self) -> float:
+        """Amplitude of the sensor's motion [m], as in the cycle, under a key that says whose it is."""
+        return self.cycle.amplitude
 
 
 @dataclass(frozen=True, repr=False)
@@ -363,28 +350,28 @@ class LimitCyclePrediction(Result):
     nonlinear              what of the device depends on the amplitude, in words
     left_out               what of the device the prediction leaves out, in words
     predicted_by           the method, and what it is worth
-    balance                growth of vibrations over their amplitude, and as far as the device can move
     answers                the limit cycles by amplitude: predicted, or simulated where the two part
     contradicted           predicted cycles that no simulation has
     small_start_vibration  what it finds where no stable cycle is predicted within the range; None: not simulated
     resting_limit          stiffest wall on which there is a place to rest under every push [N/m]; None: not known
     quiet_limit            stiffest wall, of this damping, without any hunting [N/m]; None: not known
+    balance                growth of vibrations over their amplitude, and as far as the device can move
     was_simulated          whether predictions were held against simulations
     """
 
-    wall_stiffness: float
-    wall_damping: float
-    offset: float
-    verdict: str
-    nonlinear: tuple[str, ...]
+    wall_stiffness: float = field(metadata=entry("N/m"))
+    wall_damping: float = field(metadata=entry("N s/m"))
+    offset: float = field(metadata=entry(name="offset_steps"))
+    verdict: str = field(metadata=entry())
+    nonlinear: tuple[str, ...] = field(metadata=entry())
     left_out: tuple[str, ...]
-    predicted_by: str
-    balance: HarmonicBalance
-    answers: tuple[LimitCycleAnswer, ...]
-    contradicted: tuple[LimitCycleAnswer, ...]
-    small_start_vibration: SimulatedVibration | None
-    resting_limit: float | None
-    quiet_limit: float | None
+    predicted_by: str = field(metadata=entry())
+    answers: tuple[LimitCycleAnswer, ...] = field(metadata=entry(name="limit_cycles"))
+    contradicted: tuple[LimitCycleAnswer, ...] = field(metadata=entry())
+    small_start_vibration: SimulatedVibration | None = field(metadata=entry(name="otherwise"))
+    resting_limit: float | None = field(metadata=entry("N/m"))
+    quiet_limit: float | None = field(metadata=entry("N/m"))
+    balance: HarmonicBalance = field(metadata=entry(name="growth"))
     was_simulated: bool = True
 
     @property
@@ -395,11 +382,13 @@ class LimitCyclePrediction(Result):
         return "no limit cycle is predicted" + (", and none was met by simulation" if self.was_simulated else "")
 
     @property
+    @documented("m", before="resting_limit")
     def largest_motion(self) -> float:
         """How far the device can move to either side [m]."""
         return self.balance.largest_motion
 
     @property
+    @documented(before="resting_limit")
     def leaves_range(self) -> bool:
         """Whether the largest vibrations within the range grow, so that nothing in the model limits them."""
         return self.balance.leaves_range
@@ -420,41 +409,17 @@ class LimitCyclePrediction(Result):
         """Whether a simulation has another vibration than predicted, or none; it is the answer then."""
         return bool(self.contradicted) or any(answer.source == "simulation" for answer in self.answers)
 
-    def document(self) -> dict[str, Any]:
-        """Everything by key and unit; None where it is not known, or was not simulated."""
-        balance = self.balance
-        return {
-            "wall_stiffness_N_per_m": self.wall_stiffness,
-            "wall_damping_Ns_per_m": self.wall_damping,
-            "offset_steps": self.offset,
-            "verdict": self.verdict,
-            "nonlinear": list(self.nonlinear),
-            "predicted_by": self.predicted_by,
-            "limit_cycles": [answer.document() for answer in self.answers],
-            "contradicted": [answer.document() for answer in self.contradicted],
-            "otherwise": self.small_start_vibration and self.small_start_vibration.document(),
-            "largest_motion_m": self.largest_motion,
-            "leaves_range": self.leaves_range,
-            "resting_limit_N_per_m": self.resting_limit,
-            "quiet_limit_N_per_m": self.quiet_limit,
-            "growth": {
-                "amplitude_m": balance.amplitude,
-                "growth_per_s": balance.growth,
-                "frequency_Hz": balance.frequency_Hz,
-            },
-        }
-
     def table(self) -> dict[str, list[Any]]:
         """The limit cycles as columns, one a row."""
-        rows = [_cycle_document(cycle) for cycle in self.cycles]
-        columns: dict[str, list[Any]] = {key: [_as_cell(row[key]) for row in rows] for key in CYCLE_KEYS}
+        rows = [cycle.document() for cycle in self.cycles]
+        columns: dict[str, list[Any]] = {key: [_as_cell(row[key]) for row in rows] for key in keys_of(LimitCycle)}
         columns["from"] = [answer.source for answer in self.answers]
         columns["confirmed"] = [
             None if answer.confirmed is None else _as_cell(answer.confirmed) for answer in self.answers
         ]
         documents = [simulated.document() if simulated else {} for simulated in self.simulated]
-        for key in ("behaviour", "amplitude_m", "frequency_Hz"):
-            columns[f"simulated_{key}"] = [own.get(key) for own in documents]
+        for name in ("behaviour", "amplitude_m", "frequency_Hz"):
+            columns[f"simulated_{name}"] = [own.get(name) for own in documents]
         return columns
 
     def __repr__(self) -> str:
@@ -477,25 +442,8 @@ class LimitCyclePrediction(Result):
         )
 
 
-def _cycle_document(cycle: LimitCycle) -> dict[str, Any]:
-    values = (
-        cycle.amplitude,
-        cycle.frequency_Hz,
-        cycle.stable,
-        cycle.within_range,
-        cycle.force_amplitude,
-        cycle_speed(cycle),
-    )
-    return dict(zip(CYCLE_KEYS, values, strict=True))
-
-
 def _as_cell(value: float | bool) -> float | str:
     return str(value).lower() if isinstance(value, bool) else value
-
-
-def cycle_speed(cycle: LimitCycle) -> float:
-    """Velocity amplitude at the sensor, of the sine [m/s]."""
-    return 2.0 * pi * cycle.frequency_Hz * cycle.amplitude
 
 
 # Share by which a simulated amplitude or frequency may differ from the predicted one and confirm it: with more, a

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from zwidth.guarantees.two_port import (
     sampled_demand,
 )
 from zwidth.loop.loop import Loop
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry
 
 # Number of ratios of damping to stiffness tried, and steps of golden section between them.
 DIRECTIONS, STEPS = 721, 60
@@ -38,18 +38,19 @@ ACROSS = np.sinh(np.linspace(-6.0, 6.0, 41)) / 4.0
 
 
 @dataclass(frozen=True)
-class Coupling:
+class Coupling(Documented):
     """The stiffest coupling that a wall may be rendered through.
 
     stiffness, damping  k_c [N/m], b_c [N s/m]; inf and 0 where the wall needs none, 0 and 0 where none suffices
     felt_stiffness      stiffness of wall and coupling in series, k_c K/(k_c + K) [N/m]
     """
 
-    stiffness: float
-    damping: float
-    felt_stiffness: float
+    stiffness: float = field(metadata=entry("N/m"))
+    damping: float = field(metadata=entry("N s/m"))
+    felt_stiffness: float = field(metadata=entry("N/m"))
 
     @property
+    @documented()
     def needed(self) -> bool:
         """Whether the wall needs a coupling."""
         return self.stiffness != float("inf")
@@ -63,10 +64,10 @@ class Couplings(Result):
     reason  why there are no regions; None where there are
     """
 
-    llewellyn: Region
-    raisbeck: Region
-    sampled: Region
-    limit: Coupling | None
+    llewellyn: Region = field(metadata=entry())
+    raisbeck: Region = field(metadata=entry())
+    sampled: Region = field(metadata=entry())
+    limit: Coupling | None = field(metadata=entry())
     reason: str | None = None
 
     @property
@@ -78,16 +79,7 @@ class Couplings(Result):
         """The couplings by key and unit; only the reason where there are none."""
         if self.reason is not None:
             return {"reason": self.reason}
-        limit = self.limit
-        return {name: region.document() for name, region in self.regions.items()} | {
-            "limit": limit
-            and {
-                "stiffness_N_per_m": limit.stiffness,
-                "damping_Ns_per_m": limit.damping,
-                "felt_stiffness_N_per_m": limit.felt_stiffness,
-                "needed": limit.needed,
-            }
-        }
+        return super().document()
 
     def table(self) -> dict[str, list[Any]]:
         """The outlines as columns, region after region."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 from zwidth.chart.chart import StabilityChart
@@ -13,7 +13,7 @@ from zwidth.guarantees.region import Region, outline_columns, stiffness_text
 from zwidth.guarantees.stable_alone import Premise
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.result import Result
+from zwidth.result import Documented, Result, entry
 
 COLGATE = (
     "Colgate and Schenkel 1997, read in Weir and Colgate's chapter of 2008; here for any device by alias disks"
@@ -23,13 +23,13 @@ NO_STABLE = "no stable wall has K > 0 and B >= 0"
 
 
 @dataclass(frozen=True)
-class Guarantee:
+class Guarantee(Documented):
     """One guarantee: its short name, what it promises, its walls, and where the condition comes from."""
 
-    name: str
-    meaning: str
-    region: Region
-    source: str
+    name: str = field(metadata=entry())
+    meaning: str = field(metadata=entry())
+    region: Region = field(metadata=entry(spread=True))
+    source: str = field(metadata=entry())
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Guarantees(Result):
     """
 
     loop: Loop | MeasuredLoop
-    guarantees: tuple[Guarantee, ...]
+    guarantees: tuple[Guarantee, ...] = field(metadata=entry())
     chart: StabilityChart | MeasuredChart
-    couplings: Couplings | None = None
-    premises: tuple[Premise, ...] = ()
+    couplings: Couplings | None = field(default=None, metadata=entry(name="coupling", empty="left out"))
+    premises: tuple[Premise, ...] = field(default=(), metadata=entry())
 
     def __getitem__(self, name: str) -> Guarantee:
         """The guarantee of that name. Raises KeyError."""
@@ -68,15 +68,6 @@ class Guarantees(Result):
     def is_empty(self) -> bool:
         """Whether no wall with K > 0 and B >= 0 has any of the guarantees."""
         return all(guarantee.region.reason is not None for guarantee in self.guarantees)
-
-    def document(self) -> dict[str, Any]:
-        """The guarantees by key and unit, and the couplings if they were computed."""
-        entries = [
-            {"name": one.name, "meaning": one.meaning} | one.region.document() | {"source": one.source}
-            for one in self.guarantees
-        ]
-        coupling = {} if self.couplings is None else {"coupling": self.couplings.document()}
-        return {"guarantees": entries} | coupling | {"premises": [one.document() for one in self.premises]}
 
     def table(self) -> dict[str, list[Any]]:
         """The outlines as columns, region after region."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from shapely.geometry.polygon import orient
 from zwidth.arrays import Flags, Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.area import find_peak
-from zwidth.result import Result
+from zwidth.result import Result, entry
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,11 +28,11 @@ class Region(Result):
     warning        limitation of the result; None if there is none
     """
 
-    rings: tuple[Floats, ...]
-    stiffness_max: float
-    damping_at_stiffness_max: float
-    reason: str | None = None
-    warning: str | None = None
+    rings: tuple[Floats, ...] = field(metadata=entry(name="regions"))
+    stiffness_max: float = field(metadata=entry("N/m"))
+    damping_at_stiffness_max: float = field(metadata=entry("N s/m"))
+    reason: str | None = field(default=None, metadata=entry(empty="left out"))
+    warning: str | None = field(default=None, metadata=entry(empty="left out"))
 
     @property
     def polygon(self) -> Any:
@@ -52,15 +52,6 @@ class Region(Result):
         for ring in self.rings:
             inside |= shapely.contains_xy(shapely.Polygon(ring), K, B)
         return inside
-
-    def document(self) -> dict[str, Any]:
-        """The set by key and unit, with its reason and warning."""
-        notes = {"reason": self.reason, "warning": self.warning}
-        return {
-            "regions": list(self.rings),
-            "stiffness_max_N_per_m": self.stiffness_max,
-            "damping_at_stiffness_max_Ns_per_m": self.damping_at_stiffness_max,
-        } | {key: note for key, note in notes.items() if note is not None}
 
     def table(self) -> dict[str, list[Any]]:
         """The corners of its rings as columns, ring after ring and counted from 0."""

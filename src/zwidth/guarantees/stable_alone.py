@@ -11,7 +11,7 @@ takes in no power along some motion, or the computer adds feedback of its own, t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -24,6 +24,7 @@ from zwidth.loop.closed_plant import close_plant, zero_poles
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant
+from zwidth.result import Documented, entry
 
 AS_BENT: Final = "links that bend are linearised as the load bends them"
 STABLE_ALONE: Final = "the device by itself, without wall and hand, is stable"
@@ -37,7 +38,7 @@ ROUNDING: Final = 1e-15  # of a computed root, in units of its own condition num
 
 
 @dataclass(frozen=True)
-class Premise:
+class Premise(Documented):
     """What must hold for a claim.
 
     what    a sentence
@@ -46,15 +47,10 @@ class Premise:
     reason  why it does not hold, or is not known, in words; "" where it holds
     """
 
-    what: str
-    holds: bool | None
-    how: Literal["computed", "by the file", "not checked"]
-    reason: str = ""
-
-    def document(self) -> dict[str, Any]:
-        """The premise by key; `reason` where it does not hold or is not known."""
-        stated = {"what": self.what, "holds": self.holds, "how": self.how}
-        return stated | ({"reason": self.reason} if self.reason else {})
+    what: str = field(metadata=entry())
+    holds: bool | None = field(metadata=entry())
+    how: Literal["computed", "by the file", "not checked"] = field(metadata=entry())
+    reason: str = field(default="", metadata=entry(empty="left out"))
 
     @property
     def fails(self) -> bool:

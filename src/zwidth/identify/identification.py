@@ -8,12 +8,12 @@ from math import ceil, inf, isfinite, log10, nan
 from typing import Any
 
 from zwidth.errors import NoAnswerError
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry, finite
 from zwidth.unit_text import unit_text
 
 
 @dataclass(frozen=True)
-class Check:
+class Check(Documented):
     """One thing that the data must be, before anything is fitted.
 
     what     is checked, a noun: "motion"
@@ -22,18 +22,14 @@ class Check:
     warning  it failed, and the fit is made all the same: a remark that a reader must see
     """
 
-    what: str
-    passed: bool
-    reason: str
+    what: str = field(metadata=entry())
+    passed: bool = field(metadata=entry())
+    reason: str = field(metadata=entry())
     warning: bool = False
-
-    def document(self) -> dict[str, Any]:
-        """The check as --json has it."""
-        return {"what": self.what, "passed": self.passed, "reason": self.reason}
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Documented):
     """A number with the interval that holds it with 95 %.
 
     name   what it is, a noun: "backlash"
@@ -47,28 +43,15 @@ class Estimate:
             is one of these entries; "" where it belongs to none
     """
 
-    name: str
-    value: float
-    low: float
-    high: float
-    unit: str
-    path: str = ""
+    name: str = field(metadata=entry())
+    value: float = field(metadata=entry(value=finite))
+    low: float = field(metadata=entry(value=finite))
+    high: float = field(metadata=entry(value=finite))
+    unit: str = field(metadata=entry())
+    path: str = field(default="", metadata=entry(empty="null", before="value"))
     within: str = ""
-    told: str = "yes"
-    reason: str = ""
-
-    def document(self) -> dict[str, Any]:
-        """The number as --json has it; an end without bound is null."""
-        return {
-            "name": self.name,
-            "path": self.path or None,
-            "value": self.value if isfinite(self.value) else None,
-            "low": self.low if isfinite(self.low) else None,
-            "high": self.high if isfinite(self.high) else None,
-            "unit": self.unit,
-            "told": self.told,
-            "reason": self.reason or None,
-        }
+    told: str = field(default="yes", metadata=entry())
+    reason: str = field(default="", metadata=entry(empty="null"))
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,15 +70,15 @@ class Identification(Result):
     details      further numbers of the kind, keys and values of --json
     """
 
-    kind: str
+    kind: str = field(metadata=entry())
     label: str
-    checks: tuple[Check, ...]
-    estimates: tuple[Estimate, ...] = ()
-    validation: float = nan
-    validated_on: str = ""
-    remarks: tuple[str, ...] = ()
+    checks: tuple[Check, ...] = field(metadata=entry(name="check"))
+    estimates: tuple[Estimate, ...] = field(default=(), metadata=entry(name="parameters"))
+    validation: float = field(default=nan, metadata=entry())
+    validated_on: str = field(default="", metadata=entry())
+    remarks: tuple[str, ...] = field(default=(), metadata=entry())
     curves: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    details: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict, metadata=entry(spread=True))
 
     @property
     def reason(self) -> str | None:
@@ -134,28 +117,16 @@ class Identification(Result):
         return ""
 
     @property
+    @documented(before="details")
     def left_out(self) -> tuple[str, ...]:
         """What the intervals do not hold, sentences."""
         return ()
 
     @property
+    @documented(before="details")
     def premises(self) -> tuple[Mapping[str, Any], ...]:
         """What the answer rests on: `what`, `holds` (True, False, None) and `how` it was seen."""
         return ()
-
-    def document(self) -> dict[str, Any]:
-        """Keys and values of --json."""
-        return {
-            "kind": self.kind,
-            "check": [check.document() for check in self.checks],
-            "parameters": [estimate.document() for estimate in self.estimates],
-            "validation": self.validation,
-            "validated_on": self.validated_on,
-            "remarks": list(self.remarks),
-            "left_out": list(self.left_out),
-            "premises": [dict(one) for one in self.premises],
-            **self.details,
-        }
 
     def table(self) -> Mapping[str, Any]:
         """Columns of what was measured and fitted."""

@@ -42,6 +42,7 @@ from zwidth.model.first_order_form import first_order_form
 from zwidth.model.modes import real_modes, undamped_modes
 from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.plant import Plant
+from zwidth.result import Documented, documented, entry, finite
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
@@ -312,16 +313,17 @@ NEUTRAL: Final = 1e-12  # |z| - 1 that is rounding
 
 
 @dataclass(frozen=True)
-class SidewaysMotion:
+class SidewaysMotion(Documented):
     """A motion that stands apart.
 
     growth_rate  [1/s], negative where it decays, 0 where it does neither;   frequency [Hz], 0 without vibration
     """
 
-    growth_rate: float
-    frequency: float
+    growth_rate: float = field(metadata=entry("1/s"))
+    frequency: float = field(metadata=entry("Hz"))
 
     @property
+    @documented("s", value=finite, before="frequency")
     def time_to_double(self) -> float:
         """[s]; inf of a motion that does not grow."""
         return log(2.0) / self.growth_rate if self.growth_rate > 0.0 else np.inf
@@ -333,14 +335,6 @@ class SidewaysMotion:
         if self.growth_rate > 0.0:
             return f"{kind} that grows by {self.growth_rate:.4g} 1/s (doubles in {self.time_to_double:.4g} s)"
         return f"{kind} that decays by {-self.growth_rate:.4g} 1/s" if self.growth_rate else f"{kind} (neutral)"
-
-    def document(self) -> dict[str, float | None]:
-        """Its numbers by their keys."""
-        return {
-            "growth_rate_1_per_s": self.growth_rate,
-            "time_to_double_s": self.time_to_double if self.growth_rate > 0.0 else None,
-            "frequency_Hz": self.frequency,
-        }
 
 
 def sideways_motions(plant: Plant, controller: Controller) -> tuple[SidewaysMotion, ...]:

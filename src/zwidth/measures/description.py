@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,11 +17,11 @@ from zwidth.model.flexible_body import FlexibleLink, Method
 from zwidth.model.mechanism import FIXED, Mechanism
 from zwidth.model.modes import natural_frequencies, real_modes
 from zwidth.model.plant import Plant
-from zwidth.result import Result
+from zwidth.result import Documented, Result, entry
 
 
 @dataclass(frozen=True)
-class BeamDescription:
+class BeamDescription(Documented):
     """A link that bends.
 
     method           by which it is modelled;   modes  kept beside its static deflections
@@ -29,23 +29,12 @@ class BeamDescription:
     first_frequency  of the beam alone, clamped at its base [Hz]
     """
 
-    link: str
-    method: Method
-    modes: int
-    mass: float
-    carried_mass: float
-    first_frequency: float
-
-    def document(self) -> dict[str, Any]:
-        """Its numbers by their keys."""
-        return {
-            "link": self.link,
-            "method": self.method,
-            "modes": self.modes,
-            "mass_kg": self.mass,
-            "carried_mass_kg": self.carried_mass,
-            "first_clamped_frequency_Hz": self.first_frequency,
-        }
+    link: str = field(metadata=entry())
+    method: Method = field(metadata=entry())
+    modes: int = field(metadata=entry())
+    mass: float = field(metadata=entry("kg"))
+    carried_mass: float = field(metadata=entry("kg"))
+    first_frequency: float = field(metadata=entry("Hz", name="first_clamped_frequency"))
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,36 +54,27 @@ class Description(Result):
     """
 
     effective: EffectiveParameters | None
-    natural_frequencies: Floats | None
-    damping_ratios: list[float | None] | None
-    joints: dict[str, Any] | None = None
-    jacobian: Floats | None = None
-    angular_jacobian: Floats | None = None
-    mass_matrix: Floats | None = None
-    manipulability: float | None = None
-    dynamic_manipulability: float | None = None
-    isotropy: float | None = None
-    beams: tuple[BeamDescription, ...] = ()
+    natural_frequencies: Floats | None = field(metadata=entry("Hz"))
+    damping_ratios: list[float | None] | None = field(metadata=entry())
+    joints: dict[str, Any] | None = field(default=None, metadata=entry("rad"))
+    jacobian: Floats | None = field(default=None, metadata=entry())
+    angular_jacobian: Floats | None = field(default=None, metadata=entry())
+    mass_matrix: Floats | None = field(default=None, metadata=entry())
+    manipulability: float | None = field(default=None, metadata=entry())
+    dynamic_manipulability: float | None = field(default=None, metadata=entry())
+    isotropy: float | None = field(default=None, metadata=entry())
+    beams: tuple[BeamDescription, ...] = field(default=(), metadata=entry())
 
     def document(self) -> dict[str, Any]:
         """The numbers by key and unit; None where inapplicable."""
         felt = self.effective
-        return {
+        own = {
             "link_side_mass_kg": felt and felt.link_side_mass,
             "motor_side_mass_kg": felt and felt.motor_side_mass,
             "rigid_mass_kg": felt and felt.rigid_mass,
             "stiffness_N_per_m": felt and felt.stiffness,
-            "natural_frequencies_Hz": self.natural_frequencies,
-            "damping_ratios": self.damping_ratios,
-            "joints_rad": self.joints,
-            "jacobian": self.jacobian,
-            "angular_jacobian": self.angular_jacobian,
-            "mass_matrix": self.mass_matrix,
-            "manipulability": self.manipulability,
-            "dynamic_manipulability": self.dynamic_manipulability,
-            "isotropy": self.isotropy,
-            "beams": [beam.document() for beam in self.beams] if self.joints is not None else None,
-        }
+        } | super().document()
+        return own | ({} if self.joints is not None else {"beams": None})
 
     def table(self) -> dict[str, list[Any]]:
         """Every single number with its dotted key, in the columns `key` and `value`."""

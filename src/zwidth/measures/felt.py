@@ -11,7 +11,7 @@ with all that was measured, and W G_ha as `loop.measured.measured_port` gives it
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite
 from typing import Any, Final
@@ -42,7 +42,7 @@ from zwidth.measures.handle_impedance import (
 )
 from zwidth.model.argument_checks import check_kind, check_number
 from zwidth.model.plant import Plant
-from zwidth.result import Result
+from zwidth.result import Result, entry
 
 LIMIT_HEADINGS: Final[dict[LimitKind, str]] = {
     "bound": "the structure itself has",
@@ -78,15 +78,15 @@ class FeltWall(Result):
                                          [N s/m]
     """
 
-    wall_stiffness: float
-    wall_damping: float
-    verdict: str
-    static_stiffness: float | None
-    free_motion_mass: float
-    stiffness_max: float | None
-    static_stiffness_at_stiffness_max: float | None
-    static_stiffness_limit: float
-    static_stiffness_limit_kind: LimitKind
+    wall_stiffness: float = field(metadata=entry("N/m"))
+    wall_damping: float = field(metadata=entry("N s/m"))
+    verdict: str = field(metadata=entry())
+    static_stiffness: float | None = field(metadata=entry("N/m"))
+    free_motion_mass: float = field(metadata=entry("kg"))
+    stiffness_max: float | None = field(metadata=entry("N/m"))
+    static_stiffness_at_stiffness_max: float | None = field(metadata=entry("N/m"))
+    static_stiffness_limit: float = field(metadata=entry("N/m"))
+    static_stiffness_limit_kind: LimitKind = field(metadata=entry())
     frequency: Floats
     felt_impedance: Complexes | None
     commanded_impedance: Complexes
@@ -101,24 +101,9 @@ class FeltWall(Result):
 
     def document(self) -> dict[str, Any]:
         """All numbers by key and unit; the felt ones are None where the wall is not stable."""
-        unknown = (
-            dict.fromkeys(_impedance_columns("impedance", self.commanded_impedance))
-            if self.felt_impedance is None
-            else {}
-        )
-        return {
-            "wall_stiffness_N_per_m": self.wall_stiffness,
-            "wall_damping_Ns_per_m": self.wall_damping,
-            "verdict": self.verdict,
-            "static_stiffness_N_per_m": self.static_stiffness,
-            "free_motion_mass_kg": self.free_motion_mass,
-            "stiffness_max_N_per_m": self.stiffness_max,
-            "static_stiffness_at_stiffness_max_N_per_m": self.static_stiffness_at_stiffness_max,
-            "static_stiffness_limit_N_per_m": self.static_stiffness_limit,
-            "static_stiffness_limit_kind": self.static_stiffness_limit_kind,
-            **self.table(),
-            **unknown,
-        }
+        own = super().document() | self.table()
+        unknown = _impedance_columns("impedance", self.commanded_impedance) if self.felt_impedance is None else {}
+        return own | dict.fromkeys(unknown)
 
     def table(self) -> dict[str, Floats]:
         """The impedances as columns, one frequency a row; nan for the felt one where the wall is not stable."""
@@ -347,6 +332,13 @@ def felt_wall(point: OperatingPoint, stiffness: float, damping: float) -> FeltWa
 PIECE = 1e-3
 
 
+def _felt_arcs(arcs: tuple[BoundaryArc, ...]) -> list[dict[str, Floats]]:
+    return [
+        {"felt_stiffness_N_per_m": arc.stiffness, "damping_Ns_per_m": arc.damping, "frequency_Hz": arc.frequency}
+        for arc in arcs
+    ]
+
+
 @dataclass(frozen=True, repr=False)
 class FeltChart(Result):
     """The stable walls with K >= 0, each at the stiffness that the hand feels at rest.
@@ -358,28 +350,11 @@ class FeltChart(Result):
     limit_kind     "bound": no wall is felt stiffer; "limit": walls of finite stiffness may be; "infinite"
     """
 
-    regions: tuple[Floats, ...]
-    boundary: tuple[BoundaryArc, ...]
-    stiffness_max: float
-    limit: float
-    limit_kind: LimitKind
-
-    def document(self) -> dict[str, Any]:
-        """The chart by key and unit."""
-        return {
-            "regions": [ring.tolist() for ring in self.regions],
-            "boundary": [
-                {
-                    "felt_stiffness_N_per_m": arc.stiffness,
-                    "damping_Ns_per_m": arc.damping,
-                    "frequency_Hz": arc.frequency,
-                }
-                for arc in self.boundary
-            ],
-            "felt_stiffness_max_N_per_m": self.stiffness_max,
-            "felt_stiffness_limit_N_per_m": self.limit,
-            "felt_stiffness_limit_kind": self.limit_kind,
-        }
+    regions: tuple[Floats, ...] = field(metadata=entry(lists=True))
+    boundary: tuple[BoundaryArc, ...] = field(metadata=entry(value=_felt_arcs))
+    stiffness_max: float = field(metadata=entry("N/m", name="felt_stiffness_max"))
+    limit: float = field(metadata=entry("N/m", name="felt_stiffness_limit"))
+    limit_kind: LimitKind = field(metadata=entry(name="felt_stiffness_limit_kind"))
 
     def table(self) -> dict[str, Floats]:
         """The edge's walls as columns, its arcs one after another and counted from 0."""

@@ -12,7 +12,7 @@ through each other, as only those of uncoupled motions do, may be exchanged.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
@@ -24,7 +24,7 @@ from zwidth.chart.verdict import BAND
 from zwidth.errors import NoAnswerError
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import check_kind
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry
 
 # A step along a path longer than this share of its |z|, or of 1, is halved; one shorter than the second length is
 # not, whatever its neighbours do: it is too small to see.
@@ -35,8 +35,12 @@ HALVINGS: Final = 40
 SHOWN: Final = 4  # crossings that a repr names
 
 
+def _parts(z: Any) -> dict[str, Any]:
+    return {"real": z.real, "imag": z.imag}
+
+
 @dataclass(frozen=True)
-class Crossing:
+class Crossing(Documented):
     """A path that crosses the unit circle.
 
     value       of the number
@@ -45,15 +49,10 @@ class Crossing:
     outwards    whether z leaves the circle's inside as the number grows along the path
     """
 
-    value: float
-    eigenvalue: complex
-    path: int
-    outwards: bool
-
-    def document(self) -> dict[str, Any]:
-        """The crossing by key."""
-        z = {"real": self.eigenvalue.real, "imag": self.eigenvalue.imag}
-        return {"value": self.value, **z, "path": self.path, "outwards": self.outwards}
+    value: float = field(metadata=entry())
+    eigenvalue: complex = field(metadata=entry(value=_parts, spread=True))
+    path: int = field(metadata=entry())
+    outwards: bool = field(metadata=entry())
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,26 +65,16 @@ class EigenvaluePaths(Result):
     crossings    of the unit circle, in the order of the values
     """
 
-    values: Floats
-    requested: Flags
-    eigenvalues: Complexes
-    crossings: tuple[Crossing, ...]
+    values: Floats = field(metadata=entry())
+    requested: Flags = field(metadata=entry(name="asked"))
+    eigenvalues: Complexes = field(metadata=entry(value=_parts, spread=True))
+    crossings: tuple[Crossing, ...] = field(metadata=entry())
 
     @property
+    @documented(before="crossings")
     def spectral_radius(self) -> Floats:
         """Largest |z| (k,)."""
         return np.asarray(np.abs(self.eigenvalues).max(axis=1))
-
-    def document(self) -> dict[str, Any]:
-        """Values, eigenvalues by real and imaginary part (k, N), spectral radius and crossings, by key."""
-        return {
-            "values": self.values,
-            "asked": self.requested,
-            "real": self.eigenvalues.real,
-            "imag": self.eigenvalues.imag,
-            "spectral_radius": self.spectral_radius,
-            "crossings": [crossing.document() for crossing in self.crossings],
-        }
 
     def table(self) -> dict[str, Any]:
         """A row for each value; the real and imaginary part of each path, counted from 0."""

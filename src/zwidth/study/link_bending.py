@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isnan, nan, pi, sqrt
 from typing import Any, Final
 
@@ -38,7 +38,7 @@ from zwidth.model.beam_section import tube as tube_section
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping, undamped_modes
 from zwidth.model.plant import Plant
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry
 
 MATERIAL: Final = "aluminium-6061"
 WALL: Final = 0.1  # of the diameter
@@ -52,34 +52,23 @@ BENDING_JOINTS: Final = ("revolute", "prismatic", "fixed")
 
 
 @dataclass(frozen=True)
-class Tube:
+class Tube(Documented):
     """A link as a typical tube.
 
     length, outer_diameter, wall  [m];   share  of the link's mass
     damping_time  of the tube's own damping, this times its stiffness [s]; 0: damped as the file says
     """
 
-    link: str
-    length: float
-    outer_diameter: float
-    wall: float
-    share: float
-    damping_time: float = 0.0
-
-    def document(self) -> dict[str, Any]:
-        """Its numbers by their keys."""
-        return {
-            "link": self.link,
-            "length_m": self.length,
-            "outer_diameter_m": self.outer_diameter,
-            "wall_m": self.wall,
-            "share_of_mass": self.share,
-            "damping_time_s": self.damping_time,
-        }
+    link: str = field(metadata=entry())
+    length: float = field(metadata=entry("m"))
+    outer_diameter: float = field(metadata=entry("m"))
+    wall: float = field(metadata=entry("m"))
+    share: float = field(metadata=entry(name="share_of_mass"))
+    damping_time: float = field(default=0.0, metadata=entry("s"))
 
 
 @dataclass(frozen=True)
-class BendingNumbers:
+class BendingNumbers(Documented):
     """Of a device with bending or with rigid links.
 
     chart             its stable walls; None where they could not be computed
@@ -91,23 +80,15 @@ class BendingNumbers:
     """
 
     chart: StabilityChart | None
-    static_stiffness: float
-    first_mode: float
-    reason: str = ""
+    static_stiffness: float = field(metadata=entry("N/m"))
+    first_mode: float = field(metadata=entry("Hz"))
+    reason: str = field(default="", metadata=entry(empty="left out"))
 
     @property
+    @documented("N/m", before="static_stiffness")
     def stiffness_max(self) -> float:
         """[N/m]; nan where no wall is stable, or the chart cannot be computed."""
         return nan if self.chart is None else self.chart.stiffness_max
-
-    def document(self) -> dict[str, Any]:
-        """Its numbers by their keys."""
-        return {
-            "stiffness_max_N_per_m": self.stiffness_max,
-            "static_stiffness_N_per_m": self.static_stiffness,
-            "first_mode_Hz": self.first_mode,
-            **({"reason": self.reason} if self.reason else {}),
-        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,37 +101,23 @@ class Bending(Result):
     bent, rigid  its numbers
     """
 
-    links: tuple[str, ...]
-    tubes: tuple[Tube, ...]
-    kept: tuple[str, ...]
-    bent: BendingNumbers
-    rigid: BendingNumbers
+    links: tuple[str, ...] = field(metadata=entry())
+    tubes: tuple[Tube, ...] = field(metadata=entry())
+    kept: tuple[str, ...] = field(metadata=entry(name="kept_rigid"))
+    bent: BendingNumbers = field(metadata=entry())
+    rigid: BendingNumbers = field(metadata=entry())
 
     @property
+    @documented(before="tubes")
     def given(self) -> bool:
         """Whether the file gives the beams."""
         return not self.tubes
 
-    def document(self) -> dict[str, Any]:
-        """Its numbers by their keys."""
-        return {
-            "links": list(self.links),
-            "given": self.given,
-            "tubes": [tube.document() for tube in self.tubes],
-            "kept_rigid": list(self.kept),
-            "bent": self.bent.document(),
-            "rigid": self.rigid.document(),
-        }
-
     def table(self) -> dict[str, Any]:
         """The numbers with rigid and with bending links as columns."""
-        rows = (self.rigid, self.bent)
-        return {
-            "links": ["rigid", "bending"],
-            "stiffness_max_N_per_m": [each.stiffness_max for each in rows],
-            "static_stiffness_N_per_m": [each.static_stiffness for each in rows],
-            "first_mode_Hz": [each.first_mode for each in rows],
-        }
+        rigid, bent = self.rigid.document(), self.bent.document()
+        columns = {name: [rigid[name], bent[name]] for name in rigid if name != "reason"}
+        return {"links": ["rigid", "bending"], **columns}
 
     def __repr__(self) -> str:
         what = "beams of the file" if self.given else "typical tubes"

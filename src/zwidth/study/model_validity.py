@@ -13,7 +13,7 @@ models would count as equal where they merely cross.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import nan, pi
 from typing import Any, Final
@@ -31,7 +31,7 @@ from zwidth.model.argument_checks import check_kind
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.plant import Plant
 from zwidth.model.reduction import Model
-from zwidth.result import Result
+from zwidth.result import Documented, Result, entry
 
 Interval = tuple[float, float]
 
@@ -55,7 +55,7 @@ SIMPLER: Final[tuple[tuple[Model, str], ...]] = (
 
 
 @dataclass(frozen=True)
-class ModelFit:
+class ModelFit(Documented):
     """Error of one model against the full one along the edge.
 
     key           "rigid", "motor-mass" or "two-mass", with "-undamped" where its damping was left out
@@ -66,12 +66,12 @@ class ModelFit:
     reason        why the model does not apply; "" where it does
     """
 
-    key: str
-    label: str
+    key: str = field(metadata=entry())
+    label: str = field(metadata=entry())
     frequency: Floats
     error: Floats
-    valid_ranges: tuple[Interval, ...]
-    reason: str = ""
+    valid_ranges: tuple[Interval, ...] = field(metadata=entry("Hz", name="frequency_ranges"))
+    reason: str = field(default="", metadata=entry(empty="left out"))
 
     @property
     def everywhere(self) -> bool:
@@ -93,28 +93,12 @@ class Validity(Result):
     fits           simplest first
     """
 
-    tolerance: float
-    first_natural: float
+    tolerance: float = field(metadata=entry())
+    first_natural: float = field(metadata=entry("Hz", name="first_natural_frequency"))
     frequency: Floats
     walls: Floats
     arc: Ints
-    fits: tuple[ModelFit, ...]
-
-    def document(self) -> dict[str, Any]:
-        """The tolerance, and where along the edge each model stays within it, by key and unit."""
-        return {
-            "tolerance": self.tolerance,
-            "first_natural_frequency_Hz": self.first_natural,
-            "within": [
-                {
-                    "key": fit.key,
-                    "label": fit.label,
-                    "frequency_ranges_Hz": [list(interval) for interval in fit.valid_ranges],
-                    **({"reason": fit.reason} if fit.reason else {}),
-                }
-                for fit in self.fits
-            ],
-        }
+    fits: tuple[ModelFit, ...] = field(metadata=entry(name="within"))
 
     def table(self) -> dict[str, list[Any]]:
         """A row for each model and each wall of the edge."""

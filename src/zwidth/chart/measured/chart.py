@@ -8,8 +8,9 @@ Walls that a device renders by its response as measured, where the error of the 
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isnan, nan
 from typing import Any, ClassVar, Final
@@ -55,6 +56,7 @@ from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.response import CONFIDENCE, Response, joint_radius
+from zwidth.result import documented, entry
 
 ON_IT = 1e-9  # distance from a cell's edge, in windows, of a measured point that is a corner of its polygon
 ZOOMED = 2e-8  # relative error of the stiffest wall by chords in the window round it
@@ -88,16 +90,16 @@ class MeasuredChart(DrawnChart):
     """
 
     loop: MeasuredLoop
-    stiffness_max_nominal: float
-    damping_at_stiffness_max_nominal: float
-    frequencies_at_stiffness_max_nominal: tuple[float, ...]
+    stiffness_max_nominal: float = field(metadata=entry("N/m"))
+    damping_at_stiffness_max_nominal: float = field(metadata=entry("N s/m"))
+    frequencies_at_stiffness_max_nominal: tuple[float, ...] = field(metadata=entry("Hz", empty="null"))
     edge: Boundary
-    interpolation_error: float
-    measured_stiffness_max: float
-    band: DoubtBand | None
-    stiffness_max_of_sweeps: tuple[float, ...]
-    unusable: tuple[UnusableRange, ...]
-    open: bool
+    interpolation_error: float = field(metadata=entry())
+    measured_stiffness_max: float = field(metadata=entry("N/m", before="interpolation_error"))
+    band: DoubtBand | None = field(metadata=entry())
+    stiffness_max_of_sweeps: tuple[float, ...] = field(metadata=entry("N/m", empty="null"))
+    unusable: tuple[UnusableRange, ...] = field(metadata=entry())
+    open: bool = field(metadata=entry(name="closed", value=operator.not_))
     window: Window
 
     _edge_columns: ClassVar[dict[str, str]] = {
@@ -107,6 +109,7 @@ class MeasuredChart(DrawnChart):
     }
 
     @property
+    @documented(before="interpolation_error")
     def integrators(self) -> int:
         """Poles of the response at z = 1."""
         return self.loop.integrators
@@ -117,6 +120,13 @@ class MeasuredChart(DrawnChart):
         return doubt_along(self.loop, self.edge, self.window)
 
     @property
+    @documented(empty="null", before="interpolation_error")
+    def measurement(self) -> str:
+        """The note of whoever measured the response; "" where there is none."""
+        return self.loop.response.note
+
+    @property
+    @documented()
     def measured_up_to_share(self) -> float:
         """Where the data end, as a share of half the sampling rate; 1 where they reach it."""
         half = 0.5 / self.loop.period
@@ -136,23 +146,6 @@ class MeasuredChart(DrawnChart):
         return judge_measured(
             self.loop, self.edge, self.in_doubt, wall_stiffness, wall_damping, edge_frequencies(self)
         )
-
-    def document(self) -> dict[str, Any]:
-        """The chart as numbers and lists, under the keys of `zwidth chart --json`; nan where there is none."""
-        return super().document() | {
-            "stiffness_max_nominal_N_per_m": self.stiffness_max_nominal,
-            "damping_at_stiffness_max_nominal_Ns_per_m": self.damping_at_stiffness_max_nominal,
-            "frequencies_at_stiffness_max_nominal_Hz": list(self.frequencies_at_stiffness_max_nominal) or None,
-            "integrators": self.integrators,
-            "measurement": self.loop.response.note or None,
-            "measured_stiffness_max_N_per_m": self.measured_stiffness_max,
-            "interpolation_error": self.interpolation_error,
-            "band": self.band and self.band.document(),
-            "stiffness_max_of_sweeps_N_per_m": list(self.stiffness_max_of_sweeps) or None,
-            "unusable": [stretch.document() for stretch in self.unusable],
-            "closed": not self.open,
-            "measured_up_to_share": self.measured_up_to_share,
-        }
 
     def _numbers(self) -> list[str]:
         if self.band is None:

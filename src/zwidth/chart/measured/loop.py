@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from zwidth.model.response import (
     low_frequencies,
     usable_frequencies,
 )
+from zwidth.result import Documented, entry
 
 BETWEEN = 2.0  # times the error that interpolation is expected to leave: what is allowed for between frequencies
 SETTLED = np.radians(3.0)  # phase at the lowest frequency, below which nothing is fitted to what lies below
@@ -296,20 +297,16 @@ CONTINUED: Final = 0.8  # of half the sampling rate: from here on the response i
 
 
 @dataclass(frozen=True)
-class UnusableRange:
+class UnusableRange(Documented):
     """Frequencies low to high [Hz] whose part of the boundary cannot be relied on, and why.
 
     on_edge  whether the edge of the stable set runs through it; None where it is not known
     """
 
-    low: float
-    high: float
-    reason: str
-    on_edge: bool | None = None
-
-    def document(self) -> dict[str, Any]:
-        """The stretch as numbers and words."""
-        return {"low_Hz": self.low, "high_Hz": self.high, "reason": self.reason, "on_edge": self.on_edge}
+    low: float = field(metadata=entry("Hz"))
+    high: float = field(metadata=entry("Hz"))
+    reason: str = field(metadata=entry())
+    on_edge: bool | None = field(default=None, metadata=entry())
 
 
 def reaches_half_rate(theta: Floats) -> tuple[bool, bool]:

@@ -19,9 +19,8 @@ two roots outside for each stretch of frequencies that can hide so many.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf, isnan, nan
-from typing import Any
 
 import numpy as np
 import shapely
@@ -39,6 +38,7 @@ from zwidth.chart.measured.boundary import (
 )
 from zwidth.chart.measured.doubt import Doubt
 from zwidth.chart.measured.loop import MeasuredLoop
+from zwidth.result import Documented, entry
 
 CHORD = 1e-5  # a chord's distance from the curve, as a share of the window
 GRID = 1e-11  # to which lines are noded, as a share of the window
@@ -249,7 +249,7 @@ LARGEST_DRAWN = 0.9  # relative error of the response whose ellipse is drawn at 
 
 
 @dataclass(frozen=True)
-class DoubtBand:
+class DoubtBand(Documented):
     """The doubtful walls along the stable set's edge.
 
     regions         rings (k, 2) of [stiffness, damping] that cover them
@@ -258,19 +258,10 @@ class DoubtBand:
     meaning         what the band covers, in words
     """
 
-    regions: tuple[Floats, ...]
-    stiffness_low: float
-    stiffness_high: float
-    meaning: str
-
-    def document(self) -> dict[str, Any]:
-        """The band as numbers and lists."""
-        return {
-            "stiffness_low_N_per_m": self.stiffness_low,
-            "stiffness_high_N_per_m": self.stiffness_high,
-            "meaning": self.meaning,
-            "regions": [ring.tolist() for ring in self.regions],
-        }
+    regions: tuple[Floats, ...] = field(metadata=entry(lists=True))
+    stiffness_low: float = field(metadata=entry("N/m", before="regions"))
+    stiffness_high: float = field(metadata=entry("N/m", before="regions"))
+    meaning: str = field(metadata=entry(before="regions"))
 
 
 def band_rings(loop: MeasuredLoop, cells: StableRegions) -> tuple[Floats, ...]:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from zwidth.arrays import Floats
 from zwidth.chart.chart_base import Chart, DrawnChart
+from zwidth.result import entry
+
+
+def _failed_members(failed: Mapping[int, str]) -> list[dict[str, Any]]:
+    return [{"member": index, "reason": reason} for index, reason in failed.items()]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -33,16 +38,16 @@ class CommonChart(DrawnChart):
                     a corner, and 1e-6 where a member cuts off less than chords of the arcs see
     """
 
-    failed: dict[int, str]
-    binding: tuple[int, ...]
-    members_at_stiffness_max: tuple[int, ...]
-    best_by_area: int
-    best_by_stiffness: int
-    lost_share: float
-    lost_stiffness_share: float
-    excluding: tuple[int, ...]
+    failed: dict[int, str] = field(metadata=entry(value=_failed_members))
+    binding: tuple[int, ...] = field(metadata=entry())
+    members_at_stiffness_max: tuple[int, ...] = field(metadata=entry(before="failed"))
+    best_by_area: int = field(metadata=entry())
+    best_by_stiffness: int = field(metadata=entry())
+    lost_share: float = field(metadata=entry())
+    lost_stiffness_share: float = field(metadata=entry())
+    excluding: tuple[int, ...] = field(metadata=entry(empty="null"))
     outlines: dict[int, tuple[Floats, ...]]
-    corner_blur: float
+    corner_blur: float = field(metadata=entry(before="excluding"))
     off_circle: Floats
 
     _edge_columns: ClassVar[dict[str, str]] = {"member": "member", **Chart._edge_columns}
@@ -103,22 +108,7 @@ class CommonChart(DrawnChart):
             "stiffness_max_is": self.stiffness_max_is,
             "edge_walls_in_doubt": self.off_circle.tolist(),
         }
-        return (
-            doubt
-            | reason
-            | super().document()
-            | {
-                "members_at_stiffness_max": list(self.members_at_stiffness_max),
-                "failed": [{"member": index, "reason": reason} for index, reason in self.failed.items()],
-                "binding": list(self.binding),
-                "best_by_area": self.best_by_area,
-                "best_by_stiffness": self.best_by_stiffness,
-                "lost_share": self.lost_share,
-                "lost_stiffness_share": self.lost_stiffness_share,
-                "corner_blur": self.corner_blur,
-                "excluding": list(self.excluding) or None,
-            }
-        )
+        return doubt | reason | super().document()
 
     def _summary(self) -> str:
         bind = f"{len(self.binding)} of which bind"

@@ -65,6 +65,7 @@ from zwidth.identify.records.sampling import SampleTimes, check_mass_in_file, ch
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.progress import Progress
+from zwidth.result import entry
 
 Torque = Literal["measured", "commanded"]
 Rotors = Literal["fitted", "known"]
@@ -93,7 +94,7 @@ class ArmIdentification(Identification):
               can have, as the device file takes them; their intervals leave noise in the positions out
     """
 
-    numbers: Mapping[str, Any] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict, metadata=entry())
 
     @property
     def not_written(self) -> str:
@@ -113,10 +114,6 @@ class ArmIdentification(Identification):
         return (
             {"what": "noise in the positions is small in the analysed band", "holds": None, "how": "not checked"},
         )
-
-    def document(self) -> dict[str, Any]:
-        """Keys and values of --json."""
-        return {**super().document(), "numbers": dict(self.numbers)}
 
 
 def identify_arm(

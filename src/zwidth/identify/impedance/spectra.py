@@ -16,7 +16,7 @@ hand; here by the noncentral chi-square distribution).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
 
@@ -28,6 +28,7 @@ from zwidth.identify.impedance.local_spectra import LocalSpectra, correlations, 
 from zwidth.identify.profile_likelihood import LEVEL
 from zwidth.identify.records.record import Piece, Record
 from zwidth.identify.records.sampling import SampleTimes, joined
+from zwidth.result import Documented, documented, entry
 
 FORCE, POSITION = "force", "position"
 FEWEST_LINES: Final = 8  # frequencies for a fit
@@ -201,36 +202,25 @@ def wall_states(words: NDArray[np.str_]) -> NDArray[np.str_]:
 
 
 @dataclass(frozen=True)
-class OctaveBand:
+class OctaveBand(Documented):
     """The real part of the impedance in one octave.
 
     low, high     of the octave [Hz];   lines  in it
     real          mean of Re Z at these [N s/m];   real_low, real_high  its interval (95 %), bias included
     """
 
-    low: float
-    high: float
-    lines: int
-    real: float
-    real_low: float
-    real_high: float
+    low: float = field(metadata=entry("Hz"))
+    high: float = field(metadata=entry("Hz"))
+    lines: int = field(metadata=entry())
+    real: float = field(metadata=entry("N s/m"))
+    real_low: float = field(metadata=entry("N s/m"))
+    real_high: float = field(metadata=entry("N s/m"))
 
     @property
+    @documented()
     def passive(self) -> bool | None:
         """Whether the handle takes energy there; None where the interval holds 0."""
         return True if self.real_low > 0.0 else False if self.real_high < 0.0 else None
-
-    def document(self) -> dict[str, float | int | bool | None]:
-        """The band by key and unit."""
-        return {
-            "low_Hz": self.low,
-            "high_Hz": self.high,
-            "lines": self.lines,
-            "real_Ns_per_m": self.real,
-            "real_low_Ns_per_m": self.real_low,
-            "real_high_Ns_per_m": self.real_high,
-            "passive": self.passive,
-        }
 
 
 def octave_bands(impedance: MeasuredImpedance) -> list[OctaveBand]:

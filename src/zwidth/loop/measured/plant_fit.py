@@ -8,9 +8,9 @@ plant, and its answers hold as far as the plant does: the fit says how far that 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from zwidth.loop.measured.pole_fit import (
 )
 from zwidth.model.plant import Plant
 from zwidth.model.response import Response
+from zwidth.result import Documented, entry
 
 POINTS: Final = 250  # frequencies to which a plant is fitted
 STEPS: Final = 300  # of the search
@@ -91,7 +92,7 @@ class ModalModel:
 
 
 @dataclass(frozen=True)
-class PlantFit:
+class PlantFit(Documented):
     """A plant that stands for a measured device.
 
     plant      in modal coordinates, its handle where the paths of the handle are known
@@ -101,23 +102,12 @@ class PlantFit:
     noise      root mean square of the measurement's own relative error; 0 where it is not known
     """
 
-    plant: Plant
-    delay: float
-    misfit: float
-    largest: float
-    largest_at: float
-    noise: float
-
-    def document(self) -> dict[str, Any]:
-        """The fit by key and unit."""
-        return {
-            "modes": self.plant.size,
-            "hardware_delay_s": self.delay,
-            "misfit": self.misfit,
-            "largest_misfit": self.largest,
-            "largest_misfit_at_Hz": self.largest_at,
-            "measurement_error": self.noise,
-        }
+    plant: Plant = field(metadata=entry(name="modes", value=lambda plant: plant.size))
+    delay: float = field(metadata=entry("s", name="hardware_delay"))
+    misfit: float = field(metadata=entry())
+    largest: float = field(metadata=entry(name="largest_misfit"))
+    largest_at: float = field(metadata=entry("Hz", name="largest_misfit_at"))
+    noise: float = field(metadata=entry(name="measurement_error"))
 
 
 def fit_plant(response: Response, period: float) -> PlantFit:

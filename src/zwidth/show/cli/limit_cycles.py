@@ -186,8 +186,6 @@ def _headings(prediction: LimitCyclePrediction) -> list[str]:
 
 
 def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
-    from zwidth.contact.wall_limit_cycles import cycle_speed
-
     for answer in prediction.answers:
         cycle = answer.cycle
         source = ["simulation" if answer.source == "simulation" else "prediction"]
@@ -195,7 +193,7 @@ def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
             amount(cycle.amplitude, "m"),
             amount(cycle.frequency_Hz, "Hz"),
             *(source if _says_source(prediction) else []),
-            amount(cycle_speed(cycle), "m/s"),
+            amount(cycle.speed, "m/s"),
             "" if isnan(cycle.force_amplitude) else amount(cycle.force_amplitude, "N"),
             _kind(cycle),
             _simulated_text(answer),

@@ -93,7 +93,7 @@ class SensitivityCommand(Command):
         return Found(found, numbers_for_goal(case.device, case.point, case["goal"], case.progress))
 
     def document(self, case: CommandLine, result: Found) -> dict[str, Any]:
-        goal = None if result.goal is None else result.goal.entries()
+        goal = None if result.goal is None else result.goal.document()["goal"]
         return result.sensitivities.document() | {"goal": goal}
 
     def table(self, case: CommandLine, result: Found, document: Mapping[str, Any]) -> Mapping[str, Sequence[Any]]:

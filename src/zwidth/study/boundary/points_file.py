@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 from math import isfinite, isnan, nan
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zwidth.device.text_file import LARGEST_TABLE, SEPARATORS, header_fault, non_blank_rows, read_text
 from zwidth.errors import FileError
 from zwidth.model.argument_checks import check_choice
+from zwidth.result import Documented, documented, entry
 
 if TYPE_CHECKING:
     from zwidth.chart.chart import StabilityChart
@@ -208,7 +209,7 @@ class UserPoint:
 
 
 @dataclass(frozen=True)
-class ComparedPoint:
+class ComparedPoint(Documented):
     """A measured point with the exact values that belong to it.
 
     exact          the damping of the nearest exact edge at its stiffness, of a tip the stiffness at its damping;
@@ -251,10 +252,10 @@ class ComparedPoint:
 
 
 @dataclass(frozen=True)
-class PointsComparison:
+class PointsComparison(Documented):
     """All points with their exact values, in the order in which they were given."""
 
-    points: tuple[ComparedPoint, ...]
+    points: tuple[ComparedPoint, ...] = field(metadata=entry(name="measured"))
 
     @property
     def edges(self) -> list[ComparedPoint]:
@@ -271,6 +272,7 @@ class PointsComparison:
         return [one for one in self.points if not one.point.edge and not one.point.verdict]
 
     @property
+    @documented(name="measured_counts")
     def counts(self) -> dict[str, int]:
         """How many points there are of each kind, and how many of them could be compared."""
         counts_by_key = {
@@ -285,10 +287,6 @@ class PointsComparison:
         counts_by_key["unnamed_points"] = len(self.unnamed)
         counts_by_key["unnamed_points_inside"] = sum(one.exact_verdict == "stable" for one in self.unnamed)
         return counts_by_key
-
-    def document(self) -> dict[str, Any]:
-        """The points and their counts by key and unit."""
-        return {"measured": [one.document() for one in self.points], "measured_counts": self.counts}
 
     def table(self) -> dict[str, list[Any]]:
         """The points as columns, one point a row."""

@@ -8,7 +8,7 @@ The front's designs looked at again: on a finer grid of the task, and in nonline
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -22,7 +22,7 @@ from zwidth.device.operator_choice import with_operator
 from zwidth.errors import DeviceError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note, WantedWall
-from zwidth.result import Result
+from zwidth.result import Documented, Result, entry
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.task import Task, task_of
@@ -267,7 +267,7 @@ class Optimisation(Result):
             if self.finer is None
             else [dict(zip(names, row, strict=True)) for row in self.finer.values.tolist()],
             "produced": None if self.bars is None else self._bars_document(self.bars, names),
-            "contacts": self._contacts_document(),
+            "contacts": [one.document() for one in self.contacts],
             "searched": self.searched,
             "polished": self.polished,
             "budget": self.problem.budget,
@@ -295,19 +295,6 @@ class Optimisation(Result):
                 "best": one.best,
             }
             for one in self.demands
-        ]
-
-    def _contacts_document(self) -> list[dict[str, Any]]:
-        """Return by key and unit the simulated wall of each design of the front."""
-        return [
-            {
-                "stiffness_N_per_m": one.stiffness,
-                "damping_Ns_per_m": one.damping,
-                "stable": one.stable,
-                "amplitude_m": one.amplitude,
-                "reason": one.reason or None,
-            }
-            for one in self.contacts
         ]
 
     def _bars_document(self, bars: Bars, names: list[str]) -> list[dict[str, Any]]:
@@ -438,7 +425,7 @@ SHARE: Final = 0.9  # of the largest stiffness: of the wall that is simulated
 
 
 @dataclass(frozen=True)
-class Contact:
+class Contact(Documented):
     """A wall of a design, simulated with all its nonlinear parts where the design is worst.
 
     stiffness, damping  of the wall [N/m], [N s/m]
@@ -447,11 +434,11 @@ class Contact:
     reason     why nothing was simulated; "" where it was
     """
 
-    stiffness: float = float("nan")
-    damping: float = float("nan")
-    stable: bool | None = None
-    amplitude: float = float("nan")
-    reason: str = ""
+    stiffness: float = field(default=float("nan"), metadata=entry("N/m"))
+    damping: float = field(default=float("nan"), metadata=entry("N s/m"))
+    stable: bool | None = field(default=None, metadata=entry())
+    amplitude: float = field(default=float("nan"), metadata=entry("m"))
+    reason: str = field(default="", metadata=entry(empty="null"))
 
 
 @dataclass(frozen=True)

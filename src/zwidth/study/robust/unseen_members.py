@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import nan
 from typing import Any, Final, TypeAlias
@@ -36,6 +36,7 @@ from zwidth.chart.verdict import BAND, spectral_radius
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
 from zwidth.progress import Progress
+from zwidth.result import Documented, entry
 from zwidth.study.robust.family import Family, FamilyMember, MeasuredFamily, MeasuredMember, build_together
 
 EDGE_WALLS: Final = 200  # walls along the edge that random members are tried on
@@ -47,7 +48,7 @@ STAGE: Final = "unseen members"
 
 
 @dataclass(frozen=True)
-class Violation:
+class Violation(Documented):
     """Random members, not used for the chart, tried on the robust walls.
 
     unseen                 number of members tried, without those that could not be built
@@ -59,23 +60,12 @@ class Violation:
     worst_member           that member's values: path -> value; {} if none violates
     """
 
-    unseen: int
-    violating: int
-    worst_spectral_radius: float
-    worst_stiffness_share: float
-    worst_member: dict[str, Any]
-    unknown: int = 0
-
-    def document(self) -> dict[str, Any]:
-        """The numbers by key."""
-        return {
-            "unseen": self.unseen,
-            "unknown": self.unknown,
-            "violating": self.violating,
-            "worst_spectral_radius": self.worst_spectral_radius,
-            "worst_stiffness_share": self.worst_stiffness_share,
-            "worst_member": self.worst_member or None,
-        }
+    unseen: int = field(metadata=entry())
+    violating: int = field(metadata=entry())
+    worst_spectral_radius: float = field(metadata=entry())
+    worst_stiffness_share: float = field(metadata=entry())
+    worst_member: dict[str, Any] = field(metadata=entry(empty="null"))
+    unknown: int = field(default=0, metadata=entry(before="violating"))
 
 
 def try_unseen_members(

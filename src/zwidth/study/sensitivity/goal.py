@@ -37,7 +37,7 @@ from zwidth.errors import ChartError, DeviceError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress
-from zwidth.result import Result
+from zwidth.result import Documented, Result, entry, keys_of
 from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping, build_at_point
 from zwidth.study.sensitivity.result import number_obstacle
 from zwidth.study.sensitivity.sensitivities import moved_places, property_numbers
@@ -266,11 +266,10 @@ REACHED: Final = "reached"
 OUT_OF_RANGE: Final = "out of range"
 NO_INFLUENCE: Final = "no influence"
 ORDER: Final = (REACHED, OUT_OF_RANGE, NO_INFLUENCE)
-COLUMNS: Final = ("path", "value_now", "unit", "value", "factor", "stiffness_max_N_per_m", "status", "reason")
 
 
 @dataclass(frozen=True)
-class GoalNumber:
+class GoalNumber(Documented):
     """What one number would have to be.
 
     path           of the number in the device file; an element of a symmetric matrix moves with its mirror image
@@ -284,14 +283,14 @@ class GoalNumber:
     reason         what keeps the goal from being reached; "" where it is
     """
 
-    path: str
-    now: float
-    unit: str
-    value: float
-    factor: float
-    stiffness_max: float
-    status: Status
-    reason: str = ""
+    path: str = field(metadata=entry())
+    now: float = field(metadata=entry(name="value_now"))
+    unit: str = field(metadata=entry(empty="null"))
+    value: float = field(metadata=entry())
+    factor: float = field(metadata=entry())
+    stiffness_max: float = field(metadata=entry("N/m"))
+    status: Status = field(metadata=entry())
+    reason: str = field(default="", metadata=entry(empty="null"))
 
     @property
     def distance(self) -> float:
@@ -308,43 +307,19 @@ class Goal(Result):
     numbers        those that reach it first, the smallest change before the others
     """
 
-    goal: float
-    stiffness_max: float
-    numbers: tuple[GoalNumber, ...]
+    goal: float = field(metadata=entry("N/m"))
+    stiffness_max: float = field(metadata=entry("N/m"))
+    numbers: tuple[GoalNumber, ...] = field(metadata=entry(name="goal"))
 
     @property
     def reached(self) -> tuple[GoalNumber, ...]:
         """The numbers with which alone the goal can be reached."""
         return tuple(one for one in self.numbers if one.status == REACHED)
 
-    def entries(self) -> list[dict[str, Any]]:
-        """Each number as a document."""
-        return [
-            {
-                "path": one.path,
-                "value_now": one.now,
-                "unit": one.unit or None,
-                "value": one.value,
-                "factor": one.factor,
-                "stiffness_max_N_per_m": one.stiffness_max,
-                "status": one.status,
-                "reason": one.reason or None,
-            }
-            for one in self.numbers
-        ]
-
-    def document(self) -> dict[str, Any]:
-        """The numbers by key and unit, with the goal and the largest stiffness as it is."""
-        return {
-            "goal_N_per_m": self.goal,
-            "stiffness_max_N_per_m": self.stiffness_max,
-            "goal": self.entries(),
-        }
-
     def table(self) -> dict[str, list[Any]]:
         """One number a row."""
-        rows = self.entries()
-        return {column: [row[column] for row in rows] for column in COLUMNS}
+        rows = [one.document() for one in self.numbers]
+        return {column: [row[column] for row in rows] for column in keys_of(GoalNumber)}
 
     def __repr__(self) -> str:
         first = ", ".join(f"{one.path} = {one.value:.4g}" for one in self.reached[:3])

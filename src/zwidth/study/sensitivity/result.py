@@ -5,14 +5,14 @@ Numbers of a device file as what a sensitivity is by: which have a derivative.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite, nan
 from typing import Any, Final
 
 from zwidth.chart.area import Peak
 from zwidth.device.faults import KeyPath
 from zwidth.device.schema import device_file as schema
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry
 from zwidth.study.sensitivity.optimum import Kind
 
 COLUMNS: Final = (
@@ -55,7 +55,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class Group:
+class Group(Documented):
     """Numbers scaled together: a whole list or matrix, or one key of all links (a * in its path).
 
     path         of the list, or with * for the names
@@ -63,9 +63,18 @@ class Group:
     logarithmic  d ln K_max / d ln of the common factor: the sum of the members'; nan where it is not known
     """
 
-    path: str
-    members: tuple[str, ...]
-    logarithmic: float
+    path: str = field(metadata=entry())
+    members: tuple[str, ...] = field(metadata=entry())
+    logarithmic: float = field(metadata=entry(name="d_ln_stiffness_max_d_ln_value"))
+
+
+def _peak_wall(peak: Peak | None) -> dict[str, float | None]:
+    stiffness, damping = (None, None) if peak is None else (peak.stiffness, peak.damping)
+    return {"stiffness_max_N_per_m": stiffness, "damping_at_stiffness_max_Ns_per_m": damping}
+
+
+def _reasons(left_out: dict[str, str]) -> list[dict[str, str]]:
+    return [{"path": path, "reason": reason} for path, reason in left_out.items()]
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,30 +90,16 @@ class Sensitivities(Result):
                  takes over as soon as a change makes it the stiffer one.
     """
 
-    peak: Peak | None
-    kind: Kind | None
+    peak: Peak | None = field(metadata=entry(value=_peak_wall, spread=True, before="second_peak"))
+    kind: Kind | None = field(metadata=entry(name="held_by", before="second_peak"))
     numbers: tuple[Sensitivity, ...]
-    groups: tuple[Group, ...]
-    left_out: dict[str, str]
-    second_peak: float
+    groups: tuple[Group, ...] = field(metadata=entry())
+    left_out: dict[str, str] = field(metadata=entry(value=_reasons))
+    second_peak: float = field(metadata=entry("N/m", name="rival_stiffness"))
 
     def document(self) -> dict[str, Any]:
         """The sensitivities by key and unit, with the wall they are about; None where there is none."""
-        peak = self.peak
-        groups = (
-            {"path": one.path, "members": one.members, "d_ln_stiffness_max_d_ln_value": one.logarithmic}
-            for one in self.groups
-        )
-        return {
-            "sensitivities": self._entries(),
-            "groups": list(groups),
-            "left_out": [{"path": path, "reason": reason} for path, reason in self.left_out.items()],
-            "stiffness_max_N_per_m": None if peak is None else peak.stiffness,
-            "damping_at_stiffness_max_Ns_per_m": None if peak is None else peak.damping,
-            "held_by": self.kind,
-            "rival_stiffness_N_per_m": self.second_peak,
-            "one_sided": self.tie,
-        }
+        return {"sensitivities": self._entries()} | super().document()
 
     def table(self) -> dict[str, list[Any]]:
         """The sensitivities as columns, one number a row."""
@@ -147,6 +142,7 @@ class Sensitivities(Result):
         return tuple(sorted(influential, key=lambda pair: -abs(pair[1])))
 
     @property
+    @documented(name="one_sided")
     def tie(self) -> bool:
         """Whether two walls are stiffest at once; each derivative then holds for `peak` alone."""
         return self.peak is not None and bool(self.second_peak >= (1.0 - TIE) * self.peak.stiffness)

@@ -23,16 +23,17 @@ from zwidth.chart.tracer import Tracer
 from zwidth.errors import ChartError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import FAILED, OK, UNDECIDED, Note
+from zwidth.result import Documented, entry
 from zwidth.study.designs.sweep_job import SweepJob
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
-from zwidth.study.tolerances.intervals import Interval
+from zwidth.study.tolerances.intervals import Interval, under
 
 Pieces = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
-class BandWall:
+class BandWall(Documented):
     """A wall of a band, tried on devices that had no part in finding it.
 
     stiffness, damping  [N/m], [N s/m]
@@ -40,14 +41,14 @@ class BandWall:
     unseen              number of these devices
     """
 
-    stiffness: float
-    damping: float
-    share: Interval | None = None
-    unseen: int = 0
+    stiffness: float = field(metadata=entry("N/m"))
+    damping: float = field(metadata=entry("N s/m"))
+    share: Interval | None = field(default=None, metadata=entry(value=under("unseen_stable_share"), spread=True))
+    unseen: int = field(default=0, metadata=entry(before="share"))
 
 
 @dataclass(frozen=True)
-class Band:
+class Band(Documented):
     """The walls K >= 0, B >= 0 that at least `members` of the drawn devices render stably.
 
     probability  least share of the devices, 0..1
@@ -61,39 +62,13 @@ class Band:
                  [N/m]; 0: none
     """
 
-    probability: float
-    members: int
-    dampings: Floats
-    pieces: tuple[Pieces, ...]
-    stiffest: BandWall | None
-    certain: BandWall | None
-    high: float
-
-    def document(self) -> dict[str, Any]:
-        """The band by key and unit."""
-        return {
-            "probability": self.probability,
-            "members": self.members,
-            "stiffest": _wall_document(self.stiffest),
-            "certain": _wall_document(self.certain),
-            "stiffness_max_high_N_per_m": self.high,
-            "damping_Ns_per_m": self.dampings.tolist(),
-            "stiffness_N_per_m": [[list(piece) for piece in pieces] for pieces in self.pieces],
-        }
-
-
-def _wall_document(wall: BandWall | None) -> dict[str, Any] | None:
-    if wall is None:
-        return None
-    share = wall.share
-    return {
-        "stiffness_N_per_m": wall.stiffness,
-        "damping_Ns_per_m": wall.damping,
-        "unseen": wall.unseen,
-        "unseen_stable_share": None if share is None else share.value,
-        "unseen_stable_share_low": None if share is None else share.low,
-        "unseen_stable_share_high": None if share is None else share.high,
-    }
+    probability: float = field(metadata=entry())
+    members: int = field(metadata=entry())
+    dampings: Floats = field(metadata=entry("N s/m", name="damping", lists=True))
+    pieces: tuple[Pieces, ...] = field(metadata=entry("N/m", name="stiffness"))
+    stiffest: BandWall | None = field(metadata=entry(before="dampings"))
+    certain: BandWall | None = field(metadata=entry(before="dampings"))
+    high: float = field(metadata=entry("N/m", name="stiffness_max_high", before="dampings"))
 
 
 class Coverage:

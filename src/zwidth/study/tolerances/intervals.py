@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import ceil, log, sqrt
 from typing import Final
 
@@ -10,18 +11,25 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.model.response import CONFIDENCE
+from zwidth.result import Documented, entry
 
 OUTSIDE: Final = 0.5 * (1.0 - CONFIDENCE)  # on either side of one
 SPAN: Final = 1.959963984540054  # standard deviations of a normal distribution within it
 
 
 @dataclass(frozen=True)
-class Interval:
+class Interval(Documented):
     """An estimate with the interval that holds the true value with 95 %."""
 
-    value: float
-    low: float
-    high: float
+    value: float = field(metadata=entry())
+    low: float = field(metadata=entry())
+    high: float = field(metadata=entry())
+
+
+def under(name: str) -> Callable[[Interval | None], dict[str, float | None]]:
+    """Function that spreads an interval in a document: NAME, NAME_low and NAME_high; None where there is none."""
+    keys = (name, f"{name}_low", f"{name}_high")
+    return lambda one: dict(zip(keys, (None,) * 3 if one is None else (one.value, one.low, one.high), strict=True))
 
 
 def share_interval(count: int, of: int, doubtful: int = 0) -> Interval:

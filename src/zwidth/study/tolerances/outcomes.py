@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from zwidth.arrays import Flags, Floats
 from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
 from zwidth.model.response import CONFIDENCE
+from zwidth.result import Documented, documented, entry
 from zwidth.study.designs.column import Column
 from zwidth.study.jobs.job import CellValues
-from zwidth.study.tolerances.intervals import Interval, quantile_interval
+from zwidth.study.tolerances.intervals import Interval, quantile_interval, under
 from zwidth.study.tolerances.question import WALL_IS_STABLE
 
 STABLE, UNSTABLE = "stable", "unstable"  # outcomes of the wanted wall; the others are a status in words
@@ -34,19 +35,19 @@ STIFFNESS: Final = "stiffness_max"
 
 
 @dataclass(frozen=True)
-class Quantile:
+class Quantile(Documented):
     """A quantile of a measure over the produced devices.
 
     share     0..1 of the devices that have less
     interval  the estimate and its bounds, in the measure's unit; infinite where there are too few devices
     """
 
-    share: float
-    interval: Interval
+    share: float = field(metadata=entry())
+    interval: Interval = field(metadata=entry(spread=True))
 
 
 @dataclass(frozen=True)
-class MeasureQuantiles:
+class MeasureQuantiles(Documented):
     """Quantiles of one measure over the drawn devices that have a value.
 
     name, unit  of the measure
@@ -54,27 +55,10 @@ class MeasureQuantiles:
     quantiles   () where none has one
     """
 
-    name: str
-    unit: str
-    devices: int
-    quantiles: tuple[Quantile, ...]
-
-    def document(self) -> dict[str, Any]:
-        """The quantiles by key."""
-        return {
-            "measure": self.name,
-            "unit": self.unit or None,
-            "devices": self.devices,
-            "quantiles": [
-                {
-                    "share": one.share,
-                    "value": one.interval.value,
-                    "low": one.interval.low,
-                    "high": one.interval.high,
-                }
-                for one in self.quantiles
-            ],
-        }
+    name: str = field(metadata=entry(name="measure"))
+    unit: str = field(metadata=entry(empty="null"))
+    devices: int = field(metadata=entry())
+    quantiles: tuple[Quantile, ...] = field(metadata=entry())
 
 
 def outcome_counts(columns: Sequence[Column], cells: CellValues) -> dict[str, int]:
@@ -181,7 +165,7 @@ RESAMPLES: Final = 500
 
 
 @dataclass(frozen=True)
-class Index:
+class Index(Documented):
     """The indices of one tolerance for one outcome.
 
     key    of the tolerance
@@ -189,37 +173,25 @@ class Index:
     total  of all orders
     """
 
-    key: str
-    first: Interval
-    total: Interval
+    key: str = field(metadata=entry())
+    first: Interval = field(metadata=entry(value=under("first"), spread=True))
+    total: Interval = field(metadata=entry(value=under("total"), spread=True))
 
     @property
+    @documented(name="first_differs_from_0", before="total")
     def first_is_certain(self) -> bool:
         """Whether the first order can be told from 0: its interval does not hold 0."""
         return self.first.low > 0.0
 
     @property
+    @documented(name="total_differs_from_0")
     def total_is_certain(self) -> bool:
         """Whether the total index can be told from 0."""
         return self.total.low > 0.0
 
-    def document(self) -> dict[str, Any]:
-        """The indices by key."""
-        return {
-            "key": self.key,
-            "first": self.first.value,
-            "first_low": self.first.low,
-            "first_high": self.first.high,
-            "first_differs_from_0": self.first_is_certain,
-            "total": self.total.value,
-            "total_low": self.total.low,
-            "total_high": self.total.high,
-            "total_differs_from_0": self.total_is_certain,
-        }
-
 
 @dataclass(frozen=True)
-class Indices:
+class Indices(Documented):
     """The indices of all tolerances for one outcome, or why there are none.
 
     name     of the outcome: a measure, `wall_is_stable`, `has_stable_wall`, or `has_value(MEASURE)`
@@ -228,19 +200,10 @@ class Indices:
     reason   why there are none; "" where there are
     """
 
-    name: str
-    of: str
-    indices: tuple[Index, ...]
-    reason: str = ""
-
-    def document(self) -> dict[str, Any]:
-        """The outcome and its indices by key."""
-        return {
-            "outcome": self.name,
-            "meaning": self.of,
-            "indices": [one.document() for one in self.indices],
-            "reason": self.reason or None,
-        }
+    name: str = field(metadata=entry(name="outcome"))
+    of: str = field(metadata=entry(name="meaning"))
+    indices: tuple[Index, ...] = field(metadata=entry())
+    reason: str = field(default="", metadata=entry(empty="null"))
 
 
 def sampled_shares(count: int, samples: int, seed: int) -> Floats:

@@ -6,7 +6,7 @@ Which tolerance to tighten first: the same devices once more, one tolerance afte
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +17,7 @@ from zwidth.chart.point_chart import chart_at
 from zwidth.device.faults import plural
 from zwidth.errors import ChartError
 from zwidth.measures.definition import NO_VALUE, OK, STATUS, UNDECIDED
-from zwidth.result import Result
+from zwidth.result import Documented, Result, documented, entry
 from zwidth.study.designs.sampling import Axis
 from zwidth.study.designs.study import Study
 from zwidth.study.designs.sweep import Sweep
@@ -25,7 +25,7 @@ from zwidth.study.designs.sweep_job import SweepJob
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.tolerances.band import Band
 from zwidth.study.tolerances.distribution import Tolerance
-from zwidth.study.tolerances.intervals import Interval, difference_interval, share_interval
+from zwidth.study.tolerances.intervals import Interval, difference_interval, share_interval, under
 from zwidth.study.tolerances.outcomes import (
     STABLE,
     STIFFNESS,
@@ -77,11 +77,11 @@ class ToleranceStudy(Result):
     question: ToleranceQuestion
     job: SweepJob
     cells: CellValues
-    indices: tuple[Indices, ...] = ()
-    bands: tuple[Band, ...] = ()
-    uncharted: int = 0
-    tightened: tuple[Tightened, ...] = ()
-    middle: str | None = None
+    indices: tuple[Indices, ...] = field(default=(), metadata=entry())
+    bands: tuple[Band, ...] = field(default=(), metadata=entry(before="indices"))
+    uncharted: int = field(default=0, metadata=entry(before="bands"))
+    tightened: tuple[Tightened, ...] = field(default=(), metadata=entry(name="narrower"))
+    middle: str | None = field(default=None, metadata=entry())
 
     def __repr__(self) -> str:
         question = self.question
@@ -101,11 +101,13 @@ class ToleranceStudy(Result):
         return "\n  ".join(lines)
 
     @cached_property
+    @documented(before="uncharted")
     def outcomes(self) -> dict[str, int]:
         """Outcome -> number of drawn devices."""
         return outcome_counts(self.question.columns, self.cells)
 
     @property
+    @documented(value=under("probability"), spread=True, before="uncharted")
     def probability(self) -> Interval | None:
         """Probability that a produced device renders the wanted wall stably; None where no wall is wanted.
 
@@ -127,12 +129,14 @@ class ToleranceStudy(Result):
         return {name: count for name, count in self.outcomes.items() if name not in ASKED}
 
     @property
+    @documented(before="uncharted")
     def without_stable_wall(self) -> int:
         """Number of drawn devices of which no wall with K > 0 and B >= 0 is stable."""
         column = [one.name for one in self.question.columns].index(STIFFNESS)
         return int((self.cells.status[:, column] == NO_VALUE).sum())
 
     @cached_property
+    @documented(before="uncharted")
     def quantiles(self) -> tuple[MeasureQuantiles, ...]:
         """Quantiles of every measure."""
         return tuple(measure_quantiles(self.question.columns, self.cells, self.question.quantiles))
@@ -157,6 +161,7 @@ class ToleranceStudy(Result):
         return f"no drawn device has an answer: {status}{f'; the first: {why}' if why else ''}"
 
     @property
+    @documented(name="notes")
     def reasons(self) -> list[str]:
         """Why devices have no value, each reason once: "failed: ..."."""
         texts = [
@@ -168,6 +173,7 @@ class ToleranceStudy(Result):
         return list(dict.fromkeys(texts))
 
     @property
+    @documented(name="tighten_first", value=lambda found: [one.key for one in found])
     def best_to_tighten(self) -> tuple[Tightened, ...]:
         """The tolerances of which half the width would gain most: several that cannot be told apart, or ().
 
@@ -184,6 +190,7 @@ class ToleranceStudy(Result):
         return self.middle in (STABLE, WITH_WALL)
 
     @property
+    @documented(name="tighten_first_reason")
     def no_advice(self) -> str | None:
         """Why no tolerance is named that is to be tightened first; None where one is."""
         if self.best_to_tighten:
@@ -200,7 +207,7 @@ class ToleranceStudy(Result):
 
     def document(self) -> dict[str, Any]:
         """Everything by key and unit."""
-        question, share = self.question, self.probability
+        question = self.question
         wall = question.study.wall
         return {
             "stiffness_N_per_m": wall.stiffness,
@@ -209,21 +216,7 @@ class ToleranceStudy(Result):
             "index_samples": question.index_samples,
             "seed": question.seed,
             "tolerances": [one.document() for one in question.tolerances],
-            "outcomes": self.outcomes,
-            "probability": None if share is None else share.value,
-            "probability_low": None if share is None else share.low,
-            "probability_high": None if share is None else share.high,
-            "without_stable_wall": self.without_stable_wall,
-            "quantiles": [one.document() for one in self.quantiles],
-            "uncharted": self.uncharted,
-            "bands": [one.document() for one in self.bands],
-            "indices": [one.document() for one in self.indices],
-            "narrower": [one.document() for one in self.tightened],
-            "middle": self.middle,
-            "tighten_first": [one.key for one in self.best_to_tighten],
-            "tighten_first_reason": self.no_advice,
-            "notes": self.reasons,
-        }
+        } | super().document()
 
     def table(self) -> Mapping[str, list[Any]]:
         """The drawn devices as columns, one device a row."""
@@ -242,8 +235,12 @@ class ToleranceStudy(Result):
 NARROWER: Final = 0.5  # width that a tolerance is tried with, of its own
 
 
+def _narrower(key: str) -> dict[str, Any]:
+    return {"key": key, "width": NARROWER}
+
+
 @dataclass(frozen=True)
-class Tightened:
+class Tightened(Documented):
     """What a tolerance of half the width would do to the share of devices that render the wanted wall stably.
 
     key    of the tolerance
@@ -252,35 +249,22 @@ class Tightened:
     rival  difference from the best of all narrower tolerances, 0 of the best itself; with it two are told apart
     """
 
-    key: str
-    share: Interval
-    gain: Interval
+    key: str = field(metadata=entry(value=_narrower, spread=True))
+    share: Interval = field(metadata=entry(value=under("probability"), spread=True))
+    gain: Interval = field(metadata=entry(value=under("gain"), spread=True))
     rival: Interval
 
     @property
+    @documented(name="gain_differs_from_0")
     def is_certain(self) -> bool:
         """Whether the gain can be told from 0."""
         return self.gain.low > 0.0 or self.gain.high < 0.0
 
     @property
+    @documented()
     def may_be_best(self) -> bool:
         """Whether it cannot be told from the best."""
         return self.rival.high >= 0.0
-
-    def document(self) -> dict[str, Any]:
-        """The narrower tolerance by key."""
-        return {
-            "key": self.key,
-            "width": NARROWER,
-            "probability": self.share.value,
-            "probability_low": self.share.low,
-            "probability_high": self.share.high,
-            "gain": self.gain.value,
-            "gain_low": self.gain.low,
-            "gain_high": self.gain.high,
-            "gain_differs_from_0": self.is_certain,
-            "may_be_best": self.may_be_best,
-        }
 
 
 def tightened_axes(tolerances: Sequence[Tolerance], values: Sequence[Floats]) -> list[Axis]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from zwidth.arrays import Floats, Ints
 from zwidth.device.device import Device
 from zwidth.measures.definition import NO_VALUE, OK, STATUS
-from zwidth.result import Result
+from zwidth.result import Documented, Result, entry
 from zwidth.study.jobs.job import Cells
 from zwidth.study.wall_tables.cell_walls import NONE, CellQuestion
 from zwidth.study.wall_tables.grid import CellGrid, Sectors
@@ -30,12 +30,12 @@ EVERYWHERE: Final = 0  # the table of all directions among those of a cell
 
 
 @dataclass(frozen=True)
-class Rectangle:
+class Rectangle(Documented):
     """Walls with a stiffness from 0 to `stiffness` [N/m] and a damping [N s/m] from `low` to `high`."""
 
-    stiffness: float
-    low: float
-    high: float
+    stiffness: float = field(metadata=entry("N/m", name="stiffness_max"))
+    low: float = field(metadata=entry("N s/m", name="damping_min"))
+    high: float = field(metadata=entry("N s/m", name="damping_max"))
 
 
 @dataclass(frozen=True, repr=False)
@@ -171,11 +171,7 @@ class SafeWalls(Result):
             "stiffness_max_N_per_m": K.reshape(shape),
             "damping_min_Ns_per_m": low.reshape(shape),
             "damping_max_Ns_per_m": high.reshape(shape),
-            "outside": {
-                "stiffness_max_N_per_m": self.outside.stiffness,
-                "damping_min_Ns_per_m": self.outside.low,
-                "damping_max_Ns_per_m": self.outside.high,
-            },
+            "outside": self.outside.document(),
             "notes": list(self.reasons),
         }
 
