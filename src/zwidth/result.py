@@ -79,8 +79,8 @@ def documented(unit: str = "", **how: Any) -> Callable[[Function], Function]:
 
 
 @cache
-def entries_of(kind: type) -> dict[str, Entry]:
-    """The entries of a dataclass by attribute, in the order of the document: those of its bases first."""
+def entries_of(kind: type) -> dict[str, tuple[str, Entry]]:
+    """Key and entry by attribute of a dataclass, in the order of the document: those of its bases first."""
     of_fields: dict[str, Mapping[Any, Any]] = {one.name: one.metadata for one in fields(kind)}
     found: dict[str, Entry] = {}
     for base in reversed(kind.__mro__):
@@ -94,12 +94,12 @@ def entries_of(kind: type) -> dict[str, Entry]:
     for name, one in found.items():
         if one.before:
             order.insert(order.index(one.before), name)
-    return {name: found[name] for name in order}
+    return {name: (found[name].key(name), found[name]) for name in order}
 
 
 def keys_of(kind: type) -> list[str]:
     """The keys themselves, of a document that leaves none out."""
-    return [declared.key(attribute) for attribute, declared in entries_of(kind).items()]
+    return [key for key, _ in entries_of(kind).values()]
 
 
 def finite(value: float) -> float | None:
@@ -114,15 +114,17 @@ class Documented:
         """Every number by its key, the unit in the name; parts by their own documents, tuples as lists."""
         entries: dict[str, Any] = {}
         kind: Any = type(self)  # a class is hashable, which mypy denies of a variable one
-        for attribute, declared in entries_of(kind).items():
+        for attribute, (key, declared) in entries_of(kind).items():
             value = getattr(self, attribute)
             value = declared.value(value) if declared.value else value
             if declared.empty != "kept" and (value is None or (hasattr(value, "__len__") and not len(value))):
                 if declared.empty == "left out":
                     continue
                 value = None
-            plain = _plain(value, declared.lists)
-            entries |= plain if declared.spread else {declared.key(attribute): plain}
+            if declared.spread:
+                entries |= _plain(value, declared.lists)
+            else:
+                entries[key] = _plain(value, declared.lists)
         return entries
 
 

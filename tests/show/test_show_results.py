@@ -184,6 +184,42 @@ def test_a_result_shows_itself_in_a_few_lines(all_results, name):
     assert "array(" not in text
 
 
+# Units of a few lines, and how keys end that have them.
+ENDINGS = {"N/m": "_N_per_m", "N s/m": "_Ns_per_m", "N^2 s/m^2": "_N2s_per_m2", "Hz": "_Hz", "kg": "_kg"}
+ENDINGS |= {"N": "_N", "m": "_m", "s": "_s", "1/s": "_per_s", "m^2": "_m2"}
+UNITS = "|".join(map(re.escape, ENDINGS))
+NUMBER = re.compile(rf"(?<![\w.])(-?\d[\d.]*(?:e[+-]?\d+)?) ({UNITS})(?![\w/^]| [sm]\b)")
+
+
+def numbers_by_key(value, key=""):
+    """Every number of a document or table with its key; one of a list, or by a name, with that of the whole."""
+    if isinstance(value, dict):
+        for name, own in value.items():
+            yield from numbers_by_key(own, name if name.endswith(tuple(ENDINGS.values())) else key or name)
+    elif isinstance(value, list):
+        for own in value:
+            yield from numbers_by_key(own, key)
+    elif isinstance(value, float):
+        yield key, abs(value)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_numbers_of_a_few_lines_are_those_of_the_document_in_the_same_unit(all_results, name):
+    result = all_results[name]
+    numbers = set(numbers_by_key(json_value([result.document(), dict(result.table())])))
+    for text, unit in NUMBER.findall(repr(result)):
+        own = [value for key, value in numbers if key.endswith(ENDINGS[unit])]
+        assert any(text.lstrip("-") in {f"{value:.{digits}g}" for digits in (4, 5, 6)} for value in own), text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_columns_are_the_lists_of_the_document(all_results, name):
+    document, table = all_results[name].document(), all_results[name].table()
+    for key in document.keys() & table.keys():
+        if isinstance(document[key], np.ndarray) and document[key].ndim == 1:
+            np.testing.assert_array_equal(table[key], document[key])
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_result_draws_itself_and_stands_in_a_notebook(all_results, name):
     result = all_results[name]

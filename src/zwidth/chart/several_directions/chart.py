@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from zwidth.chart.verdict import Verdicts, sides_of_circle, verdicts
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.model.argument_checks import check_kind
+from zwidth.result import documented, entry
 
 # How closely chords follow curves, in shares of the box: at first, and before corners are solved.
 COARSE, CLOSE = 1e-3, 1e-5
@@ -65,6 +66,17 @@ class _Cells:
     raster: Raster
 
 
+def _law(loop: MultiLoop) -> dict[str, Any]:
+    own = loop.matrices
+    if own is None:
+        return {}
+    return {"relative_stiffness": own.stiffness.tolist(), "relative_damping": own.damping.tolist()}
+
+
+def _undecided(doubt: str) -> str:
+    return f"this is undecided: {doubt}" if doubt else ""
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class MultiChart(DrawnChart):
     """The stable walls of several directions under one law.
@@ -83,11 +95,11 @@ class MultiChart(DrawnChart):
     complete    whether it is shown that no cell is missing
     """
 
-    loop: MultiLoop
-    judged: int
-    doubtful: Floats
-    off_circle: Floats
-    missed: Floats
+    loop: MultiLoop = field(metadata=entry(value=_law, spread=True))
+    judged: int = field(metadata=entry(name="walls_judged"))
+    doubtful: Floats = field(metadata=entry(name="walls_in_doubt", lists=True))
+    off_circle: Floats = field(metadata=entry(name="edge_walls_in_doubt", lists=True))
+    missed: Floats = field(metadata=entry(name="missed_edge_walls", lists=True))
     complete: bool
 
     @property
@@ -96,40 +108,19 @@ class MultiChart(DrawnChart):
         return "in doubt" if self.doubt else "confirmed"
 
     @property
+    @documented()
     def decided(self) -> bool:
         """Whether the chart is confirmed."""
         return not self.doubt
 
     @property
+    @documented(before="judged")
     def stiffness_max_is(self) -> str | None:
         """What the largest stiffness found is: "exact"; "at least", where cells may be missing; None where the
         regions themselves are in doubt."""
         if len(self.doubtful) or len(self.off_circle):
             return None
         return "exact" if self.complete and not len(self.missed) else "at least"
-
-    def document(self) -> dict[str, Any]:
-        """The chart under the keys of every chart, the law's matrices, and what was tried by eigenvalues."""
-        matrices = self.loop.matrices
-        law = (
-            {}
-            if matrices is None
-            else {
-                "relative_stiffness": matrices.stiffness.tolist(),
-                "relative_damping": matrices.damping.tolist(),
-            }
-        )
-        tried = {
-            "stiffness_max_is": self.stiffness_max_is,
-            "walls_judged": self.judged,
-            "walls_in_doubt": self.doubtful.tolist(),
-            "edge_walls_in_doubt": self.off_circle.tolist(),
-            "missed_edge_walls": self.missed.tolist(),
-            "cells_may_be_missing": self.cells_may_be_missing,
-            "decided": self.decided,
-        }
-        reason = {"reason": f"this is undecided: {self.doubt}"} if self.doubt else {}
-        return super().document() | law | tried | reason
 
     def _summary(self) -> str:
         return f"in doubt, {super()._summary()} found" if self.doubt else super()._summary()
@@ -141,11 +132,13 @@ class MultiChart(DrawnChart):
         return [f"in doubt           {self.doubt}", *(f"found: {line}" for line in numbers)]
 
     @property
+    @documented(before="decided")
     def cells_may_be_missing(self) -> bool:
         """Whether the stable set may have cells that the regions have not."""
         return not self.complete or bool(len(self.missed))
 
     @property
+    @documented(name="reason", value=_undecided, empty="left out")
     def doubt(self) -> str:
         """What is in doubt, in a sentence; "" where the chart is confirmed."""
         doubts = []

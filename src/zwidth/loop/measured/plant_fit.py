@@ -98,7 +98,7 @@ class PlantFit(Documented):
     plant      in modal coordinates, its handle where the paths of the handle are known
     delay      of the hardware [s]
     misfit     root mean square of the relative deviation of the fitted from the measured response
-    largest    the largest such deviation, at `largest_at` [Hz]
+    largest    the largest such deviation;   largest_at  its frequency [Hz]
     noise      root mean square of the measurement's own relative error; 0 where it is not known
     """
 
