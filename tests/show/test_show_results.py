@@ -185,8 +185,8 @@ def test_a_result_shows_itself_in_a_few_lines(all_results, name):
 
 
 # Units of a few lines, and how keys end that have them.
-ENDINGS = {"N/m": "_N_per_m", "N s/m": "_Ns_per_m", "N^2 s/m^2": "_N2s_per_m2", "Hz": "_Hz", "kg": "_kg"}
-ENDINGS |= {"N": "_N", "m": "_m", "s": "_s", "1/s": "_per_s", "m^2": "_m2"}
+ENDINGS = {"N/m": "_N_per_m", "N s/m": "_Ns_per_m", "N² s/m²": "_N2s_per_m2", "Hz": "_Hz", "kg": "_kg"}
+ENDINGS |= {"N": "_N", "m": "_m", "s": "_s", "1/s": "_per_s", "m²": "_m2"}
 UNITS = "|".join(map(re.escape, ENDINGS))
 NUMBER = re.compile(rf"(?<![\w.])(-?\d[\d.]*(?:e[+-]?\d+)?) ({UNITS})(?![\w/^]| [sm]\b)")
 

@@ -109,7 +109,7 @@ class MeasuredChart(DrawnChart):
     }
 
     @property
-    @documented(before="interpolation_error")
+    @documented(before="measured_stiffness_max")
     def integrators(self) -> int:
         """Poles of the response at z = 1."""
         return self.loop.integrators
@@ -120,7 +120,7 @@ class MeasuredChart(DrawnChart):
         return doubt_along(self.loop, self.edge, self.window)
 
     @property
-    @documented(empty="null", before="interpolation_error")
+    @documented(empty="null", before="measured_stiffness_max")
     def measurement(self) -> str:
         """The note of whoever measured the response; "" where there is none."""
         return self.loop.response.note

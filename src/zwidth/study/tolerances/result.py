@@ -173,7 +173,7 @@ class ToleranceStudy(Result):
         return list(dict.fromkeys(texts))
 
     @property
-    @documented(name="tighten_first", value=lambda found: [one.key for one in found])
+    @documented(name="tighten_first", value=lambda found: [one.key for one in found], before="reasons")
     def best_to_tighten(self) -> tuple[Tightened, ...]:
         """The tolerances of which half the width would gain most: several that cannot be told apart, or ().
 
@@ -190,7 +190,7 @@ class ToleranceStudy(Result):
         return self.middle in (STABLE, WITH_WALL)
 
     @property
-    @documented(name="tighten_first_reason")
+    @documented(name="tighten_first_reason", before="reasons")
     def no_advice(self) -> str | None:
         """Why no tolerance is named that is to be tightened first; None where one is."""
         if self.best_to_tighten:
