@@ -24,12 +24,14 @@ DEVICES = sorted(path.stem for path in (PACKAGE / "device" / "zoo").glob("*.toml
 FLOW = ("model", "loop", "chart", "conditions", "guarantees", "contact", "measures", "identify", "study", "show")
 # Device files become models and loops; what computes knows nothing of files.
 EVERYWHERE = {
+    "argument",
     "arrays",
     "compiled",
     "compile_events",
     "errors",
     "processors",
     "progress",
+    "questions",
     "machine_code",
     "memory_limit",
     "result",
@@ -40,7 +42,8 @@ EVERYWHERE = {
 }
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
-MAY_IMPORT["memory_limit"] = MAY_IMPORT["processors"] = {"errors"}
+MAY_IMPORT["argument"] = MAY_IMPORT["memory_limit"] = MAY_IMPORT["processors"] = {"errors"}
+MAY_IMPORT["questions"] = {"argument"}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}
 MAY_IMPORT["identify"].add("device")

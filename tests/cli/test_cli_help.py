@@ -11,8 +11,8 @@ import pytest
 from tests.cli.command_runner import run_command
 from zwidth import __version__
 from zwidth.model import MODELS as MODEL_NAMES
+from zwidth.questions import DEVICE
 from zwidth.show import zwidth as group
-from zwidth.show.cli.options import MODELS
 
 COMMANDS = sorted(group.commands)
 
@@ -86,4 +86,4 @@ def test_the_version():
 
 
 def test_the_models_offered_are_the_models_there_are():
-    assert MODELS == MODEL_NAMES
+    assert DEVICE["model"].choices == MODEL_NAMES

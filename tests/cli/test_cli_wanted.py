@@ -8,7 +8,8 @@ import pytest
 import zwidth
 from tests.cli.command_runner import MECHANISM, document_of, refusal_lines, run_command
 from zwidth.measures import WantedWall
-from zwidth.measures.definition import WANTED_NUMBERS, WantedWalls
+from zwidth.measures.definition import WantedWalls
+from zwidth.questions import WANTED
 from zwidth.study import StudyFile
 
 FEW = ("--cells", "3,2", "--x", "-0.05,0.05", "--y", "0.2,0.25")
@@ -58,9 +59,9 @@ def test_only_the_named_links_are_checked_in_a_map():
         (("stiffness_max_decaying",), "that the wall must not exceed; give --spectral-radius"),
         (("stiffness_max_with_margins",), "give --stiffness-margin and --damping-margin and --delay-margin"),
         (("link_clearance",), "needs the radius of the links; give --link-radius"),
-        (("stiffness_max_decaying", "--spectral-radius", "1.5"), "must be above 0 and at most 1, got 1.5"),
-        (("stiffness_max_with_margins", "--delay-margin", "-1"), "--delay-margin: must be at least 0 and at most"),
-        (("impedance_ratio", "--lowest-frequency", "0"), "--lowest-frequency: must be above 0, got 0"),
+        (("stiffness_max_decaying", "--spectral-radius", "1.5"), "above 0 and at most 1, got 1.5"),
+        (("stiffness_max_with_margins", "--delay-margin", "-1"), "at least 0 and at most 20 [samples], got -1"),
+        (("impedance_ratio", "--lowest-frequency", "0"), "must be a finite number, above 0 [Hz], got 0"),
         (("link_clearance", "--link-radius", "0", "--colliding-links", "a:b"), "has no link 'a' to check"),
         (("motor_heat", "--force", "1"), "needs a finite winding_resistance_ohm of every drive; give mechanism."),
     ],
@@ -73,7 +74,7 @@ def test_what_is_missing_or_impossible_is_one_line(words, said):
 def test_every_number_is_a_key_of_study_files_a_field_and_an_option():
     text = run_command("map", "--help").out
     fields = StudyFile.model_fields
-    for one in WANTED_NUMBERS:
+    for one in WANTED.values():
         assert one.key in fields
         assert hasattr(WantedWall(), one.name)
         assert hasattr(WantedWalls(), one.name)

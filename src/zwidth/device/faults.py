@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -14,6 +15,10 @@ KeyPath = tuple[str | int, ...]
 KeyMessages = Iterator[tuple[KeyPath, str]]
 
 LONGEST_QUOTE: Final = 60
+MISSPELT: Final = 0.85  # likeness from which a word is another one misspelt
+NOT_CONTAINED: Final = 3  # rank of a word that neither begins nor ends with the one typed
+# What a key that ends in a unit has behind its name, in small letters.
+UNIT_ENDING: Final = re.compile(r"(?:_(?:per|kg|[mnswavj]|m2|nm|ns|nms|hz|rad|ohm|rev|deg|samples|percent))+")
 
 
 SETTINGS: Final = "settings"  # what stands for a file in messages about settings
@@ -66,13 +71,25 @@ def quote(value: Any) -> str:
 
 
 def nearest(word: str, allowed: Collection[str]) -> str | None:
-    """The allowed word that looks most like this one, None if none does; case and -/_ do not count.
+    """The allowed word that is most likely meant by this one, None if none is; case and -/_ do not count.
 
-    A word that the right one begins with counts as near: "mass" for "mass_kg".
+    First one that is hardly misspelt, then this one with a unit, one that ends with it, one that begins with it,
+    and last the one that looks most like it.
+
+    >>> nearest("damping", ["damping_Ns_per_m", "spring"]), nearest("ratio", ["ratio_table", "transmission_ratio"])
+    ('damping_Ns_per_m', 'transmission_ratio')
     """
-    plain = {_plain(candidate): candidate for candidate in allowed}
-    close = get_close_matches(_plain(word), plain, n=1, cutoff=0.6)
-    close = close or [p for p in plain if len(_plain(word)) > 2 and p.startswith(_plain(word) + "_")][:1]
+    plain, typed = {_plain(candidate): candidate for candidate in allowed}, _plain(word)
+
+    def rank(candidate: str) -> tuple[int, int]:
+        if candidate.startswith(typed + "_"):
+            return 0 if UNIT_ENDING.fullmatch(candidate, len(typed)) else 2, len(candidate)
+        return 1 if candidate.endswith("_" + typed) else NOT_CONTAINED, len(candidate)
+
+    close = get_close_matches(typed, plain, n=1, cutoff=MISSPELT)
+    if not close and len(typed) > 2:
+        close = [one for one in sorted(plain, key=rank)[:1] if rank(one)[0] < NOT_CONTAINED]
+    close = close or get_close_matches(typed, plain, n=1, cutoff=0.6)
     return plain[close[0]] if close else None
 
 

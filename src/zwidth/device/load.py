@@ -155,8 +155,9 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
     check_not_newer(document, label)
     if STUDY_KEYS & document.keys() and not DEVICE_KEYS & document.keys():
         named = f", {document['device']}" if isinstance(document.get("device"), str) else ""
+        command = "tolerance" if "tolerance" in document and "axis" not in document else "sweep"
         raise fail(
-            label, "", f"is a study of designs, not a device; sweep it, or give the device that it names{named}"
+            label, "", f"is a study file; use zwidth {command} {label}, or give the device that it names{named}"
         )
     cleaned, faults = without_unsupported(document)
     checked: DeviceFile | None = None

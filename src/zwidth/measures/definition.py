@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
-from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from zwidth.result import Result
@@ -23,75 +22,6 @@ if TYPE_CHECKING:
 
     from zwidth.arrays import Floats
     from zwidth.loop.operating_point import OperatingPoint
-
-
-@dataclass(frozen=True)
-class WantedNumber:
-    """A number that some measures need.
-
-    name      argument in Python and field of `WantedWall`
-    key       in a study file
-    unit      "" for none
-    meaning   what it is
-    least, most  limits of its value
-    open_end  whether the least value itself is not allowed
-    """
-
-    name: str
-    key: str
-    unit: str
-    meaning: str
-    least: float = 0.0
-    most: float = float("inf")
-    open_end: bool = False
-
-    @property
-    def checked(self) -> bool:
-        """Whether measures refuse a value outside; walls of either sign have spectral radii, too."""
-        return self.name not in ("stiffness", "damping")
-
-    @property
-    def allowed(self) -> str:
-        """The allowed values in words.
-
-        >>> WANTED_BY_NAME["frequency"].allowed, WANTED_BY_NAME["spectral_radius"].allowed
-        ('above 0', 'above 0 and at most 1')
-        """
-        low = f"above {self.least:g}" if self.open_end else f"at least {self.least:g}"
-        return f"{low} and at most {self.most:g}" if isfinite(self.most) else low
-
-    def allows(self, value: float) -> bool:
-        """Whether a value is finite and within the limits."""
-        above = self.least < value if self.open_end else self.least <= value
-        return isfinite(value) and above and value <= self.most
-
-
-WANTED_NUMBERS: Final = (
-    WantedNumber("stiffness", "stiffness_N_per_m", "N/m", "of the wanted wall"),
-    WantedNumber("damping", "damping_Ns_per_m", "N s/m", "of the wanted wall"),
-    WantedNumber("frequency", "frequency_Hz", "Hz", "at which the hand moves", open_end=True),
-    WantedNumber(
-        "spectral_radius",
-        "spectral_radius",
-        "",
-        "that the wall must not exceed: vibration shrinks at least by it per sample",
-        most=1.0,
-        open_end=True,
-    ),
-    WantedNumber("stiffness_margin", "stiffness_margin", "", "share by which the wall's stiffness may be off"),
-    WantedNumber("damping_margin", "damping_margin", "", "share by which the wall's damping may be off"),
-    WantedNumber("delay_margin", "delay_margin_samples", "samples", "by which the delay may be longer", most=20.0),
-    WantedNumber(
-        "lowest_frequency", "lowest_frequency_Hz", "Hz", "lower end of the band of motion", open_end=True
-    ),
-    WantedNumber(
-        "highest_frequency", "highest_frequency_Hz", "Hz", "upper end of the band of motion", open_end=True
-    ),
-    WantedNumber("force", "force_N", "N", "to be held along the rendered direction"),
-    WantedNumber("link_radius", "link_radius_m", "m", "of the links, taken for rods with round ends"),
-)
-WANTED_BY_NAME: Final = {one.name: one for one in WANTED_NUMBERS}
-WANTED_BY_KEY: Final = {one.key: one for one in WANTED_NUMBERS}
 
 
 @dataclass(frozen=True)

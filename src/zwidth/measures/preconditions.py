@@ -11,9 +11,10 @@ from zwidth.conditions.assumptions import COLLOCATED, PLAIN, WALL_ALONE, Conditi
 from zwidth.errors import HandleError, MeasureError, ModelError, NonlinearError
 from zwidth.loop.loop import Loop, with_inertia_of
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.measures.definition import WANTED_BY_NAME, WantedWall, WantedWalls
+from zwidth.measures.definition import WantedWall, WantedWalls
 from zwidth.measures.handle_impedance import handle_of
 from zwidth.model.plant import Plant
+from zwidth.questions import WANTED
 from zwidth.unit_text import unit_text
 
 # One mass in place of a mechanism, where only the computer matters.
@@ -46,9 +47,9 @@ def numbers_of(
     if any(value is None for value in values):
         raise MeasureError(f"needs {what}", [(name, None) for name in names])
     for name, value in zip(names, values, strict=True):
-        number = WANTED_BY_NAME[name]
+        number = WANTED[name]
         wrong = [float(one) for one in np.ravel(value) if not number.allows(one)]
-        if wrong and number.checked:
+        if wrong and name not in ("stiffness", "damping"):  # walls of either sign have spectral radii, too
             unit = f" {unit_text(number.unit)}" if number.unit else ""
             raise MeasureError(f"needs {name} {number.allowed}{unit}, got {wrong[0]:g}{unit}")
     return tuple(np.array(np.broadcast_to(value, shape), dtype=np.float64) for value in values)

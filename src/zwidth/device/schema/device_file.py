@@ -31,7 +31,7 @@ from zwidth.unit_text import unit_text
 KINDS: Final = ("mechanism", "plant", "response")  # by one of which a device is given
 # Tables that only device files have, and keys that only studies have: they tell which of the two a file is.
 DEVICE_KEYS: Final = frozenset({*KINDS, "loop"})
-STUDY_KEYS: Final = frozenset({"measures", "axis", "tolerance"})
+STUDY_KEYS: Final = frozenset({"device", "measures", "axis", "tolerance", "optimise"})
 TAGS: Final = ("type", "method", "shape")  # of a filter, of a velocity's estimate, of a cross section
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
+from zwidth.questions import BOUNDS
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.options import Finite
+from zwidth.show.cli.options import options_of
 from zwidth.show.units import amount, number, typed
 
 if TYPE_CHECKING:
@@ -43,15 +42,7 @@ class BoundsCommand(Command):
         "zwidth bounds my-device.toml",
         "zwidth bounds my-device.toml --damping 2 --output bounds.csv",
     )
-    options = (
-        click.option(
-            "--damping",
-            metavar="B",
-            type=Finite(),
-            help="Damping at which the conditions are compared [N s/m]. Default: that of the stiffest stable "
-            "wall; 0 if there is none.",
-        ),
-    )
+    options = options_of(BOUNDS)
     keys = (
         "bounds",
         "damping_Ns_per_m",

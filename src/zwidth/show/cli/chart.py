@@ -6,13 +6,12 @@ from collections.abc import Iterator, Mapping
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from zwidth.loop.motion_names import listed_names
+from zwidth.questions import CHART
 from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.options import Numbers
+from zwidth.show.cli.options import Ranges, options_of
 from zwidth.show.units import amount, percent, radius, typed
 
 if TYPE_CHECKING:
@@ -41,14 +40,6 @@ NO_CERTAIN_WALL: Final = (
     "that they may be of; record longer, with more force, or repeat the sweep"
 )
 
-Window = tuple[float, float, float, float]
-
-
-def _check_window(ctx: click.Context, param: click.Parameter, window: Window | None) -> Window | None:
-    if window and not (window[0] < window[1] and window[2] < window[3]):
-        raise click.BadParameter("needs KMIN < KMAX and BMIN < BMAX, such as 0,8000,0,30")
-    return window
-
 
 class ChartCommand(Command):
     """Find the walls that DEVICE renders stably: the exact chart of stiffness and damping."""
@@ -60,15 +51,7 @@ class ChartCommand(Command):
         "zwidth chart my-device.toml --set loop.delay_samples=1 --output chart.svg",
         "zwidth chart my-device.toml --direction 0,1 --with-direction 1,0 --relative-stiffness 1,0.2",
     )
-    options = (
-        click.option(
-            "--window",
-            type=Numbers("KMIN,KMAX,BMIN,BMAX", (4,), "0,8000,0,30"),
-            callback=_check_window,
-            help="Part of the chart that a figure shows; results are never clipped.",
-        ),
-        *wall_law.OPTIONS,
-    )
+    options = options_of(CHART, window=Ranges(CHART["window"]), **wall_law.KINDS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the boundary, .json)."
     keys = (
         "regions",

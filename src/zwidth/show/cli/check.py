@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.questions import CHECK
 from zwidth.show.cli import wall_law
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.options import Finite, check_not_empty
+from zwidth.show.cli.options import options_of
 from zwidth.show.output import DATA
 from zwidth.show.units import NONE, amount, radius
 from zwidth.study.boundary.points_file import Walls, read_walls
@@ -30,17 +31,7 @@ class CheckCommand(Command):
         "zwidth check my-device.toml --stiffness 4000 --damping 10",
         "zwidth check my-device.toml --points walls.csv --json",
     )
-    options = (
-        click.option(
-            "--points",
-            metavar="FILE.csv",
-            callback=check_not_empty,
-            help="Walls: columns stiffness_N_per_m, damping_Ns_per_m.",
-        ),
-        click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of one wall [N/m]."),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of one wall [N s/m]."),
-        *wall_law.OPTIONS,
-    )
+    options = options_of(CHECK, **wall_law.KINDS)
     outputs = DATA
     output_help = "Write the verdicts (.csv .json)."
     keys = ("points",)

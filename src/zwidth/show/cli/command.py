@@ -20,8 +20,9 @@ from zwidth.errors import NoAnswerError
 from zwidth.show.cli.answer import Answer, deliver, heading
 from zwidth.show.cli.errors import translate_errors
 from zwidth.show.cli.first_use import announce_compiling
-from zwidth.show.cli.options import Question, about_a_device, as_json, example, output_option
+from zwidth.show.cli.options import Question, about_a_device, as_json, decorated, example, output_option
 from zwidth.show.cli.progress import show_progress
+from zwidth.show.cli.sections import SectionedCommand
 from zwidth.show.output import DATA, FIGURES, destination, printable, write_data
 from zwidth.show.units import amount, keys_of_moments, percent, speaking_of_moments, typed
 
@@ -323,10 +324,8 @@ class Command:
             return self.run(*arguments, **options)
 
         run.__doc__ = self.__doc__
-        command: Any = run
-        for decorate in reversed(decorators):
-            command = decorate(command)
-        return click.command(self.name, short_help=self.summary, epilog=self.epilog())(command)
+        made = click.command(self.name, cls=SectionedCommand, short_help=self.summary, epilog=self.epilog())
+        return made(decorated(run, decorators))
 
 
 def _fit_sentence(fit: Mapping[str, Any]) -> str:

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from math import inf, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
+from zwidth.questions import EXPERIMENT
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Numbers, check_not_empty
+from zwidth.show.cli.options import Ranges, options_of
 from zwidth.show.cli.progress import say
 from zwidth.show.units import amount
 from zwidth.study.boundary.points_file import read_points
@@ -24,29 +24,6 @@ from zwidth.study.boundary.points_file import read_points
 if TYPE_CHECKING:
     from zwidth.study.boundary.measured_boundary import Cause, Experiment, MeasuredPoint, Plan
     from zwidth.study.boundary.points_file import ComparedPoint, PointsComparison
-
-
-MOST: Final = 1000
-# options that are numbers of the plan, under its own names
-PLAN_OPTIONS: Final = (
-    "stiffnesses",
-    "tips",
-    "disturbance",
-    "visible",
-    "push",
-    "speed",
-    "reflex",
-    "subjects",
-    "trials",
-    "spread",
-    "seed",
-)
-
-
-def _check_range(ctx: click.Context, param: click.Parameter, span: tuple[float, float] | None) -> Any:
-    if span and not span[0] < span[1]:
-        raise click.BadParameter(f"needs LOW < HIGH, such as 0,8000; got {span[0]:g},{span[1]:g}")
-    return span
 
 
 class ExperimentCommand(Command):
@@ -60,112 +37,7 @@ class ExperimentCommand(Command):
         "zwidth experiment my-device.toml --operator thesis-arm --wall one-sided --subjects 2 --trials 4",
         "zwidth experiment my-device.toml --measured bench.csv --output compared.png",
     )
-    options = (
-        click.option(
-            "--wall",
-            type=click.Choice(("two-sided", "one-sided")),
-            default="two-sided",
-            help="Default: two-sided.",
-        ),
-        click.option(
-            "--stiffnesses",
-            type=click.IntRange(1, MOST),
-            default=16,
-            metavar="N",
-            help="Number of stiffnesses at which the damping is bisected (default 16).",
-        ),
-        click.option(
-            "--tips",
-            type=click.IntRange(0, MOST),
-            default=8,
-            metavar="N",
-            help="Number of dampings, near the tip, at which the stiffness is bisected (default 8).",
-        ),
-        click.option(
-            "--stiffness",
-            type=Numbers("KMIN,KMAX", (2,), "0,8000"),
-            callback=_check_range,
-            help="Range of stiffness to search [N/m].",
-        ),
-        click.option(
-            "--damping",
-            type=Numbers("BMIN,BMAX", (2,), "0,30"),
-            callback=_check_range,
-            help="Range of damping to search [N s/m].",
-        ),
-        click.option(
-            "--disturbance",
-            type=float,
-            metavar="M",
-            help="Displacement at the start, for a two-sided wall [m] (default 0.001; at most 1).",
-        ),
-        click.option(
-            "--visible",
-            type=float,
-            metavar="M",
-            help="Largest amplitude of a lasting vibration that counts as none [m] (default: three encoder steps "
-            "and ten standard deviations of the noise).",
-        ),
-        click.option(
-            "--push",
-            type=float,
-            metavar="N",
-            help="Constant force of the hand [N] (default: 2 against a one-sided wall, else 0).",
-        ),
-        click.option(
-            "--speed",
-            type=float,
-            metavar="V",
-            help="Velocity at the start [m/s] (default: 0.02 towards a one-sided wall, else 0; at most 100).",
-        ),
-        click.option(
-            "--reflex",
-            is_flag=True,
-            help="The hand stiffens threefold, 50 ms after the wall has half of the push.",
-        ),
-        click.option(
-            "--subjects",
-            type=click.IntRange(1, MOST),
-            default=1,
-            metavar="N",
-            help="Number of operators (default 1).",
-        ),
-        click.option(
-            "--trials",
-            type=click.IntRange(1, MOST),
-            default=1,
-            metavar="N",
-            help="Number of trials with each operator (default 1).",
-        ),
-        click.option(
-            "--spread",
-            type=click.FloatRange(0.0, 2.0),
-            default=0.2,
-            metavar="S",
-            help="Spread of operators and trials: standard deviation of the logarithm (default 0.2).",
-        ),
-        click.option(
-            "--seed",
-            type=click.IntRange(min=0),
-            default=1,
-            metavar="N",
-            help="Seed of the random numbers (default 1).",
-        ),
-        click.option(
-            "--measured",
-            metavar="FILE.csv",
-            callback=check_not_empty,
-            help="Your own points, with columns stiffness_N_per_m, damping_Ns_per_m, and edge (lower, upper, tip) "
-            "or verdict (stable, unstable); optional: damping_low_Ns_per_m, "
-            "damping_high_Ns_per_m, stiffness_low_N_per_m, stiffness_high_N_per_m, trials.",
-        ),
-        click.option(
-            "--resume",
-            metavar="FILE",
-            callback=check_not_empty,
-            help="Save finished work here; the same command continues from it.",
-        ),
-    )
+    options = options_of(EXPERIMENT, **{name: Ranges(EXPERIMENT[name]) for name in ("stiffness", "damping")})
     output_help = "Write a figure (.png .svg .pdf) or the points (.csv .json)."
     keys = (
         "points",
@@ -214,7 +86,7 @@ class ExperimentCommand(Command):
     ) -> str | None:
         reason = super().write(case, result, document, reason)
         file = _journal(case)
-        if case["resume"] is None and file is not None:
+        if case["file"] is None and file is not None:
             file.unlink(missing_ok=True)  # now that what it kept is written
         return reason
 
@@ -240,7 +112,10 @@ def _plan(case: CommandLine) -> Plan:
         raise BadInput(
             "--disturbance: applies to a two-sided wall; against a one-sided wall use --push and --speed"
         )
-    given = {name: case[name] for name in PLAN_OPTIONS if case[name] is not None}
+    numbers = [
+        one.name for one in fields(Plan) if one.name in EXPERIMENT
+    ]  # the options that are numbers of the plan
+    given = {name: case[name] for name in numbers if case[name] is not None}
     box = None if stiffness is None else SearchWindow(stiffness, damping)
     try:
         return Plan.touching(box=box, **given) if one_sided else Plan(box=box, **given)
@@ -250,8 +125,8 @@ def _plan(case: CommandLine) -> Plan:
 
 def _journal(case: CommandLine) -> Path | None:
     """The file that keeps what is done: --resume, or one beside --output; None: nothing is kept."""
-    if case["resume"] is not None:
-        return Path(case["resume"])
+    if case["file"] is not None:
+        return Path(case["file"])
     return None if case.path is None else case.path.with_name(case.path.name + ".progress")
 
 

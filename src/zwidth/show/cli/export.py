@@ -7,15 +7,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from zwidth.errors import NoAnswerError
+from zwidth.questions import EXPORT
 from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Numbers, ParamType, Question, about_every_posture, check_not_empty
-from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
+from zwidth.show.cli.options import Question, about_every_posture, options_of
+from zwidth.show.cli.resumable import RESUME, WORKER_OPTIONS, check_workers, open_store, report_kept_work
 from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import amount
 
@@ -26,35 +25,6 @@ if TYPE_CHECKING:
 
 HEADER: Final = ".h"
 ARRAY: Final = ".nc"
-
-
-class CountsType(ParamType):
-    """Two or three whole numbers."""
-
-    name = "counts"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return "NX,NY[,NZ]"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, tuple):
-            return value
-        try:
-            counts = tuple(int(part) for part in value.split(","))
-        except ValueError:
-            counts = ()
-        if len(counts) not in (2, 3):
-            self.fail(f"must be two or three whole numbers such as 20,10, got {value!r}", param, ctx)
-        return counts
-
-
-def _axis_range(name: str) -> Any:
-    return click.option(
-        f"--{name}",
-        f"{name}_range",
-        type=Numbers("LOW,HIGH", (2,), "-0.1,0.1"),
-        help=f"Range of the table along {name} [m]. Default: the workspace of DEVICE, or the reachable range.",
-    )
 
 
 class ExportCommand(Command):
@@ -71,71 +41,7 @@ class ExportCommand(Command):
         "zwidth export my-device.toml --hands none,thesis-arm --cells 20,10 --output safe_walls.h",
         "zwidth export my-device.toml --directions 4 --levels 8 --arduino my-wall --output safe.json",
     )
-    options = (
-        _axis_range("x"),
-        _axis_range("y"),
-        _axis_range("z"),
-        click.option(
-            "--cells",
-            type=CountsType(),
-            help="Number of cells along each axis. Default: 20 along the longer side of a plane, 6 in space.",
-        ),
-        click.option(
-            "--hands",
-            metavar="A,B,C",
-            callback=check_not_empty,
-            help="Operators that may hold the handle: bundled ones, files, none. Default: that of DEVICE.",
-        ),
-        click.option(
-            "--margin",
-            type=float,
-            default=0.0,
-            metavar="SHARE",
-            help="Share by which stiffness and damping may both be off (default 0).",
-        ),
-        click.option(
-            "--levels",
-            type=int,
-            default=12,
-            metavar="N",
-            help="Number of bands of stiffness in each cell (default 12).",
-        ),
-        click.option(
-            "--directions",
-            type=int,
-            default=1,
-            metavar="N",
-            help="Further tables for sectors of directions: 2 N in a plane, 3 N² in space (default 1: none).",
-        ),
-        click.option(
-            "--span",
-            type=float,
-            metavar="B",
-            help="Damping range that every cell offers at least [N s/m]: the stiffest walls that have it. "
-            "Default: the walls whose rectangle is the largest.",
-        ),
-        click.option(
-            "--size-limit",
-            type=click.IntRange(min=1),
-            metavar="BYTES",
-            help="Refuse a table that takes more bytes.",
-        ),
-        click.option(
-            "--arduino",
-            metavar="FOLDER",
-            callback=check_not_empty,
-            help="Also write a sketch that clamps its gains by the table, with the header.",
-        ),
-        click.option(
-            "--seed",
-            type=click.IntRange(min=0),
-            default=1,
-            metavar="N",
-            help="Seed of the random postures that cells are tried by (default 1).",
-        ),
-        resume_option,
-        worker_options,
-    )
+    options = (*options_of(EXPORT), RESUME, *WORKER_OPTIONS)
     outputs = (HEADER, *FIGURES, *DATA, ARRAY)
     output_help = (
         "Write a header (.h), a figure (.png .svg .pdf) or the data (.csv .json .nc). Default: safe_walls.h in "
@@ -205,7 +111,7 @@ class ExportCommand(Command):
             _check_sketch(question.name, device)
         try:
             job = self._job(case)
-            store = open_store(job, case.path, case["resume"])
+            store = open_store(job, case.path, case["store"])
             with report_kept_work(store):
                 table = compute_table(
                     device,
@@ -222,7 +128,7 @@ class ExportCommand(Command):
         except TooLarge as error:
             raise BadInput(f"{question.name}: {error}") from None
         if not (table.level > 0).any():
-            if store is not None and case["resume"] is None:
+            if store is not None and case["store"] is None:
                 store.remove()
             raise NoAnswerError(f"no cell has safe walls: {'; '.join(table.reasons)}")
         return table
@@ -264,7 +170,7 @@ class ExportCommand(Command):
             write_dataset(case.path, result.dataset())
         else:
             super().write(case, result, document, reason)
-        if case["resume"] is None:  # now that what it kept is written
+        if case["store"] is None:  # now that what it kept is written
             store = open_store(SafeWallsJob(result.question), case.path, None)
             if store is not None:
                 store.remove()

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from zwidth.questions import WALL
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.contact_options import wall_options
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import options_of
 from zwidth.show.units import amount, percent, typed
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class FeltCommand(Command):
         "zwidth felt my-device.toml --stiffness 2000 --damping 5",
         "zwidth felt my-device.toml --stiffness 2000 --damping 5 --output felt.svg",
     )
-    options = wall_options()
+    options = options_of(WALL)
     takes_responses = True
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the impedances, .json)."
     keys = (

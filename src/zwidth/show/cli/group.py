@@ -10,6 +10,7 @@ from typing import Any, Final
 import click
 
 from zwidth._version import __version__
+from zwidth.show.cli.sections import GroupedCommands
 
 # Name -> module and attribute: a `Command` to be made, or click's own.
 COMMANDS: Final = {
@@ -76,6 +77,7 @@ class LazyCommands(MutableMapping[str, click.Command]):
 
 
 @click.group(
+    cls=GroupedCommands,
     commands=LazyCommands(),
     epilog=EPILOG,
     invoke_without_command=True,

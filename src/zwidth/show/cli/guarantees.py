@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.questions import GUARANTEES
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.options import Finite
+from zwidth.show.cli.options import options_of
 from zwidth.show.units import amount
 
 if TYPE_CHECKING:
@@ -35,23 +36,7 @@ class GuaranteesCommand(Command):
         "zwidth guarantees my-device.toml --output guarantees.svg",
         "zwidth guarantees my-device.toml --coupling --stiffness 5000 --json",
     )
-    options = (
-        click.option(
-            "--coupling",
-            is_flag=True,
-            help="Also find the virtual couplings that keep the device stable with every passive wall and "
-            "operator (Llewellyn), or make it passive (Raisbeck).",
-        ),
-        click.option(
-            "--stiffness", metavar="K", type=Finite(), help="With --coupling: stiffness of the wall [N/m]."
-        ),
-        click.option(
-            "--damping",
-            metavar="B",
-            type=Finite(),
-            help="With --coupling: damping of the wall [N s/m]. Default: 0.",
-        ),
-    )
+    options = options_of(GUARANTEES)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the outlines, .json)."
     keys = ("guarantees",)
 

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import click
 
+from zwidth.questions import IDENTIFY
 from zwidth.show.cli.answer import answer_table, heading
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import (
     Callback,
-    Finite,
     Question,
+    Text,
     about_a_device,
-    check_not_empty,
     example,
+    options_of,
     with_settings_option,
 )
 from zwidth.show.output import destination, printable, write_text
@@ -31,40 +32,9 @@ if TYPE_CHECKING:
     from zwidth.identify.identification import Estimate, Identification
 
 
-def _check_no_empty_items(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
-    for value in values:
-        check_not_empty(ctx, param, value)
-    return values
-
-
 device_option = click.option(
-    "--device", metavar="DEVICE", required=True, callback=check_not_empty, help="The device that was measured."
+    "--device", metavar="DEVICE", required=True, type=Text(), help="The device that was measured."
 )
-joint_option = click.option(
-    "--joint",
-    metavar="NAME",
-    callback=check_not_empty,
-    help="Drive, or link whose joint it drives, that was measured. Default: the only one, or a column joint.",
-)
-
-parameter_option = click.option(
-    "--parameter",
-    "paths",
-    metavar="PATH",
-    multiple=True,
-    callback=_check_no_empty_items,
-    help="Number of the device file to be fitted, as --set takes it; repeatable.",
-)
-spring_option = click.option(
-    "--spring/--no-spring",
-    default=None,
-    help="Whether a spring holds the joint. Default: where the data show one.",
-)
-
-
-def segment_option(shortest: int, what: str) -> Callable[[Any], Any]:
-    """`--segment SAMPLES`, from a shortest one on, and what it is with its default."""
-    return click.option("--segment", metavar="SAMPLES", type=click.IntRange(shortest), help=what)
 
 
 MOST_EXPLAINED: Final = 0.999  # share of the variance beyond which more digits say nothing
@@ -125,7 +95,7 @@ class IdentifyCommand(Command):
         return False
 
     def compute(self, case: CommandLine) -> Identification:
-        options = {name: case[name] for name in _option_names(self.options)}
+        options = {name: case[name] for name in IDENTIFY[self.name]}
         if self.takes_point:
             options["point"] = case.point
         found: Identification = case.device.identify(
@@ -198,18 +168,6 @@ class IdentifyCommand(Command):
         return self.circumstances(case) if self.takes_point else {"name": case.device.name}
 
 
-def _option_names(options: Sequence[Callable[[Any], Any]]) -> list[str]:
-    """The names under which click hands over what these decorators declare."""
-
-    def declared() -> None:
-        """Carries the options."""
-
-    for option in options:
-        option(declared)
-    parameters: list[click.Parameter] = getattr(declared, "__click_params__", [])
-    return [one.name for one in parameters if one.name]
-
-
 def _files(command: Callback) -> Callback:
     """The records, of which there is one at least."""
     return click.argument("files", metavar="FILE...", nargs=-1, required=True)(command)
@@ -243,16 +201,7 @@ class StiffnessCommand(IdentifyCommand):
     name = "stiffness"
     summary = "Stiffness, backlash and friction of a drive, from torque over angle."
     examples = ("zwidth identify stiffness strokes.csv --device my-device.toml --joint upper --write",)
-    options = (
-        joint_option,
-        click.option(
-            "--side",
-            type=click.Choice(["motor", "link"]),
-            default="motor",
-            show_default=True,
-            help="Where torque and angle were measured: at the motor's shaft, or at the link's joint.",
-        ),
-    )
+    options = options_of(IDENTIFY["stiffness"])
 
 
 class FrictionCommand(IdentifyCommand):
@@ -266,15 +215,7 @@ class FrictionCommand(IdentifyCommand):
     name = "friction"
     summary = "Dry and viscous friction of a joint, both ways, from its motion."
     examples = ("zwidth identify friction back-and-forth.csv --device my-device.toml --joint upper",)
-    options = (
-        joint_option,
-        spring_option,
-        click.option(
-            "--mass-from-file",
-            is_flag=True,
-            help="In free motion, which tells only friction over mass, take the mass that DEVICE gives.",
-        ),
-    )
+    options = options_of(IDENTIFY["friction"])
 
 
 class MassCommand(IdentifyCommand):
@@ -287,7 +228,7 @@ class MassCommand(IdentifyCommand):
     name = "mass"
     summary = "Effective mass of a joint, from its motion and what drove it."
     examples = ("zwidth identify mass shaken.csv --device my-device.toml --joint upper",)
-    options = (joint_option, spring_option)
+    options = options_of(IDENTIFY["mass"])
 
 
 class BoundaryCommand(IdentifyCommand):
@@ -304,27 +245,7 @@ class BoundaryCommand(IdentifyCommand):
         "zwidth identify boundary edge.csv --device my-device.toml --parameter loop.delay_samples",
         "zwidth identify boundary edge.csv --device my-device.toml --damping-model all --output boundary.svg",
     )
-    options = (
-        parameter_option,
-        click.option(
-            "--damping-model",
-            "damping_models",
-            metavar="NAME",
-            multiple=True,
-            help="modal, stiffness, mass, proportional, drive, hysteretic, or all: structural damping that is "
-            "fitted in place of the file's; several are compared; repeatable.",
-        ),
-        click.option(
-            "--through",
-            type=click.Choice(["chart", "experiment"]),
-            help="What the points are compared with. Default: the exact chart; simulated trials where dry "
-            "friction makes the boundary depend on the amplitude.",
-        ),
-        click.option("--disturbance", metavar="M", type=Finite(), help="Initial disturbance of those trials [m]."),
-        click.option(
-            "--visible", metavar="M", type=Finite(), help="Amplitude up to which those trials count as still [m]."
-        ),
-    )
+    options = options_of(IDENTIFY["boundary"])
     takes_point = True
     size = (5.6, 4.4)
 
@@ -339,11 +260,7 @@ class ImpedanceCommand(IdentifyCommand):
     name = "impedance"
     summary = "What the handle feels like over frequency, from force and position there."
     examples = ("zwidth identify impedance shaken.csv --device my-device.toml --stiffness 2000 --damping 5",)
-    options = (
-        click.option("--stiffness", metavar="K", type=Finite(), help="Stiffness of the wall that was on [N/m]."),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall that was on [N s/m]."),
-        segment_option(64, "Samples of a segment of the transforms. Default: a third of the longest stretch."),
-    )
+    options = options_of(IDENTIFY["impedance"])
     takes_point = True
 
 
@@ -360,30 +277,7 @@ class ArmCommand(IdentifyCommand):
         "zwidth identify arm moved.csv --device my-device.toml --gravity 0,-9.81",
         "zwidth identify arm moved.csv --device my-device.toml --torque commanded",
     )
-    options = (
-        click.option(
-            "--side",
-            type=click.Choice(["joint", "motor"]),
-            default="joint",
-            show_default=True,
-            help="Where angles and torques were recorded: at the links' joints, or at the motors' shafts.",
-        ),
-        click.option(
-            "--torque",
-            type=click.Choice(["measured", "commanded"]),
-            default="measured",
-            show_default=True,
-            help="Whether the torque acted when it was recorded, or is the computer's command, which acts after "
-            "the loop's delay and is held for a period.",
-        ),
-        click.option(
-            "--rotors",
-            type=click.Choice(["fitted", "known"]),
-            default="fitted",
-            show_default=True,
-            help="Whether the rotors' inertias are fitted, or taken from DEVICE.",
-        ),
-    )
+    options = options_of(IDENTIFY["arm"])
     takes_point = True
 
     def check(self, case: CommandLine) -> None:
@@ -408,23 +302,7 @@ class ModesCommand(IdentifyCommand):
         "zwidth identify modes soft.csv hard.csv --device my-device.toml",
         "zwidth identify modes held.csv --device my-device.toml --operator firm-grasp",
     )
-    options = (
-        parameter_option,
-        click.option(
-            "--fit",
-            "fitted",
-            type=click.Choice(["device", "modes"]),
-            default="device",
-            show_default=True,
-            help="Fit the file's numbers and the modes, or the modes alone.",
-        ),
-        click.option(
-            "--estimator",
-            type=click.Choice(["H1", "H2", "Hv", "joint"]),
-            help="Estimator of the response that is drawn. Default: H1, joint with a reference.",
-        ),
-        segment_option(64, "Samples of a segment of the averaged spectra. Default: 15 in a record."),
-    )
+    options = options_of(IDENTIFY["modes"])
     takes_point = True
 
 
@@ -441,14 +319,7 @@ class ResponseCommand(IdentifyCommand):
         "zwidth identify response noise.csv --device my-device.toml --output sweep.csv",
         "zwidth identify response up.csv down.csv --device my-device.toml --output response.svg",
     )
-    options = (
-        click.option(
-            "--integrators",
-            type=click.IntRange(0, 2),
-            help="Poles at z = 1: 2 of a free device, 1 with a dashpot, 0 on a spring. Default: as the data say.",
-        ),
-        segment_option(64, "Samples whose transform resolves what must be told apart. Default: by itself."),
-    )
+    options = options_of(IDENTIFY["response"])
 
 
 KINDS: tuple[Callable[[], IdentifyCommand], ...] = (

@@ -14,19 +14,19 @@ import click
 
 from zwidth.device.faults import plural
 from zwidth.errors import DeviceError
+from zwidth.questions import IMPORT
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import PostureType, Question, check_not_empty
+from zwidth.show.cli.options import PostureType, Question, Text, options_of
 from zwidth.show.output import printable, write_text
 
 if TYPE_CHECKING:
     from zwidth.device.robot_files.import_file import ImportedDevice
 
 ENDING: Final = ".toml"
-CONTROLS: Final = ("position", "orientation", "pose")
-ARGUMENT: Final = re.compile(r"\b(handle|controls|keyframe|posture|fix)=([^\s;,][^\s;]*)")
+ARGUMENT: Final = re.compile(rf"\b({'|'.join(IMPORT)})=([^\s;,][^\s;]*)")
 
 
 class ImportCommand(Command):
@@ -45,35 +45,7 @@ class ImportCommand(Command):
         "zwidth import arm.xml --handle tool",
         "zwidth import robot.urdf --handle wrist --fix finger_joint --output robot.toml",
     )
-    options = (
-        click.option(
-            "--handle",
-            metavar="NAME",
-            callback=check_not_empty,
-            help="Site, body or link that is the handle. Default: the only one with such a name, or the end of a "
-            "single chain.",
-        ),
-        click.option(
-            "--controls",
-            type=click.Choice(CONTROLS),
-            help="What of the handle the drives control. Default: the least that tells the posture.",
-        ),
-        click.option(
-            "--keyframe", metavar="NAME", callback=check_not_empty, help="Keyframe that is the reference posture."
-        ),
-        click.option(
-            "--posture",
-            type=PostureType(),
-            help="Joints of the reference posture, as the file counts them [rad] or [m]. Others stay.",
-        ),
-        click.option(
-            "--fix",
-            metavar="NAME[,NAME]",
-            multiple=True,
-            help="Joints, or bodies with their joints, to be held still; repeatable.",
-        ),
-        click.option("--force", is_flag=True, help="Overwrite an existing file."),
-    )
+    options = options_of(IMPORT, posture=PostureType(IMPORT["posture"]))
     outputs = (ENDING,)
     output_help = "Where to write it (.toml). Default: FILE's name in this folder."
     has_device = False
@@ -83,7 +55,7 @@ class ImportCommand(Command):
         def with_file(file: str, **more: Any) -> int:
             return command(Question(file), **more)
 
-        return click.argument("file", metavar="FILE", callback=check_not_empty)(with_file)
+        return click.argument("file", metavar="FILE", type=Text())(with_file)
 
     def default_output(self, question: Question) -> str:
         return (Path(question.name).stem or "device") + ENDING

@@ -7,14 +7,12 @@ from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from zwidth.errors import NoAnswerError
+from zwidth.questions import LIMIT_CYCLES
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.contact_options import BoundedNumber, wall_options
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import check_not_empty
+from zwidth.show.cli.options import options_of
 from zwidth.show.output import FIGURES, destination
 from zwidth.show.units import amount, as_written
 
@@ -44,24 +42,7 @@ class LimitCyclesCommand(Command):
         "zwidth limit-cycles my-device.toml --stiffness 4000 --damping 1 --set loop.saturation.force_N=5",
         "zwidth limit-cycles my-device.toml --stiffness 900 --damping 1 --set loop.saturation.force_N=5 --json",
     )
-    options = (
-        *wall_options(),
-        click.option(
-            "--offset",
-            metavar="SHARE",
-            type=BoundedNumber("steps", -0.5, 0.5),
-            default=0.0,
-            help="Middle of the vibration, as a share of an encoder step: 0.5 is halfway between two counts, the "
-            "most that a constant push can do. Default: 0.",
-        ),
-        click.option("--no-simulation", is_flag=True, help="Predict only, without simulation."),
-        click.option(
-            "--plane",
-            metavar="FILE",
-            callback=check_not_empty,
-            help="Draw the device in the friction-quantisation plane (.png .svg .pdf).",
-        ),
-    )
+    options = options_of(LIMIT_CYCLES)
     output_help = "Write a figure (.png .svg .pdf: growth over amplitude) or the data (.csv: the cycles, .json)."
     keys = (
         "verdict",

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from zwidth.questions import LOAD
 from zwidth.show.cli.answer import answer_table, heading
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Finite
+from zwidth.show.cli.options import options_of
 from zwidth.show.units import amount, as_written, seconds, signed, spoken_unit, typed, vector
 
 if TYPE_CHECKING:
@@ -18,18 +17,6 @@ if TYPE_CHECKING:
 
     from zwidth.device.device import Device
     from zwidth.study.loaded_charts import LoadPath, PushedChart
-
-
-def _check_push(ctx: click.Context, param: click.Parameter, push: float) -> float:
-    if push <= 0.0:
-        raise click.BadParameter(f"must be positive, got {push:g}; pushes to both sides are charted")
-    return push
-
-
-def _check_count(ctx: click.Context, param: click.Parameter, count: int) -> int:
-    if count % 2 == 0:
-        raise click.BadParameter(f"must be odd, so that the chart without a push is among them, got {count}")
-    return count
 
 
 class LoadCommand(Command):
@@ -45,26 +32,7 @@ class LoadCommand(Command):
         "zwidth load my-device.toml --push 10",
         "zwidth load my-device.toml --gravity 0,0,-9.81 --count 5 --output load.svg",
     )
-    options = (
-        click.option(
-            "--push",
-            metavar="N",
-            type=Finite(),
-            callback=_check_push,
-            default=5.0,
-            show_default=True,
-            help="Largest push to either side [N], about an axis [N m].",
-        ),
-        click.option(
-            "--count",
-            metavar="N",
-            type=click.IntRange(3, 201),
-            callback=_check_count,
-            default=9,
-            show_default=True,
-            help="Number of pushes, odd.",
-        ),
-    )
+    options = options_of(LOAD)
     keys = (
         "push_N",
         "status",

@@ -5,29 +5,28 @@ Text page of `zwidth map`.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from math import inf
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from zwidth.measures.catalogue import MEASURES
-from zwidth.measures.definition import OK, STATUS, WANTED_NUMBERS, WantedNumber
+from zwidth.measures.definition import OK, STATUS
+from zwidth.questions import MAP, POLAR, RUN, WANTED
 from zwidth.show.circumstances import computer_text, load_text
 from zwidth.show.cli.answer import omissions, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput, as_option
 from zwidth.show.cli.options import Callback as Callback
 from zwidth.show.cli.options import (
-    Finite,
     Numbers,
-    ParamType,
     about_a_workspace,
-    check_not_empty,
-    processor_option,
+    option,
+    options_of,
 )
-from zwidth.show.cli.resumable import check_workers, report_kept_work, worker_options
+from zwidth.show.cli.resumable import WORKER_OPTIONS, check_workers, report_kept_work
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.units import amount, area_text, percent, typed, vector
 from zwidth.unit_text import unit_text
@@ -41,9 +40,6 @@ if TYPE_CHECKING:
     from zwidth.study.designs.column import Requirement
     from zwidth.study.workspace.common_area import CommonArea
     from zwidth.study.workspace.plane_grid import PlaneGrid
-
-
-PLANES: Final = ("xy", "xz", "yz")
 
 
 @dataclass(frozen=True)
@@ -61,42 +57,7 @@ class PlaneType(Numbers):
     """A plane of base axes, or two vectors in it."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return value if value in PLANES else super().convert(value, param, ctx)
-
-
-class CellsType(ParamType):
-    """Two whole numbers."""
-
-    name = "counts"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return "NX,NY"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        try:
-            counts = tuple(int(part) for part in value.split(","))
-        except ValueError:
-            counts = ()
-        if len(counts) != 2:
-            self.fail(f"must be two whole numbers such as 81,41, got {value!r}", param, ctx)
-        return counts
-
-
-def _axis_range(name: str) -> Callable[[Callback], Callback]:
-    return click.option(
-        f"--{name}",
-        f"{name}_range",
-        type=Numbers("LOW,HIGH", (2,), "-0.2,0.2"),
-        help=f"Range along the plane's {'first' if name == 'x' else 'second'} axis [m]. Default: the "
-        "workspace of the device file, or the reachable range.",
-    )
-
-
-def _wanted_number(number: WantedNumber) -> Callable[[Callback], Callback]:
-    unit = f" [{unit_text(number.unit)}]" if number.unit else ""
-    meaning = number.meaning[0].upper() + number.meaning[1:]
-    name = number.name.replace("_", "-")
-    return click.option(f"--{name}", type=Finite(), metavar="NUMBER", help=f"{meaning}{unit}.")
+        return value if value in POLAR["plane"].choices else super().convert(value, param, ctx)
 
 
 class MapCommand(Command):
@@ -113,68 +74,7 @@ class MapCommand(Command):
         "zwidth map my-device.toml --measure rigid_mass --measure isotropy --direction worst --cells 41,21 --json",
         "zwidth map my-device.toml --require 'rigid_mass>=0.2' --require 'isotropy<=1.3' --output common.svg",
     )
-    options = (
-        click.option("--measure", "measures", metavar="NAME", multiple=True, help="Measure to map; repeatable."),
-        click.option(
-            "--measures-file",
-            metavar="FILE.py",
-            callback=check_not_empty,
-            help="File with measures of your own, for --measure.",
-        ),
-        click.option(
-            "--plane",
-            type=PlaneType("xy|xz|yz|AX,AY,AZ,BX,BY,BZ", (6,), "1,0,0,0,0,1, or xy, xz, yz"),
-            help="Plane of the map, by two vectors in it. Default: the plane that the handle cannot leave, or xy.",
-        ),
-        click.option(
-            "--through",
-            type=Numbers("X,Y[,Z]", (2, 3), "0,0.25"),
-            help="A point of the plane [m]. Default: the reference position.",
-        ),
-        _axis_range("x"),
-        _axis_range("y"),
-        click.option(
-            "--cells", type=CellsType(), help="Number of cells along both axes. Default: 81 along the longer one."
-        ),
-        click.option(
-            "--require",
-            "requirements",
-            metavar="NAME>=VALUE",
-            multiple=True,
-            help="Show where this requirement is met, and where all are; repeatable. Or NAME<=VALUE.",
-        ),
-        click.option(
-            "--share",
-            "shares",
-            metavar="NAME>=VALUE",
-            multiple=True,
-            help="Map the share of directions that meet this requirement. Or NAME<=VALUE.",
-        ),
-        click.option(
-            "--stiffness",
-            type=Finite(),
-            metavar="K",
-            help="Stiffness of the wall, for measures of one wall [N/m].",
-        ),
-        click.option(
-            "--damping", type=Finite(), metavar="B", help="Damping of the wall, for measures of one wall [N s/m]."
-        ),
-        click.option(
-            "--frequency",
-            type=Finite(),
-            metavar="F",
-            help="Frequency of the hand's motion, for measures that depend on it [Hz].",
-        ),
-        *(_wanted_number(one) for one in WANTED_NUMBERS[3:]),
-        click.option(
-            "--colliding-links",
-            metavar="A:B",
-            multiple=True,
-            help="Links that can collide, for link_clearance; repeatable. Default: all that are no neighbours.",
-        ),
-        worker_options,
-        processor_option,
-    )
+    options = (*options_of(MAP, plane=PlaneType(MAP["plane"])), *WORKER_OPTIONS, option(RUN["processor"]))
     outputs = (*FIGURES, *DATA, *ARRAYS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat)."
     keys = ("plane", "plane_axes", "plane_through_m", "x_m", "y_m", "values", "status", "overall", "notes")
@@ -198,14 +98,7 @@ class MapCommand(Command):
         from zwidth.measures.definition import WantedWall
 
         measures, required = _measures(case)
-        frequency = case["frequency"]
-        if frequency is not None and not (math.isfinite(frequency) and frequency > 0.0):
-            raise BadInput(f"--frequency: must be positive, got {frequency:g}")
-        numbers = {one.name: case[one.name] for one in WANTED_NUMBERS}
-        for one in WANTED_NUMBERS[3:]:
-            value = numbers[one.name]
-            if value is not None and not one.allows(value):
-                raise BadInput(f"{as_option(one.name)}: must be {one.allowed}, got {value:g}")
+        numbers = {name: case[name] for name in WANTED}
         wall = WantedWall(**numbers, colliding_links=case["colliding_links"] or None)
         return {"measures": measures, "requirements": required, "wall": wall}
 
@@ -417,7 +310,7 @@ def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Itera
 
 
 def _amount(value: float, unit: str) -> str:
-    return "infinite" if value == math.inf else amount(value, unit)
+    return "infinite" if value == inf else amount(value, unit)
 
 
 def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:

@@ -7,30 +7,25 @@ Command-line options of `zwidth move`: the surface that the handle meets, and wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from zwidth.errors import NoAnswerError
+from zwidth.questions import MOVE
 from zwidth.show.circumstances import computer_text
 from zwidth.show.cli.answer import Row, answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import (
-    LARGEST_FORCE,
-    LARGEST_SEED,
-    BoundedNumber,
+    ParameterType,
     environment_from_options,
-    environment_options,
     usage_error,
 )
 from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.options import Finite, Numbers
+from zwidth.show.cli.options import options_of
 from zwidth.show.cli.simulate import environment_words
 from zwidth.show.output import printable
 from zwidth.show.units import HEADINGS, amount, energy_rows, percent, typed, vector
-from zwidth.study.boundary.points_file import LARGEST_WALL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +46,7 @@ if TYPE_CHECKING:
 
 SURFACES: Final = ("plane", "sphere", "box")
 WALL_OPTIONS: Final = ("stiffness", "damping", "no_pull", "two_sided", "hollow", "environment", "parameters")
-LONGEST: Final = 1e9  # s
+STRONGEST: Final = 1e6  # N
 FASTEST: Final = 1e3  # m/s
 
 
@@ -91,7 +86,7 @@ def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
 
 
 def _check_sizes(options: Mapping[str, Any]) -> None:
-    for name, most, unit in (("push", LARGEST_FORCE, "N"), ("start_velocity", FASTEST, "m/s")):
+    for name, most, unit in (("push", STRONGEST, "N"), ("start_velocity", FASTEST, "m/s")):
         value = options[name] or ()
         if any(abs(part) > most for part in value):
             numbers = ",".join(f"{part:g}" for part in value)
@@ -160,90 +155,6 @@ def components(value: tuple[float, ...] | None, direction: Floats) -> Sequence[f
     return value[0] * direction if value is not None and len(value) == 1 else value
 
 
-def motion_options() -> tuple[Callable[..., Any], ...]:
-    """What a mechanism meets and what drives it, as options."""
-    return (*_surface_options(), *_force_options(), *_run_options())
-
-
-def _surface_options() -> list[Callable[..., Any]]:
-    return [
-        click.option(
-            "--plane",
-            type=Numbers("X,Y[,Z],NX,NY[,NZ]", (4, 6), "0,0.28,0,-1"),
-            help="A wall behind a plane: a point of it [m], and the direction out of the wall.",
-        ),
-        click.option(
-            "--sphere", type=Numbers("X,Y[,Z],R", (3, 4), "0,0.3,0.05"), help="A ball: its centre and radius [m]."
-        ),
-        click.option(
-            "--box",
-            type=Numbers("X,Y[,Z],HX,HY[,HZ]", (4, 6), "0,0.3,0.05,0.02"),
-            help="A box along the axes: its centre and half sizes [m]; with two it has no end along z.",
-        ),
-        click.option("--two-sided", is_flag=True, help="The plane holds the handle from both sides."),
-        click.option("--hollow", is_flag=True, help="The sphere or box keeps the handle in, not out."),
-        click.option(
-            "--stiffness",
-            metavar="K",
-            type=BoundedNumber("N/m", 0.0, LARGEST_WALL),
-            help="Stiffness of the wall [N/m].",
-        ),
-        click.option("--damping", metavar="B", type=Finite(), help="Damping of the wall [N s/m]."),
-        *environment_options(),
-        click.option("--no-pull", is_flag=True, help="The wall never pulls the handle in."),
-    ]
-
-
-def _force_options() -> list[Callable[..., Any]]:
-    return [
-        click.option(
-            "--push",
-            type=Numbers("F|FX,FY[,FZ]", (1, 2, 3), "2 or 0,2"),
-            help="Force of the hand [N]; one number acts along the direction. Default: none.",
-        ),
-        click.option(
-            "--start-velocity",
-            type=Numbers("V|VX,VY[,VZ]", (1, 2, 3), "0.1 or 0,0.1"),
-            help="Velocity of the handle at the start [m/s]; one number is along the direction. Default: at rest.",
-        ),
-        click.option(
-            "--gravity", type=Numbers("GX,GY[,GZ]", (2, 3), "0,-9.81"), help="Gravity [m/s²]. Default: none."
-        ),
-        click.option(
-            "--torque-limits",
-            type=click.Choice(("each", "together")),
-            default="each",
-            help="Limit each motor by itself, or scale all together, so that the force keeps its direction. "
-            "Default: each.",
-        ),
-    ]
-
-
-def _run_options() -> list[Callable[..., Any]]:
-    return [
-        click.option(
-            "--duration",
-            metavar="S",
-            type=BoundedNumber("s", 0.0, LONGEST, above=True),
-            default=1.0,
-            help="Simulated time [s]. Default: 1.",
-        ),
-        click.option(
-            "--substeps",
-            type=click.IntRange(1, 100_000),
-            default=4,
-            help="Integration steps per sample. Default: 4.",
-        ),
-        click.option(
-            "--seed",
-            type=click.IntRange(0, LARGEST_SEED),
-            default=0,
-            help="Seed of the encoders' noise. Default: 0.",
-        ),
-        click.option("--exact", is_flag=True, help="Ideal encoders: no steps, no noise."),
-    ]
-
-
 def _with_height(numbers: Sequence[float], height: float) -> tuple[float, ...]:
     """A point with its height; one in a plane has that of the device."""
     return (*numbers, height) if len(numbers) == 2 else tuple(numbers)
@@ -270,7 +181,7 @@ class MoveCommand(Command):
         "zwidth move my-arms.toml --sphere 0,0.3,0.05 --stiffness 900 --damping 3 --push 2 --output path.svg",
         "zwidth move my-arms.toml --plane 0,0.28,0,-1 --environment hunt_crossley --parameter dissipation=1",
     )
-    options = motion_options()
+    options = options_of(MOVE, parameters=ParameterType())
     keys = (
         "surface",
         "environment",

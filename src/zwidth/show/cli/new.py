@@ -14,7 +14,7 @@ from zwidth.device.read import KINDS
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, check_not_empty
+from zwidth.show.cli.options import Question, Text
 from zwidth.show.output import printable, write_text
 
 ENDING: Final = ".toml"
@@ -49,7 +49,7 @@ class NewCommand(Command):
         def with_name(device: str, **more: Any) -> int:
             return command(Question(device), **more)
 
-        return click.argument("device", metavar="NAME", callback=check_not_empty)(with_name)
+        return click.argument("device", metavar="NAME", type=Text())(with_name)
 
     def default_output(self, question: Question) -> str:
         return question.name if question.name.lower().endswith(ENDING) else question.name + ENDING

@@ -8,15 +8,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from zwidth.device.faults import comma_list
+from zwidth.questions import OPTIMISE
 from zwidth.show.circumstances import omission_text
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import Callback, check_not_empty
-from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
+from zwidth.show.cli.options import Callback, options_of
+from zwidth.show.cli.resumable import RESUME, WORKER_OPTIONS, check_workers, remove_series, series_of
 from zwidth.show.cli.sweep import StudyQuestion, about_a_study, circumstances_of_study
 from zwidth.show.output import DATA, FIGURES, printable, write_text
 from zwidth.show.units import number, spoken_unit, typed
@@ -28,17 +27,6 @@ if TYPE_CHECKING:
     from zwidth.study.optimisation.optimisation import Optimisation
 
 PAGES: Final = (".html", ".htm")
-
-
-def _designs_option(command: Callback) -> Callback:
-    option: Any = click.option(
-        "--designs",
-        metavar="FOLDER",
-        callback=check_not_empty,
-        help="Write a device file for each design of the front into this folder, replacing earlier ones.",
-    )
-    decorated: Callback = option(command)
-    return decorated
 
 
 class OptimiseCommand(Command):
@@ -56,7 +44,7 @@ class OptimiseCommand(Command):
         "zwidth optimise my-study.toml --output before-and-after.html --designs better",
         "zwidth optimise my-study.toml --resume my-study.search --output front.svg",
     )
-    options = (_designs_option, resume_option, worker_options)
+    options = (*options_of(OPTIMISE), RESUME, *WORKER_OPTIONS)
     outputs = (*FIGURES, *DATA, *PAGES)
     output_help = "Write a report (.html), a figure of the front (.png .svg .pdf) or the data (.csv .json)."
     keys = ("designs", "values", "status", "knee", "baseline")

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from zwidth.processors import PROCESSORS
+from zwidth.argument import Argument, Arguments
+from zwidth.errors import ArgumentError
+from zwidth.questions import DEVICE, LOADS, PLACE, SETTINGS
 from zwidth.show.circumstances import AS_GIVEN
-from zwidth.show.cli.errors import BadInput
-from zwidth.study.boundary.points_file import wall_number
-
-if TYPE_CHECKING:
-    from zwidth.loop.operating_point import OperatingPoint
-
+from zwidth.show.cli.errors import BadInput, as_option
 
 if TYPE_CHECKING:
     from zwidth.arrays import Floats
@@ -28,10 +26,10 @@ if TYPE_CHECKING:
 else:
     ParamType = click.ParamType  # generic in newer releases only
 
-MODELS: Final = ("full", "two-mass", "motor-mass", "rigid")
 EXTREMES: Final = ("worst", "best", "lowest", "highest")  # as in study.extreme_direction
 
 Callback = Callable[..., int]
+Decorator = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
@@ -157,17 +155,38 @@ class Question:
         return {"direction": rendered[:3] if rendered[:3].any() else None, "axis": rendered[3:]}
 
 
-class PostureType(ParamType):
-    """A handle's position, or the angles of driven joints by name."""
+class Numbers(ParamType):
+    """Numbers with commas between them, 0.1,-0.25, of a vector; whole ones of counts."""
 
-    name = "posture"
+    name = "numbers"
+
+    def __init__(self, argument: Argument) -> None:
+        self.argument = argument
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return "X,Y[,Z]|JOINT=RAD,..."
+        return str(self.argument.value)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        one = self.argument
+        whole = one.kind == "counts"
+        try:
+            numbers = tuple(int(part) if whole else float(part) for part in value.split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) not in one.lengths or not all(map(math.isfinite, numbers)):
+            count, kind = " or ".join(map(str, one.lengths)), "whole" if whole else "finite"
+            self.fail(f"must be {count} {kind} numbers such as {one.example}, got {value!r}", param, ctx)
+        return numbers
+
+
+class PostureType(Numbers):
+    """A handle's position, or the angles of driven joints by name."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str) or "=" not in value:
-            return Numbers("", (2, 3), "0.1,0.25").convert(value, param, ctx)
+            return super().convert(value, param, ctx)
         angles: dict[str, float] = {}
         for part in value.split(","):
             joint, _, text = part.partition("=")
@@ -185,47 +204,46 @@ class PostureType(ParamType):
         return angles
 
 
-class Numbers(ParamType):
-    """Numbers with commas between them: 0.1,-0.25."""
-
-    name = "numbers"
-
-    def __init__(self, shape: str, lengths: tuple[int, ...], example: str) -> None:
-        self.shape, self.lengths, self.example = shape, lengths, example
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        return self.shape
+class Ranges(Numbers):
+    """Pairs of numbers, of each the lower one first."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, tuple):
-            return value
-        try:
-            numbers = tuple(float(part) for part in value.split(","))
-        except ValueError:
-            numbers = ()
-        if len(numbers) not in self.lengths or not all(map(math.isfinite, numbers)):
-            count = " or ".join(map(str, self.lengths))
-            self.fail(f"must be {count} finite numbers such as {self.example}, got {value!r}", param, ctx)
+        numbers = super().convert(value, param, ctx)
+        if not all(low < high for low, high in zip(numbers[::2], numbers[1::2], strict=True)):
+            ends = str(self.argument.value).split(",")
+            wanted = " and ".join(f"{low} < {high}" for low, high in zip(ends[::2], ends[1::2], strict=True))
+            self.fail(f"needs {wanted}, such as {self.argument.example}; got {value}", param, ctx)
         return numbers
 
 
-class Finite(ParamType):
-    """One number of a wall."""
+class Number(ParamType):
+    """One number, whole or not, within an argument's limits."""
 
     name = "number"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number, fault = wall_number(str(value))
-        if fault:
-            self.fail(fault, param, ctx)
+    def __init__(self, argument: Argument) -> None:
+        self.argument = argument
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = value
+        with suppress(ValueError):
+            number = int(value) if self.argument.kind == "whole" else float(value)
+        try:
+            self.argument.check(number)
+        except ArgumentError as error:
+            self.fail(error.reasons[0], param, ctx)
         return number
 
 
-def check_not_empty(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """A callback that refuses an empty name."""
-    if value == "":
-        raise click.BadParameter("is empty; give a name (is a variable of the shell not set?)")
-    return value
+class Text(ParamType):
+    """A name or a file, which is not empty."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "":
+            self.fail("is empty; give a name (is a variable of the shell not set?)", param, ctx)
+        return value
 
 
 class DirectionType(Numbers):
@@ -235,79 +253,68 @@ class DirectionType(Numbers):
         return value if value in EXTREMES else super().convert(value, param, ctx)
 
 
-with_settings_option: Final = click.option(
-    "--set",
-    "settings",
-    metavar="PATH=VALUE",
-    multiple=True,
-    help="Change a number of the device file; repeatable. PATH=unset removes it.",
-)
+def option(argument: Argument, kind: ParamType | None = None, **more: Any) -> Decorator:
+    """The option of the command line that gives an argument.
 
-LOAD_OPTIONS: Final = (
-    click.option(
-        "--load",
-        type=Numbers("FX,FY[,FZ]", (2, 3), "0,-5"),
-        help="Force of the hand on the handle [N], about an axis its moment [N m], under which the device is "
-        "linearised. Default: the [load] of DEVICE.",
-    ),
-    click.option(
-        "--gravity",
-        type=Numbers("GX,GY[,GZ]", (2, 3), "0,0,-9.81"),
-        help="Gravity [m/s²]. Default: the [load] of DEVICE.",
-    ),
-)
+    kind  how its value is read; None: by the argument's own kind
+    more  arguments of `click.option` besides
+    """
+    one = argument
+    if one.kind == "flag":
+        kind, more = None, {"is_flag": True, "default": one.default, **more}
+    elif one.default is not None:
+        more["default"] = one.default
+    if kind is None and one.kind != "flag":
+        kind = {
+            "choice": lambda: click.Choice(one.choices),
+            "vector": lambda: Numbers(one),
+            "counts": lambda: Numbers(one),
+            "text": Text,
+        }.get(one.kind, lambda: Number(one))()
+    return click.option(
+        option_name(one),
+        one.name,
+        type=kind,
+        metavar=one.value,
+        multiple=one.repeated,
+        required=one.required,
+        help=one.help,
+        **more,
+    )
 
 
-DEVICE: Final = click.argument("device", metavar="DEVICE", callback=check_not_empty)
+def option_name(argument: Argument) -> str:
+    """An argument as the command line spells it.
+
+    >>> option_name(SETTINGS), option_name(PLACE["characteristic_length"])
+    ('--set', '--characteristic-length')
+    """
+    return "/".join(map(as_option, (argument.option or argument.name).split("/")))
 
 
-def about_a_device(command: Callback, loads: bool = True, device: Any = DEVICE) -> Callback:
+def options_of(arguments: Arguments, **kinds: ParamType) -> tuple[Decorator, ...]:
+    """The options of a question's arguments; kinds: by name, how values are read that are no plain ones."""
+    return tuple(option(one, kinds.get(name)) for name, one in arguments.items())
+
+
+def decorated(command: Callback, decorators: Iterable[Decorator]) -> Callback:
+    """A command with arguments and options, in the order of its help."""
+    for decorate in reversed(list(decorators)):
+        command = decorate(command)
+    return command
+
+
+with_settings_option: Final = option(SETTINGS)
+DEVICE_NAME: Final = click.argument("device", metavar="DEVICE", type=Text())
+
+
+def about_a_device(command: Callback, loads: bool = True, device: Decorator = DEVICE_NAME) -> Callback:
     """Give a command DEVICE and the options of posture, direction, load, model and operator, as one `Question`.
 
     loads   whether it has the options of a load
     device  the argument, or the option, that names the device
     """
-    return _with_device_options(
-        command,
-        device,
-        click.option(
-            "--at",
-            type=PostureType(),
-            help="Posture: the handle's position [m], or the driven joints' angles [rad].",
-        ),
-        click.option(
-            "--direction",
-            type=Numbers("DX,DY[,DZ]", (2, 3), "0,1"),
-            help="Rendered direction, a vector of any length.",
-        ),
-        click.option(
-            "--axis",
-            type=Numbers("AX,AY,AZ", (3,), "0,0,1"),
-            help="Axis about which moments are rendered, of any length; walls then are in N m/rad. With "
-            "--direction: a screw.",
-        ),
-        click.option(
-            "--characteristic-length",
-            type=float,
-            metavar="METRES",
-            help="Length by which angles count as ways on a screw [m].",
-        ),
-        click.option(
-            "--orientation",
-            type=Numbers("ROLL,PITCH,YAW", (3,), "0,0,1.57"),
-            help="Orientation of the handle [rad], where the drives control it.",
-        ),
-        *(LOAD_OPTIONS if loads else ()),
-    )
-
-
-processor_option: Final = click.option(
-    "--processor",
-    type=click.Choice(PROCESSORS),
-    default="cpu",
-    show_default=True,
-    help="Where charts are computed; cuda: on an NVIDIA GPU.",
-)
+    return _with_device_options(command, device, *options_of(PLACE, at=PostureType(PLACE["at"])), loads=loads)
 
 
 def about_a_workspace(command: Callback) -> Callback:
@@ -319,84 +326,37 @@ def about_a_workspace(command: Callback) -> Callback:
         extreme = direction if isinstance(direction, str) else None
         return command(replace(question, direction=None if extreme else direction), extreme=extreme, **more)
 
-    choice = "|".join(EXTREMES)
-    return _with_device_options(
-        with_extreme,
-        DEVICE,
-        click.option(
-            "--direction",
-            type=DirectionType(f"DX,DY[,DZ]|{choice}", (2, 3), f"0,1, or one of {', '.join(EXTREMES)}"),
-            help="Rendered direction, a vector of any length; worst: in each cell the direction in which the "
-            "measure is worst.",
-        ),
-        *LOAD_OPTIONS,
+    one = PLACE["direction"]
+    one = replace(
+        one,
+        sentence=f"{one.sentence}; worst: in each cell the direction in which the measure is worst",
+        value=f"{one.value}|{'|'.join(EXTREMES)}",
+        example=f"{one.example}, or one of {', '.join(EXTREMES)}",
     )
+    return _with_device_options(with_extreme, DEVICE_NAME, option(one, DirectionType(one)))
 
 
 def about_every_posture(command: Callback) -> Callback:
     """The same for a command about all postures and all directions."""
-    return _with_device_options(command, DEVICE)
+    return _with_device_options(command, DEVICE_NAME, loads=False)
 
 
-def _with_device_options(command: Callback, device: Any, *where: Any) -> Callback:
-    """The device, the options `where`, and those that every question about a device has."""
-    takes_loads = LOAD_OPTIONS[0] in where
+def _with_device_options(command: Callback, device: Decorator, *where: Decorator, loads: bool = True) -> Callback:
+    """The device, the options `where`, those of a load, and those that every question about a device has."""
 
     @wraps(command)
-    def with_arguments(
-        device: str,
-        assembly: Any,
-        model: Any,
-        operator: Any,
-        settings: Any,
-        direction: Any = None,
-        at: Any = None,
-        axis: Any = None,
-        characteristic_length: Any = None,
-        orientation: Any = None,
-        load: Any = None,
-        gravity: Any = None,
-        **more: Any,
-    ) -> int:
-        screw = axis, characteristic_length, orientation
-        question = Question(device, settings, at, direction, *screw, assembly, model, operator)
-        if takes_loads:
-            question = replace(question, load=load, gravity=gravity)
-        else:
-            more["gravity"] = gravity  # the command's own
-        return command(question, **more)
+    def with_arguments(device: str, **options: Any) -> int:
+        own = {name: options.pop(name) for name in (*PLACE, *DEVICE) if name in options}
+        if loads:
+            own |= {name: options.pop(name) for name in LOADS}
+        return command(Question(device, **own), **options)
 
-    for decorate in reversed(_device_decorators(device, where)):
-        with_arguments = decorate(with_arguments)
-    return with_arguments
-
-
-def _device_decorators(device: Any, where: tuple[Any, ...]) -> list[Any]:
-    """Return the decorators of the device, of the options `where`, and of those that every question about a device
-    has, in the order of the help."""
-    return [
-        device,
-        *where,
-        click.option("--assembly", metavar="NAME", help="Way of assembling the mechanism."),
-        click.option(
-            "--model",
-            type=click.Choice(MODELS),
-            help="How much of the device is modelled. Default: full; a [plant] as it is given.",
-        ),
-        click.option(
-            "--operator",
-            metavar="NAME|FILE|none",
-            callback=check_not_empty,
-            help="Who holds the handle: a bundled operator, a file with an [operator], or nobody. Default: the "
-            "[operator] of DEVICE.",
-        ),
-        with_settings_option,
-    ]
+    return decorated(with_arguments, [device, *where, *(options_of(LOADS) if loads else ()), *options_of(DEVICE)])
 
 
 def output_option(what: str) -> Callable[[Callback], Callback]:
     """`--output FILE`, with what its ending may be."""
-    return click.option("--output", metavar="FILE", callback=check_not_empty, help=what)
+    return click.option("--output", metavar="FILE", type=Text(), help=what)
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-import click
-
+from zwidth.questions import POLAR
 from zwidth.show.circumstances import load_text
 from zwidth.show.cli.answer import two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
+from zwidth.show.cli.options import options_of
 from zwidth.show.output import printable
 from zwidth.show.units import amount, as_written, typed, vector
 
 if TYPE_CHECKING:
     from zwidth.chart.polar import ByDirection
-
-PLANES: Final = ("xy", "xz", "yz")  # as in chart.polar
 
 
 class PolarCommand(Command):
@@ -29,22 +27,7 @@ class PolarCommand(Command):
         "zwidth polar my-device.toml --at 0.1,0.2 --output polar.svg",
         "zwidth polar my-device.toml --plane xz --count 36 --json",
     )
-    options = (
-        click.option(
-            "--plane",
-            type=click.Choice(PLANES),
-            help="Plane of the directions. Default: xy, or, where the handle cannot move in all of it, "
-            "a plane in which it can.",
-        ),
-        click.option(
-            "--count",
-            metavar="N",
-            type=click.IntRange(3, 3600),
-            default=72,
-            show_default=True,
-            help="Number of directions, spread evenly over the full turn.",
-        ),
-    )
+    options = options_of(POLAR)
     keys = (
         "directions",
         "angle_deg",

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
+from zwidth.questions import RUN
 from zwidth.show.cli.errors import BadInput, UnfinishedRun, as_option
-from zwidth.show.cli.options import Callback, Finite, check_not_empty
+from zwidth.show.cli.options import option
 from zwidth.show.cli.progress import say, stopped_in_a_kernel
 from zwidth.show.output import printable
 
@@ -22,48 +20,13 @@ if TYPE_CHECKING:
     from zwidth.study.jobs.store import Store
 
 
-resume_option: Final = click.option(
-    "--resume",
-    metavar="FOLDER",
-    callback=check_not_empty,
-    help="Save finished work here; the same command continues from it.",
-)
-
-
-def worker_options(command: Callback) -> Callback:
-    """Give a command `--workers`, `--cluster` and `--time-limit`."""
-    options: list[Callable[[Any], Any]] = [
-        click.option(
-            "--workers",
-            type=click.IntRange(min=1),
-            metavar="N",
-            help="Largest number of processes for a long run. Default: one for each core.",
-        ),
-        click.option(
-            "--cluster",
-            metavar="ADDRESS",
-            callback=check_not_empty,
-            help="Compute on the dask cluster whose scheduler has this address, such as tcp://192.168.1.5:8786, "
-            "or 'local' for one on this computer.",
-        ),
-        click.option(
-            "--time-limit",
-            type=Finite(),
-            metavar="SECONDS",
-            help="Give up a design or cell that takes longer, to within a second: it is 'out of time', the others "
-            "keep their values.",
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+RESUME: Final = option(RUN["store"])
+WORKER_OPTIONS: Final = tuple(option(RUN[name]) for name in ("workers", "cluster", "time_limit"))
 
 
 def check_workers(options: Mapping[str, Any]) -> None:
     """Refuse options of a run that do not go together. Raises BadInput."""
-    limit, cluster = options["time_limit"], options["cluster"]
-    if limit is not None and not (math.isfinite(limit) and limit > 0.0):
-        raise BadInput(f"--time-limit: must be positive, got {limit:g}; leave it out for none")
+    cluster = options["cluster"]
     if options["workers"] is not None and cluster not in (None, "local"):
         raise BadInput(
             f"--workers: is for processes of this computer; the cluster at {printable(cluster)} has its own"
@@ -131,8 +94,8 @@ def series_of(case: CommandLine) -> Iterator[JobSeries]:
 
 def series_folder(case: CommandLine) -> Path | None:
     """The folder of `series_of`; None where nothing is kept."""
-    if case["resume"] is not None:
-        return Path(case["resume"])
+    if case["store"] is not None:
+        return Path(case["store"])
     return None if case.path is None else _default_folder(case.path)
 
 
@@ -142,7 +105,7 @@ def remove_series(case: CommandLine) -> None:
     from zwidth.study.jobs.series import remove_stores
 
     folder = series_folder(case)
-    if folder is not None and case["resume"] is None:
+    if folder is not None and case["store"] is None:
         remove_stores(folder)
 
 

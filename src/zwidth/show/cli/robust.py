@@ -6,17 +6,16 @@ from collections.abc import Iterator, Mapping
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from zwidth.device.read import LARGEST_FILE
 from zwidth.device.text_file import read_text
 from zwidth.errors import FileError, NoAnswerError
 from zwidth.loop.motion_names import listed_names
+from zwidth.questions import ROBUST
 from zwidth.show.circumstances import member_text, operator_text, value_text
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
-from zwidth.show.cli.options import check_not_empty
+from zwidth.show.cli.options import options_of
 from zwidth.show.output import printable
 from zwidth.show.units import amount, percent, radius, typed, uncertain
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from zwidth.study.robust.family import Range
     from zwidth.study.robust.robust_study import RobustStudy, Violation
 
-MOST: Final = 100_000  # members, or unseen ones
 BINDING_ROWS: Final = 12  # binding members in what people read
 LEAST_SHARE: Final = 1e-4  # of the edge, that is given as a number
 ARGUMENT_NAMES: Final = {"Device.with_": "--set", "logarithmic": "log"}  # arguments of a range, as typed
@@ -41,50 +39,7 @@ class RobustCommand(Command):
         "zwidth robust my-device.toml --range operator.arm_mass_kg=0.3,2 --range loop.delay_samples=0,1",
         "zwidth robust my-device.toml --operators none,thesis-arm,my-hand.toml --output robust.svg",
     )
-    options = (
-        click.option(
-            "--range",
-            "ranges",
-            metavar="PATH=LOW,HIGH[,log]",
-            multiple=True,
-            help="A number of the device file that is known within two values; repeatable. log: samples are "
-            "spread evenly over its logarithm.",
-        ),
-        click.option(
-            "--operators",
-            metavar="A,B,C",
-            callback=check_not_empty,
-            help="Operators that may hold the handle: names, files, none.",
-        ),
-        click.option(
-            "--operator-list",
-            metavar="FILE",
-            callback=check_not_empty,
-            help="File of operators that may hold the handle, one per line; # begins a comment.",
-        ),
-        click.option(
-            "--members",
-            type=click.IntRange(2, MOST),
-            default=None,
-            metavar="N",
-            help="Number of charts (default 256; of a measured response 24).",
-        ),
-        click.option(
-            "--unseen",
-            type=click.IntRange(1, MOST),
-            default=None,
-            metavar="N",
-            help="Number of random members that check the answer afterwards (default 10000; of a measured "
-            "response 200).",
-        ),
-        click.option(
-            "--seed",
-            type=click.IntRange(min=0),
-            default=1,
-            metavar="N",
-            help="Seed of the random numbers (default 1).",
-        ),
-    )
+    options = options_of(ROBUST)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv: the edge, .json)."
     keys = (
         "regions",

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-import click
-
+from zwidth.questions import SENSITIVITY
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
-from zwidth.show.cli.options import Finite
+from zwidth.show.cli.options import options_of
 from zwidth.show.units import amount, as_written, number, signed, typed
 from zwidth.unit_text import unit_text
 
@@ -30,13 +29,6 @@ PLACES: Final = {
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0, so that there is no largest stiffness to change"
 
 
-def _positive(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """A callback that refuses a stiffness of 0 or below."""
-    if value is not None and value <= 0.0:
-        raise click.BadParameter(f"must be above 0 N/m, got {value:g}")
-    return value
-
-
 class Found(NamedTuple):
     """The sensitivities, and what each number would have to be where a goal is given."""
 
@@ -55,22 +47,7 @@ class SensitivityCommand(Command):
         "zwidth sensitivity my-device.toml --goal 10000",
         "zwidth sensitivity my-device.toml --set loop.delay_samples=1 --output bars.svg",
     )
-    options = (
-        click.option(
-            "--top",
-            metavar="N",
-            type=click.IntRange(min=1),
-            default=12,
-            help="Rows of the printed table (default 12).",
-        ),
-        click.option(
-            "--goal",
-            metavar="K",
-            type=Finite(),
-            callback=_positive,
-            help="Also find what each number would have to be for this largest stiffness [N/m].",
-        ),
-    )
+    options = options_of(SENSITIVITY)
     keys = (
         "sensitivities",
         "groups",

@@ -12,18 +12,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.questions import SIMULATE
 from zwidth.show.cli.answer import ROUNDING, Row, answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.contact_options import (
-    LARGEST_SEED,
-    BoundedNumber,
+    ParameterType,
     check_contact,
     contact_arguments,
-    contact_options,
     translate_contact_errors,
     usage_error,
 )
-from zwidth.show.cli.options import ParamType
+from zwidth.show.cli.options import Number, options_of
 from zwidth.show.output import DATA, FIGURES
 from zwidth.show.units import HEADINGS, amount, as_written, energy_rows, percent, signed, typed, uncertain
 
@@ -36,30 +35,16 @@ if TYPE_CHECKING:
 
 
 SOUND: Final = (".wav",)
-LONGEST: Final = 1e9  # s
 NUMBERS_PER_SAMPLE: Final = 17  # numbers kept of each sample
 AS_TEXT: Final = 49  # numbers' worth of memory that each sample takes as text
 NUMBERS_OF_SOUND: Final = 48_000 * 6  # numbers kept of each second of a sound
-LOWEST_PITCH: Final = 0.1
-HIGHEST_PITCH: Final = 1000.0
 
 
-class PitchFactor(ParamType):
+class PitchFactor(Number):
     """A factor of the pitch, or "auto"."""
 
-    name = "factor"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
-        if value == "auto":
-            return "auto"
-        try:
-            factor = float(value)
-        except ValueError:
-            factor = 0.0
-        if not LOWEST_PITCH <= factor <= HIGHEST_PITCH:
-            allowed = f"auto or a factor from {LOWEST_PITCH:g} to {HIGHEST_PITCH:g}"
-            self.fail(f"must be {allowed}, got {str(value)[:60]!r}", param, ctx)
-        return factor
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return value if value == "auto" else super().convert(value, param, ctx)
 
 
 class SimulateCommand(Command):
@@ -75,49 +60,7 @@ class SimulateCommand(Command):
         "zwidth simulate my-device.toml --stiffness 9000 --damping 10 --output heard.wav --sound-full-scale 1 "
         "--sound-pitch auto",
     )
-    options = (
-        *contact_options(),
-        click.option(
-            "--duration",
-            metavar="S",
-            type=BoundedNumber("s", 0.0, LONGEST, above=True),
-            help="Simulated time [s]. Default: a tenfold change at the predicted rate, and at least eight "
-            "periods, at most 60 s.",
-        ),
-        click.option(
-            "--substeps",
-            type=click.IntRange(1, 100_000),
-            default=20,
-            help="Integration steps per sample, where the device or the environment is not linear. Default: 20.",
-        ),
-        click.option(
-            "--seed",
-            type=click.IntRange(0, LARGEST_SEED),
-            default=0,
-            help="Seed of the encoders' noise. Default: 0.",
-        ),
-        click.option(
-            "--passivity",
-            "passivity_damping",
-            metavar="B",
-            type=BoundedNumber("N s/m", 0.0, 1e15, above=True),
-            help="Add a time-domain passivity controller, whose damper is at most B [N s/m].",
-        ),
-        click.option(
-            "--sound-full-scale",
-            metavar="V",
-            type=BoundedNumber("m/s", 1e-9, 1e9),
-            help="Velocity of the handle at full scale of a .wav [m/s], the same for files to be compared; "
-            "faster is clipped. Default: each file at its own full scale.",
-        ),
-        click.option(
-            "--sound-pitch",
-            metavar="FACTOR|auto",
-            type=PitchFactor(),
-            help="Raise all frequencies of a .wav by this factor; auto: by octaves, to above 200 Hz. "
-            "Default: by octaves, from below 60 Hz to above 110 Hz.",
-        ),
-    )
+    options = options_of(SIMULATE, parameters=ParameterType(), sound_pitch=PitchFactor(SIMULATE["sound_pitch"]))
     outputs = FIGURES + DATA + SOUND
     output_help = "Write a figure (.png .svg .pdf), the data (.csv .json), or the handle's sound (.wav)."
     keys = (

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.questions import RUN
 from zwidth.show.circumstances import load_text, omission_text
 from zwidth.show.cli.answer import answer_table, two_columns
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, check_not_empty, processor_option
-from zwidth.show.cli.resumable import check_workers, open_store, report_kept_work, resume_option, worker_options
+from zwidth.show.cli.options import Question, Text, option
+from zwidth.show.cli.resumable import RESUME, WORKER_OPTIONS, check_workers, open_store, report_kept_work
 from zwidth.show.output import ARRAYS, DATA, FIGURES, FOLDERS, printable
 from zwidth.show.units import keys_of_moments, number, spoken_unit, typed
 
@@ -67,7 +68,7 @@ def about_a_study(command: Callback, *, bounds: bool = False) -> Callback:
     def with_study(study: str, **more: Any) -> int:
         return command(StudyQuestion(study, bounds=bounds), **more)
 
-    return click.argument("study", metavar="STUDY.toml", callback=check_not_empty)(with_study)
+    return click.argument("study", metavar="STUDY.toml", type=Text())(with_study)
 
 
 def _omissions_of_study(device: Device, study: Study) -> tuple[str, ...]:
@@ -111,7 +112,7 @@ class SweepCommand(Command):
         "zwidth sweep my-study.toml --resume my-study.cells --workers 4 --output designs.nc",
         "zwidth sweep my-study.toml --cluster tcp://192.168.1.5:8786 --output designs.zarr",
     )
-    options = (resume_option, worker_options, processor_option)
+    options = (RESUME, *WORKER_OPTIONS, option(RUN["processor"]))
     outputs = (*FIGURES, *DATA, *ARRAYS, *FOLDERS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .json .nc .mat .zarr)."
 
@@ -141,7 +142,7 @@ class SweepCommand(Command):
             job = sweep_job(question.study)
             if documents or _lists_all(case):
                 check_listing(job, documents)
-            store = open_store(job, case.path, case["resume"])
+            store = open_store(job, case.path, case["store"])
             with report_kept_work(store):
                 return compute_designs(
                     question.study,
@@ -207,7 +208,7 @@ class SweepCommand(Command):
             write_sweep_csv(case.path, result, keys_of_moments if self.is_about_moments(case) else dict)
         else:
             super().write(case, result, document, reason)
-        if case["resume"] is None and (store := open_store(result.job, case.path, None)) is not None:
+        if case["store"] is None and (store := open_store(result.job, case.path, None)) is not None:
             store.remove()  # now that what it kept is written
         return reason
 

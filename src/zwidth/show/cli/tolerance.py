@@ -6,19 +6,20 @@ What a study of tolerances found, in sentences.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from zwidth.questions import TOLERANCE
 from zwidth.show.circumstances import omission_text
 from zwidth.show.cli.answer import answer_table
 from zwidth.show.cli.command import Command, CommandLine
 from zwidth.show.cli.errors import BadInput
 from zwidth.show.cli.options import Callback as Callback
-from zwidth.show.cli.options import Question, check_not_empty
-from zwidth.show.cli.resumable import check_workers, remove_series, resume_option, series_of, worker_options
+from zwidth.show.cli.options import Question, Text, options_of
+from zwidth.show.cli.resumable import RESUME, WORKER_OPTIONS, check_workers, remove_series, series_of
 from zwidth.show.cli.sweep import circumstances_of_study
 from zwidth.show.output import ARRAYS, DATA, FIGURES, printable
 from zwidth.show.units import amount, number, percent, spoken_unit, typed
@@ -37,6 +38,13 @@ if TYPE_CHECKING:
 
 
 PROGRESS: Final = ".progress"  # ending of the folder that keeps finished work beside a file that is written
+
+
+# What the command line gives in place of the file's [draw].
+DRAWN: Final = {
+    name: replace(TOLERANCE[name], sentence=f"{TOLERANCE[name].sentence}, in place of the file's", left_out="")
+    for name in ("samples", "seed")
+}
 
 
 @dataclass(frozen=True)
@@ -87,16 +95,7 @@ class ToleranceCommand(Command):
         "zwidth tolerance my-tolerances.toml --samples 5000 --seed 2",
         "zwidth tolerance my-tolerances.toml --resume my-tolerances.cells --output yield.svg",
     )
-    options = (
-        click.option(
-            "--samples", type=click.IntRange(min=1), metavar="N", help="Devices drawn, in place of the file's."
-        ),
-        click.option(
-            "--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the draws, in place of the file's."
-        ),
-        resume_option,
-        worker_options,
-    )
+    options = (*options_of(DRAWN), RESUME, *WORKER_OPTIONS)
     outputs = (*FIGURES, *DATA, *ARRAYS)
     output_help = "Write a figure (.png .svg .pdf) or the data (.csv .nc .mat: drawn devices, .json: all)."
 
@@ -105,7 +104,7 @@ class ToleranceCommand(Command):
         def with_study(study: str, samples: int | None, seed: int | None, **more: Any) -> int:
             return command(ToleranceFile(study, samples=samples, seed=seed), **more)
 
-        return click.argument("study", metavar="STUDY.toml", callback=check_not_empty)(with_study)
+        return click.argument("study", metavar="STUDY.toml", type=Text())(with_study)
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
         assert isinstance(case.question, ToleranceFile)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from zwidth.show.cli.errors import BadInput, as_option
-from zwidth.show.cli.options import Numbers, ParamType
+from zwidth.show.cli.options import ParamType
 from zwidth.show.units import vector
 
 if TYPE_CHECKING:
@@ -39,31 +39,13 @@ class MatrixType(ParamType):
         return rows if len(rows) > 1 else rows[0]
 
 
-OPTIONS: Final = (
-    click.option(
-        "--with-direction",
-        "others",
-        type=Numbers("DX,DY[,DZ]", (2, 3), "1,0"),
-        multiple=True,
-        help="Another direction of the same wall, as in a corner; repeatable.",
-    ),
-    click.option(
-        "--relative-stiffness",
-        type=MatrixType(),
-        help="Stiffness along these directions, in their order; only ratios count. Left out: the same.",
-    ),
-    click.option(
-        "--relative-damping",
-        type=MatrixType(),
-        help="Damping along these directions. Left out: as the stiffness.",
-    ),
-)
+KINDS: Final = {name: MatrixType() for name in ("relative_stiffness", "relative_damping")}
 
 
 def operating_point(case: CommandLine) -> OperatingPoint:
     """The operating point, with all directions of the wall. Raises BadInput, and what `Device.at` raises."""
     question, device = case.question, case.device
-    if not case["others"]:
+    if not case["directions"]:
         for name in ("relative_stiffness", "relative_damping"):
             if case[name] is not None:
                 raise BadInput(
@@ -89,7 +71,7 @@ def operating_point(case: CommandLine) -> OperatingPoint:
 
 def circumstances(case: CommandLine) -> dict[str, Any]:
     """All directions of a wall and its matrices, as an answer states them; {} for one direction."""
-    if not case["others"]:
+    if not case["directions"]:
         return {}
     matrices = _matrices(case)
     law = (
@@ -120,7 +102,7 @@ def _directions(case: CommandLine) -> list[Any]:
     question, device = case.question, case.device
     if question.axis is not None:
         raise BadInput(f"{question.name}: --axis and --with-direction do not go together; leave out one of them")
-    return [device.direction(direction) for direction in (question.direction, *case["others"])]
+    return [device.direction(direction) for direction in (question.direction, *case["directions"])]
 
 
 def _matrices(case: CommandLine) -> WallMatrices | None:
@@ -132,6 +114,6 @@ def _matrices(case: CommandLine) -> WallMatrices | None:
     if stiffness is None and damping is None:
         return None
     try:
-        return WallMatrices.of(stiffness, damping, 1 + len(case["others"]))
+        return WallMatrices.of(stiffness, damping, 1 + len(case["directions"]))
     except ArgumentError as error:
         raise BadInput(f"{as_option(error.argument)} {error.reasons[0]}") from None

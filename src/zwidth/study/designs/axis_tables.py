@@ -14,8 +14,8 @@ from zwidth.device.device import Device
 from zwidth.device.faults import KeyPath, dotted, fail, nearest, plural, quote, suggestion
 from zwidth.device.schema import device_file as schema
 from zwidth.errors import DeviceError, FileError
-from zwidth.measures.definition import WANTED_BY_KEY
 from zwidth.model.reduction import MODELS
+from zwidth.questions import WANTED_BY_KEY
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED, Axis, Tie, read_catalogue, spread
 
 UNITS: Final = {key: one.unit for key, one in WANTED_BY_KEY.items()}

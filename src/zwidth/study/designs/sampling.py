@@ -33,7 +33,7 @@ from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import comma_list
 from zwidth.device.text_file import LARGEST_TABLE, read_text
 from zwidth.errors import FileError
-from zwidth.measures.definition import WANTED_BY_KEY
+from zwidth.questions import WANTED_BY_KEY
 
 WANTED: Final = tuple(WANTED_BY_KEY)
 CIRCUMSTANCES: Final = ("at", "direction", "assembly", "model", "operator", *WANTED)

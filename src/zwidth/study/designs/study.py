@@ -15,7 +15,8 @@ from zwidth.device.device import Device
 from zwidth.device.faults import KeyPath, nearest, plural
 from zwidth.device.validation_messages import validation_messages
 from zwidth.errors import DeviceError, Spelling, TooLarge, WorkspaceError
-from zwidth.measures.definition import WANTED_NUMBERS, Measure, WantedWall
+from zwidth.measures.definition import Measure, WantedWall
+from zwidth.questions import WANTED
 from zwidth.study.designs.axis_tables import TableFaults, axes_of, circumstance_fault
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
@@ -27,7 +28,7 @@ MOST_ALONG: Final = 10**6  # values of one axis that has a range and a count
 # Argument in Python -> what it is called as a key of a study file, or of its [workspace].
 KEYS: Final[dict[str, str]] = {
     "position": "at",
-    **{one.name: one.key for one in WANTED_NUMBERS},
+    **{one.name: one.key for one in WANTED.values()},
     "axes": "plane",
     "cells": "count",
 }
@@ -185,7 +186,7 @@ def _with_circumstances(study: Study, checked: StudyFile) -> Study:
         assembly=checked.assembly,
         model=checked.model,
         wall=WantedWall(
-            **{one.name: getattr(checked, one.key) for one in WANTED_NUMBERS},
+            **{one.name: getattr(checked, one.key) for one in WANTED.values()},
             colliding_links=checked.colliding_links,
         ),
     )

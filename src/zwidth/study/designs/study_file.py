@@ -24,9 +24,10 @@ from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, b
 from zwidth.device.schema.device_file import DEVICE_KEYS, STUDY_KEYS
 from zwidth.device.text_file import check_not_newer, read_text
 from zwidth.errors import DeviceError, FileError, as_argument
-from zwidth.measures.definition import WANTED_NUMBERS, Measure
+from zwidth.measures.definition import Measure
 from zwidth.measures.user_measures import load_measures
 from zwidth.model.argument_checks import check_kind, wrong_type
+from zwidth.questions import WANTED
 from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import measure_list
 from zwidth.study.designs.study import KEYS, Study, check_study
@@ -212,7 +213,7 @@ def _resolve_name(name: str, folder: File, shelf: BundledFiles = DEVICES) -> str
 LABEL: Final = "sweep"
 VECTORS: Final = ("at", "direction")  # of which each value is a list
 # Arguments that a study file calls otherwise.
-RENAMED_ARGUMENTS: Final = ("position", *(one.name for one in WANTED_NUMBERS if one.name != one.key))
+RENAMED_ARGUMENTS: Final = ("position", *(one.name for one in WANTED.values() if one.name != one.key))
 ARGUMENTS: Final = {KEYS[name]: name for name in RENAMED_ARGUMENTS} | {"axis": "axes", "workspace": "plane"}
 
 

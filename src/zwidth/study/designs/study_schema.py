@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
+from zwidth.argument import LARGEST, Argument
 from zwidth.device.address import is_number
 from zwidth.device.faults import KeyPath, quote, suggestion
 from zwidth.device.schema.value_types import (
@@ -20,10 +22,22 @@ from zwidth.device.schema.value_types import (
     documented_key,
 )
 from zwidth.model.reduction import Model
+from zwidth.questions import DEVICE, MAP, TOLERANCE, WANTED
 
 MOST: Final = 10**9  # designs along one axis, and in all; a larger number is a typing error
 LEAST_SEED: Final = 0
-MOST_INDEX_SAMPLES: Final = 65536  # base samples of sensitivity indices; resampling them takes 8 kB each
+
+
+def key_of(argument: Argument) -> Any:
+    """The documented key of an argument, with its limits."""
+    limits: dict[str, float] = {}
+    if argument.kind in ("number", "whole"):
+        low, high = ("ge", argument.least), ("le", argument.most)
+        low = ("gt", argument.above) if isfinite(argument.above) else low
+        limits = {name: value for name, value in (low, high) if abs(value) < LARGEST}
+    text = argument.sentence[0].lower() + argument.sentence[1:]
+    text += f"; left out: {argument.left_out}" if argument.left_out else ""
+    return documented_key(text, argument.unit or None, default=None, **limits)
 
 
 def _by_name(value: Any) -> Any:
@@ -115,28 +129,21 @@ class ToleranceSection(Section):
 class DrawSection(Section):
     """How `zwidth tolerance` draws devices, and what it says of them."""
 
-    samples: WholeNumber | None = documented_key("devices drawn; left out: 1000", ge=1, le=MOST, default=None)
-    index_samples: WholeNumber | None = documented_key(
-        "base samples of the sensitivity indices, a power of 2 from 32 on, 0 for none; left out: 512",
-        ge=0,
-        le=MOST_INDEX_SAMPLES,
-        default=None,
-    )
+    samples: WholeNumber | None = key_of(TOLERANCE["samples"])
+    index_samples: WholeNumber | None = key_of(TOLERANCE["index_samples"])
     quantiles_percent: tuple[Number, ...] | None = documented_key(
         "of measures and of charts; left out: 5, 50 and 95", "%", min_length=1, default=None
     )
-    seed: WholeNumber | None = documented_key(
-        "seed of the random numbers; left out: 1", ge=LEAST_SEED, default=None
-    )
+    seed: WholeNumber | None = key_of(TOLERANCE["seed"])
 
 
 class StudyWorkspaceSection(Section):
     """The grid in a plane on which measures over a workspace are computed."""
 
     plane: Annotated[Any, BeforeValidator(_plane)] = documented_key("xy, xz, yz or six numbers", default=None)
-    through_m: Position | None = documented_key("a point of the plane", "m", default=None)
-    x_m: Bounds | None = documented_key("lowest and highest coordinate along its first axis", "m", default=None)
-    y_m: Bounds | None = documented_key("lowest and highest coordinate along its second axis", "m", default=None)
+    through_m: Position | None = key_of(MAP["through"])
+    x_m: Bounds | None = key_of(MAP["x_range"])
+    y_m: Bounds | None = key_of(MAP["y_range"])
     count: Annotated[
         tuple[Annotated[WholeNumber, Field(ge=2, le=MOST)], ...],
         Field(min_length=2, max_length=2),
@@ -245,35 +252,21 @@ class StudyFile(Section):
     )
     at: Position | None = documented_key("the handle's position", "m", default=None)
     direction: Direction | None = documented_key("the rendered direction", default=None)
-    assembly: Text | None = documented_key("way of assembling the mechanism", default=None)
-    model: Model | None = documented_key("how much of the device is modelled", default=None)
+    assembly: Text | None = key_of(DEVICE["assembly"])
+    model: Model | None = key_of(DEVICE["model"])
     operator: Text | None = documented_key("a bundled operator, a file beside this one, or none", default=None)
     set: tuple[Text, ...] = documented_key('changes of the device file, each "PATH=VALUE"', default=())
-    stiffness_N_per_m: Number | None = documented_key("of the wanted wall", "N/m", ge=0, default=None)
-    damping_Ns_per_m: Number | None = documented_key("of the wanted wall", "N s/m", ge=0, default=None)
-    frequency_Hz: Number | None = documented_key("at which the hand moves", "Hz", gt=0, default=None)
-    spectral_radius: Number | None = documented_key(
-        "that the wall must not exceed: vibration shrinks at least by it per sample", gt=0, le=1, default=None
-    )
-    stiffness_margin: Number | None = documented_key(
-        "share by which the wall's stiffness may be off", ge=0, default=None
-    )
-    damping_margin: Number | None = documented_key(
-        "share by which the wall's damping may be off", ge=0, default=None
-    )
-    delay_margin_samples: Number | None = documented_key(
-        "by which the delay may be longer", "samples", ge=0, le=20, default=None
-    )
-    lowest_frequency_Hz: Number | None = documented_key(
-        "lower end of the band of motion", "Hz", gt=0, default=None
-    )
-    highest_frequency_Hz: Number | None = documented_key(
-        "upper end of the band of motion", "Hz", gt=0, default=None
-    )
-    force_N: Number | None = documented_key("to be held along the rendered direction", "N", ge=0, default=None)
-    link_radius_m: Number | None = documented_key(
-        "of the links, taken for rods with round ends", "m", ge=0, default=None
-    )
+    stiffness_N_per_m: Number | None = key_of(WANTED["stiffness"])
+    damping_Ns_per_m: Number | None = key_of(WANTED["damping"])
+    frequency_Hz: Number | None = key_of(WANTED["frequency"])
+    spectral_radius: Number | None = key_of(WANTED["spectral_radius"])
+    stiffness_margin: Number | None = key_of(WANTED["stiffness_margin"])
+    damping_margin: Number | None = key_of(WANTED["damping_margin"])
+    delay_margin_samples: Number | None = key_of(WANTED["delay_margin"])
+    lowest_frequency_Hz: Number | None = key_of(WANTED["lowest_frequency"])
+    highest_frequency_Hz: Number | None = key_of(WANTED["highest_frequency"])
+    force_N: Number | None = key_of(WANTED["force"])
+    link_radius_m: Number | None = key_of(WANTED["link_radius"])
     colliding_links: tuple[Text, ...] | None = documented_key(
         'pairs of links that can collide, each "A:B"; all that are no neighbours where left out', default=None
     )

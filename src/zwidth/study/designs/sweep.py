@@ -146,7 +146,7 @@ def sweep(
 
     axes           path -> values, as in `Device.with_`; or a circumstance -> values: at, direction, assembly,
                    model, operator (names, files, "none"), and of the wanted wall stiffness_N_per_m,
-                   damping_Ns_per_m, frequency_Hz and the other numbers of `measures.definition.WANTED_NUMBERS`
+                   damping_Ns_per_m, frequency_Hz and the other numbers of `questions.WANTED`
     measures       one or several: names such as "isotropy" or, over the workspace, "average(isotropy)"; or
                    measures
     position, direction, assembly, model    of all designs, as for `Device.at`

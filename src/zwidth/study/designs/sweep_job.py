@@ -42,7 +42,6 @@ from zwidth.measures.definition import (
     OK,
     OUT_OF_REACH,
     SINGULAR,
-    WANTED_BY_NAME,
     Measure,
     MeasureValues,
     Note,
@@ -50,6 +49,7 @@ from zwidth.measures.definition import (
     WantedWalls,
 )
 from zwidth.measures.evaluation import evaluate, evaluate_safely, measured_together
+from zwidth.questions import WANTED
 from zwidth.study.designs.column import Column, areas
 from zwidth.study.designs.design_groups import DesignColumn, DesignGroup, DesignGrouping
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Sampling, settings
@@ -59,7 +59,7 @@ from zwidth.study.jobs.journal import fingerprint
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
 Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
-WALL: Final = tuple(WANTED_BY_NAME)  # numbers of the wanted wall, as arguments
+WALL: Final = tuple(WANTED)  # numbers of the wanted wall, as arguments
 
 
 class _NoPoint(Exception):

@@ -33,7 +33,6 @@ from zwidth.measures.definition import (
     SINGULAR,
     STATUS,
     UNREACHED,
-    WANTED_NUMBERS,
     Measure,
     Note,
     WantedWall,
@@ -45,6 +44,7 @@ from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture_batch import shells
 from zwidth.processors import Processor
 from zwidth.progress import Progress
+from zwidth.questions import WANTED
 from zwidth.study.designs.column import measure_list, over_the_workspace, plane_positions, unit_attributes
 from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells, CellValues
@@ -351,7 +351,7 @@ def _attributes(job: MapJob) -> dict[str, Any]:
     device, plane, direction = job.device, job.plane, job.direction
     assert device.mechanism is not None
     rendered = direction if isinstance(direction, str) else device.direction(direction).tolist()
-    wanted = {f"wanted_{one.key}": getattr(job.wall, one.name) for one in WANTED_NUMBERS}
+    wanted = {f"wanted_{one.key}": getattr(job.wall, one.name) for one in WANTED.values()}
     if job.wall.colliding_links is not None:
         wanted["wanted_colliding_links"] = ", ".join(job.wall.colliding_links)
     return {
