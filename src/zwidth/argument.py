@@ -33,6 +33,7 @@ class Argument:
     repeated  may the command line give it several times?
     required  must the command line give it?
     key       in a study file
+    hint      what a message adds where the value is not allowed
     """
 
     name: str
@@ -53,6 +54,7 @@ class Argument:
     repeated: bool = False
     required: bool = False
     key: str = ""
+    hint: str = ""
 
     @property
     def help(self) -> str:
@@ -80,9 +82,9 @@ class Argument:
         return " and ".join(text for text, there in zip((low, high), bounded, strict=True) if there)
 
     def allows(self, value: Any) -> bool:
-        """Whether a value is of the kind and within the limits."""
-        if self.kind == "choice":
-            return value in self.choices
+        """Whether a number is of the kind and within the limits, a word among the choices."""
+        if self.kind not in ("number", "whole"):
+            return self.kind != "choice" or value in self.choices
         if not isinstance(value, Integral if self.kind == "whole" else Real) or isinstance(value, bool):
             return False
         number = float(value)
@@ -105,8 +107,8 @@ class Argument:
         else:
             wanted = f"a finite number{', ' if self.allowed else ''}{self.allowed}{unit}"
         number = isinstance(value, Real)
-        hint = "; is the unit right?" if number and not self.allowed and isfinite(value) else ""
-        raise ArgumentError(self.name, f"must be {wanted}, got {_quoted(value)}{hint}")
+        hint = self.hint or ("is the unit right?" if number and not self.allowed and isfinite(value) else "")
+        raise ArgumentError(self.name, f"must be {wanted}, got {_quoted(value)}{hint and '; '}{hint}")
 
 
 def _quoted(value: Any) -> str:

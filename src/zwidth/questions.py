@@ -86,7 +86,7 @@ RUN: Final = by_name(
     ),
     _number(
         "time_limit", "Time after which a design or cell is given up [s], to within a second: it is 'out of "
-        "time', the others keep their values", "s", above=0.0, value="SECONDS",
+        "time', the others keep their values", "s", above=0.0, value="SECONDS", hint="leave it out for none",
     ),
     _choice(
         "processor", "Where charts are computed; cuda: on an NVIDIA GPU", choices=("cpu", "cuda"), default="cpu",
@@ -159,6 +159,7 @@ POLAR: Final = by_name(
 LOAD: Final = by_name(
     _number(
         "push", "Largest push to either side [N], about an axis [N m]", "N", default=5.0, above=0.0, value="F",
+        hint="pushes to both sides are charted",
     ),
     _whole("count", "Number of pushes, odd", default=9, least=3, most=201),
 )
@@ -390,7 +391,7 @@ EXPERIMENT: Final = by_name(
     _whole("trials", "Number of trials with each operator", default=1, least=1, most=1000),
     _number(
         "spread", "Spread of operators and trials: standard deviation of the logarithm", default=0.2, least=0.0,
-        most=2.0, value="S",
+        most=2.0, value="S", hint="0.2 is 20 %",
     ),
     _SEED,
     _text(

@@ -98,10 +98,10 @@ def test_a_measured_response_has_no_table(here):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((MECHANISM, "--levels", 0), "five-bar: levels must be a whole number from 1 to 255, got 0"),
-        ((MECHANISM, "--margin", 1), "five-bar: margin must be at least 0 and below 1, got 1"),
-        ((MECHANISM, "--span", -1), "five-bar: the span of damping must be positive, got -1"),
-        ((MECHANISM, "--cells", "3"), "must be two or three whole numbers such as 20,10, got '3'"),
+        ((MECHANISM, "--levels", 0), "'--levels': must be a whole number from 1 to 255, got 0"),
+        ((MECHANISM, "--margin", 1), "'--margin': must be a finite number, at least 0 and below 1, got 1"),
+        ((MECHANISM, "--span", -1), "'--span': must be a finite number, above 0 [N s/m], got -1"),
+        ((MECHANISM, "--cells", "3"), "must be 2 or 3 whole numbers such as 20,10, got '3'"),
         ((MECHANISM, "--cells", "3,3,3"), "give --cells as NX,NY"),
         ((MECHANISM, "--z", "0,1"), "leave out --z"),
         ((MECHANISM, "--x", "1,0"), "range along x must be LOW,HIGH with LOW < HIGH"),

@@ -137,7 +137,7 @@ def test_moments_have_their_units(tmp_path):
     [
         ((TWO_MASS,), "has no [mechanism]"),
         ((MECHANISM, "--load", "0,-5"), "--load: does not apply"),
-        ((MECHANISM, "--push", "0"), "must be positive"),
+        ((MECHANISM, "--push", "0"), "above 0"),
         ((MECHANISM, "--push", "five"), "--push"),
         ((MECHANISM, "--count", "4"), "must be odd"),
         ((MECHANISM, "--count", "1"), "--count"),

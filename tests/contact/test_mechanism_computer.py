@@ -225,8 +225,8 @@ def test_a_filter_of_the_force_smooths_it():
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"duration": 0.0}, "duration must be positive"),
-        ({"duration": np.inf}, "duration must be positive"),
+        ({"duration": 0.0}, "duration must be a finite number, above 0"),
+        ({"duration": np.inf}, "duration must be a finite number, above 0"),
         ({"substeps": 0}, "substeps must be a whole number from 1"),
         ({"push": np.zeros((7, 3))}, r"one for each sample, \(200, 3\), got an array of \(7, 3\)"),
         ({"push": [1.0]}, "push must be two or three finite numbers"),
@@ -299,9 +299,11 @@ def test_several_postures_and_a_negative_seed_are_refused():
         ArgumentError, match=r"one posture is moved at a time, got \(2,\); take one of them by its"
     ):
         point.move()
-    with pytest.raises(ArgumentError, match="seed must be zero or positive, got -1"):
+    with pytest.raises(ArgumentError, match=r"seed must be a whole number from 0 to \d+, got -1"):
         point[0].move(seed=-1)
-    with pytest.raises(ArgumentError, match="duration must be positive and finite, in seconds, got '1'"):
+    with pytest.raises(
+        ArgumentError, match=r"duration must be a finite number, above 0 and at most 1e\+09 \[s\], got '1'"
+    ):
         point[0].move(duration="1")
 
 

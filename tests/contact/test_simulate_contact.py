@@ -224,13 +224,13 @@ def test_an_environment_that_gives_no_number_is_named_with_where_it_was():
 
 
 NUMBERS = [
-    ({"duration": 0.0}, "duration must be a finite number greater than 0"),
-    ({"duration": inf}, "duration must be a finite number greater than 0"),
+    ({"duration": 0.0}, "duration must be a finite number, above 0"),
+    ({"duration": inf}, "duration must be a finite number, above 0"),
     ({"start_position": nan}, "start_position must be a finite number"),
     ({"wall_position": inf}, "wall_position must be a finite number"),
     ({"start_velocity": nan}, "start_velocity must be a finite number"),
-    ({"substeps": 0}, "substeps must be from 1"),
-    ({"seed": -1}, "seed must be zero or positive"),
+    ({"substeps": 0}, "substeps must be a whole number from 1"),
+    ({"seed": -1}, "seed must be a whole number from 0"),
     ({"push": inf}, "push must be finite"),
     ({"passivity_damping": 0.0}, "largest_damping of the passivity controller must be positive"),
     ({"wall": "soft"}, "wall must be 'two-sided' or 'one-sided'"),

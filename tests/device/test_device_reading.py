@@ -144,7 +144,7 @@ def test_listing_the_bundled_devices_needs_no_numerics():
         ("[mechanism.loops]\na = 1\n[mechanism.loops]\n", "line 3: [mechanism.loops] is there twice"),
         (
             'device = "five-bar"\nmeasures = ["stiffness"]\n',
-            "is a study of designs, not a device; sweep it, or give",
+            "is a study file; use zwidth sweep",
         ),
     ],
 )

@@ -173,7 +173,7 @@ def test_progress_is_told_after_each_push(device):
 
 
 def test_what_is_no_path_is_refused(device):
-    with pytest.raises(ValueError, match="push must be a positive number"):
+    with pytest.raises(ValueError, match="push must be a finite number, above 0"):
         load_path(device, -1.0)
     with pytest.raises(ValueError, match="count must be odd"):
         load_path(device, 1.0, 4)

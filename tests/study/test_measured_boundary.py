@@ -125,11 +125,11 @@ def test_the_operator_of_the_point_holds_the_device(monkeypatch):
 @pytest.mark.parametrize(
     ("numbers", "argument", "says"),
     [
-        ({"stiffnesses": 0}, "stiffnesses", "must be 1 or more, got 0"),
-        ({"disturbance": 1.5}, "disturbance", "must be 1 m or less, got 1.5"),
-        ({"speed": -200.0}, "speed", "must be 100 m/s or less"),
-        ({"spread": 3.0}, "spread", "must be from 0 to 2"),
-        ({"push": float("inf")}, "push", "must be finite"),
+        ({"stiffnesses": 0}, "stiffnesses", "must be a whole number from 1 to 1000, got 0"),
+        ({"disturbance": 1.5}, "disturbance", "must be a finite number, above 0 and at most 1"),
+        ({"speed": -200.0}, "speed", "must be a finite number, at least -100 and at most 100"),
+        ({"spread": 3.0}, "spread", "must be a finite number, at least 0 and at most 2"),
+        ({"push": float("inf")}, "push", "must be a finite number"),
     ],
 )
 def test_a_plan_that_cannot_be_meant_is_refused(numbers, argument, says):

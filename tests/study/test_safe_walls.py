@@ -10,7 +10,7 @@ import pytest
 
 from tests.study.safe_wall_cases import largest_radii, random_device, search_table, try_table
 from zwidth.device.load import load
-from zwidth.errors import WorkspaceError
+from zwidth.errors import ArgumentError, WorkspaceError
 from zwidth.measures import NO_VALUE, OK, OUT_OF_REACH, UNDECIDED
 from zwidth.study import Store, run_job, safe_walls
 from zwidth.study.wall_tables.cell_walls import cell_walls
@@ -283,11 +283,11 @@ def test_questions_differ_where_cells_do():
     [
         ({"levels": 0}, "levels must be a whole number from 1 to 255, got 0"),
         ({"directions": 17}, "directions must be a whole number from 1 to 16, got 17"),
-        ({"margin": 1.0}, "margin must be at least 0 and below 1, got 1"),
-        ({"margin": float("nan")}, "margin must be at least 0 and below 1, got nan"),
-        ({"margin": "0.1"}, "margin must be at least 0 and below 1, got the text '0.1'"),
+        ({"margin": 1.0}, "margin must be a finite number, at least 0 and below 1, got 1"),
+        ({"margin": float("nan")}, "margin must be a finite number, at least 0 and below 1, got nan"),
+        ({"margin": "0.1"}, "margin must be a finite number, at least 0 and below 1, got '0.1'"),
         ({"levels": 2.5}, "levels must be a whole number from 1 to 255, got 2.5"),
-        ({"span": 0.0}, "span of damping must be positive, got 0"),
+        ({"span": 0.0}, r"span must be a finite number, above 0 \[N s/m\], got 0"),
         (
             {"cells": (20, 20), "size_limit": 1000},
             "takes 40400 bytes, more than the 1000 of its limit; take fewer",
@@ -295,7 +295,7 @@ def test_questions_differ_where_cells_do():
     ],
 )
 def test_arguments_that_are_not_allowed_are_named(arguments, message):
-    with pytest.raises(WorkspaceError, match=message):
+    with pytest.raises((ArgumentError, WorkspaceError), match=message):
         safe_walls(load(MECHANISM), **({"cells": (2, 2)} | arguments))
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.argument import check_arguments
 from zwidth.arrays import Floats
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST
@@ -19,10 +20,11 @@ from zwidth.errors import ChartError, DirectionError, LoadError, ModelError, Unm
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.loop.posed_device import check_several_directions
-from zwidth.model.argument_checks import check_choice, check_kind
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.multi_plant import DEPENDENT
 from zwidth.model.plant import Plant
 from zwidth.progress import Progress
+from zwidth.questions import POLAR
 from zwidth.result import Result, documented, entry
 
 OK, NO_WALL = "ok", "no stable wall"
@@ -98,16 +100,14 @@ def largest_stiffness_around(
 ) -> ByDirection:
     """The largest stiffness along directions spread evenly round a plane; see `largest_stiffness_by_direction`.
 
-    plane     "xy", "xz" or "yz"; left out: xy, or where the handle cannot move all over it, one where it can
-    count     number of directions, at least 3
+    plane     of the directions, "xy", "xz" or "yz"; left out: xy, or, where the handle cannot move in all of it, a
+              plane in which it can
+    count     number of directions, spread evenly over the full turn; from 3 to 3600
     progress  as for `largest_stiffness_by_direction`
-    Raises    ValueError  for another plane or count, and what `largest_stiffness_by_direction` raises
+    Raises    ArgumentError  for another plane or count, and what `largest_stiffness_by_direction` raises
     """
     check_kind("point", point, OperatingPoint)
-    if plane is not None:
-        check_choice("plane", plane, PLANES)
-    if count < 3:
-        raise ValueError(f"count must be at least 3 directions, got {count}")
+    check_arguments(POLAR, plane=plane, count=count)
     chosen = plane or _movable_plane(point.jacobian)
     first, second = np.eye(3)[list(PLANES[chosen])]
     directions = circle(count, first, second)

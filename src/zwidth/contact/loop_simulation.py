@@ -25,6 +25,7 @@ from zwidth.loop.loop import Loop
 from zwidth.memory_limit import check_memory
 from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress, watched
+from zwidth.questions import SIMULATE
 from zwidth.threads import in_chunks
 
 SUBSTEPS = 20
@@ -197,8 +198,7 @@ def _check(lengths: Floats, substeps: int) -> None:
     for length in lengths:
         if not (isfinite(length) and length > 0.0):
             raise ValueError(f"duration must be positive and finite [s], got {float(length)!r}")
-    if not 1 <= substeps <= 100_000:
-        raise ValueError(f"substeps must be from 1 to 100000, got {substeps!r}")
+    SIMULATE["substeps"].check(substeps)
 
 
 def _held_devices(runs: Sequence[Run]) -> tuple[list[HeldDevice], Ints]:

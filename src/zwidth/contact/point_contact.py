@@ -12,6 +12,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from zwidth.argument import check_arguments
 from zwidth.arrays import Floats
 from zwidth.contact.contact_simulation import (
     ContactSimulation,
@@ -34,9 +35,10 @@ from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.time_response import Judgement, TimeResponse, judge_response
 from zwidth.errors import ArgumentError, NoAnswerError, PostureError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.argument_checks import check_choice, check_kind, check_number
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.operator import Operator
 from zwidth.progress import Progress
+from zwidth.questions import SIMULATE
 
 WallSides = Literal["two-sided", "one-sided"]
 
@@ -114,7 +116,16 @@ def simulate_contact(
     """
     check_kind("point", point, OperatingPoint)
     point = _with_model(point)
-    _check_numbers(wall_position, start_position, start_velocity, duration, seed)
+    check_arguments(
+        SIMULATE,
+        wall=wall,
+        wall_position=wall_position,
+        start_position=start_position,
+        start_velocity=start_velocity,
+        duration=duration,
+        substeps=substeps,
+        seed=seed,
+    )
     chosen, given = _chosen_environment(point, wall, environment, parameters or {}, stiffness)
     touched, values = environment_with_values(chosen, given, stiffness=stiffness, damping=damping, no_pull=no_pull)
     arm = point.operator if point.ungripped_plant.handle is not None else None
@@ -285,17 +296,6 @@ def range_exit(point: OperatingPoint, response: TimeResponse) -> RangeExit | Non
     return None
 
 
-def _check_numbers(
-    wall_position: float, start_position: float | None, start_velocity: float, duration: float | None, seed: int
-) -> None:
-    check_number("wall_position", wall_position, "m")
-    check_number("start_position", 0.0 if start_position is None else start_position, "m")
-    check_number("start_velocity", start_velocity, "m/s")
-    check_number("duration", 1.0 if duration is None else duration, "s", above=0.0)
-    if seed < 0:
-        raise ValueError(f"seed must be zero or positive, got {seed}")
-
-
 def _under_load(
     point: OperatingPoint,
     wall: WallSides,
@@ -321,7 +321,6 @@ def _wall_or(environment: str | Environment | None, wall: WallSides, *, has_stif
 
     Raises  ArgumentError  where both are given, or the wall has no stiffness
     """
-    check_choice("wall", wall, ("two-sided", "one-sided"))
     if environment is not None and wall == "one-sided":
         raise ArgumentError("wall", "is one-sided beside another environment; leave one out")
     if environment is None and not has_stiffness:

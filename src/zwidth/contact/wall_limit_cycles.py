@@ -18,6 +18,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
+from zwidth.argument import check_arguments
 from zwidth.arrays import Floats
 from zwidth.chart.verdict import judge
 from zwidth.conditions.traits import reading_step
@@ -33,6 +34,7 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_kind, check_number
 from zwidth.model.modes import least_deforming_motion
 from zwidth.progress import Progress
+from zwidth.questions import LIMIT_CYCLES
 from zwidth.result import Documented, Result, documented, entry, keys_of
 
 NOT_PREDICTED: Final = ("noise", "programmable brakes")
@@ -129,9 +131,7 @@ def amplitude_dependent(point: OperatingPoint, offset: float = 0.0) -> tuple[str
     Raises  what `predict_limit_cycles` raises before it computes
     """
     check_kind("point", point, OperatingPoint)
-    check_number("offset", offset, "steps")
-    if abs(offset) > 0.5:
-        raise ValueError(f"offset must be from -0.5 to 0.5 of an encoder's step, got {offset:g}")
+    check_arguments(LIMIT_CYCLES, offset=offset)
     loop = point.loop
     check_no_feedback(loop.controller, "limit cycles are not predicted", "simulate, or leave it out")
     check_no_load(loop.plant, "limit cycles are not predicted", "simulate, or leave the load out")

@@ -339,7 +339,7 @@ class Device:
 
             device.load_path(push=5.0).stiffness_max
 
-        push   the largest to either side [N], about an axis [N m]
+        push   largest push to either side [N], about an axis [N m]
         count  number of pushes, odd
         point  where, and under which load otherwise: `device.at(...)`; left out: the reference, and the file's
         """

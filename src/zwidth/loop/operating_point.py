@@ -288,8 +288,8 @@ class OperatingPoint(PosedDevice):
     ) -> ByDirection:
         """The largest stiffness along directions round a plane; see `chart.polar.largest_stiffness_around`.
 
-        plane  "xy", "xz" or "yz"; left out: one in which the handle can move in every direction
-        count  number of directions, at least 3
+        plane  of the directions, "xy", "xz" or "yz"; left out: one in which the handle can move in every direction
+        count  number of directions, spread evenly over the full turn; from 3 to 3600
         """
         return _verbs.by_direction(self, plane, count, progress).about(self)
 

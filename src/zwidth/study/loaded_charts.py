@@ -14,17 +14,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import exp, inf, isfinite, log, nan
+from math import exp, inf, log, nan
 from typing import Any, Final
 
 import numpy as np
 from scipy.optimize import brentq
 
+from zwidth.argument import check_arguments
 from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart, largest_stiffness, stability_chart
 from zwidth.device.device import Device
 from zwidth.device.load import device_of_point, device_without_load
-from zwidth.errors import ChartError, EquilibriumError, NoMechanismError, PostureError, UnresolvedError
+from zwidth.errors import (
+    ArgumentError,
+    ChartError,
+    EquilibriumError,
+    NoMechanismError,
+    PostureError,
+    UnresolvedError,
+)
 from zwidth.loop.loop import SidewaysMotion
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.load_effect import NONE_STABLE, fastest_sideways_motion
@@ -33,11 +41,10 @@ from zwidth.model.effective_mass import screw
 from zwidth.model.equilibrium import Equilibrium
 from zwidth.model.load import HandForce, Load
 from zwidth.progress import Progress
+from zwidth.questions import LOAD
 from zwidth.result import Result
 
 OK: Final = "ok"
-PUSH: Final = 5.0  # N, or N m about an axis: the largest push where none is given
-COUNT: Final = 9
 START: Final = (
     0.6  # logarithm of a stiffness over that with the posture kept, from where it is looked for downwards
 )
@@ -199,8 +206,8 @@ class LoadPath(Result):
 
 def load_path(
     device: Device,
-    push: float = PUSH,
-    count: int = COUNT,
+    push: float = 5.0,
+    count: int = 9,
     point: OperatingPoint | None = None,
     progress: Progress | None = None,
 ) -> LoadPath:
@@ -208,22 +215,19 @@ def load_path(
 
     A push under which there is no equilibrium, or no chart, is data: nan, and a status that says why.
 
-    push      the largest [N], about an axis [N m]
-    count     number of pushes, odd, so that none is among them
+    push      largest push to either side [N], about an axis [N m]
+    count     number of pushes, odd, so that none is among them; from 3 to 201
     point     posture, direction and load; left out: the device's reference, and its own load. A load that settles
               has the push as the hand's whole force
     progress  called with "pushes", those that are done, and all of them
-    Raises    ValueError  for another push or count
+    Raises    ArgumentError  for another push or count
               NoMechanismError  for a device without a mechanism
               what `Device.at` raises, but for the lack of an equilibrium; what `OperatingPoint.loop` raises
     """
     check_kind("device", device, Device)
-    if not (isfinite(push) and push > 0.0):
-        raise ValueError(f"push must be a positive number [N], got {push:g}")
-    if count < 3 or count % 2 == 0:
-        raise ValueError(
-            f"count must be odd and at least 3, so that the chart without a push is among them, got {count}"
-        )
+    check_arguments(LOAD, push=push, count=count)
+    if count % 2 == 0:
+        raise ArgumentError("count", f"must be odd, so that the chart without a push is among them, got {count}")
     if device.mechanism is None:
         raise NoMechanismError
     pushes = _Pushes.of(device, point)

@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
-from numbers import Real
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from zwidth.argument import check_arguments
 from zwidth.arrays import Floats
 from zwidth.contact.computer import computers
 from zwidth.contact.environments import ENVIRONMENTS, Environment
@@ -30,13 +30,14 @@ from zwidth.errors import ArgumentError, NoMechanismError
 from zwidth.loop.controller import Controller, check_no_feedback
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.memory_limit import check_memory
-from zwidth.model.argument_checks import check_choice, check_kind
+from zwidth.model.argument_checks import check_kind
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
 from zwidth.model.posture import OK, Posture, handle_motions, solve_posture
 from zwidth.model.reduction import reduce_mechanism
 from zwidth.model.roadmap import roadmap
 from zwidth.progress import Progress, watched
+from zwidth.questions import MOVE
 
 REASONS: Final = {
     kernel.DONE: ("done", ""),
@@ -89,7 +90,6 @@ def simulate_mechanism(
     Returns  MechanismMotion; a motion that meets a singularity ends there, and says so
     Raises   ArgumentError  for inputs that cannot be meant, such as a surface that the handle never touches
              NoMechanismError    for a device without a mechanism
-             ValueError          for another word for torque_limits
              TooLarge     (a ValueError) for more samples than the machine has memory for
 
     >>> import zwidth
@@ -103,9 +103,7 @@ def simulate_mechanism(
     'done'
     """
     mechanism, posture = _moved_mechanism(point)
-    check_choice("torque_limits", torque_limits, ("each", "together"))
-    if seed < 0:
-        raise ArgumentError("seed", f"must be zero or positive, got {seed}")
+    check_arguments(MOVE, torque_limits=torque_limits, duration=duration, substeps=substeps, seed=seed)
     environment, values = _environment_at(wall, surface)
     check_no_feedback(
         point.controller,
@@ -441,7 +439,6 @@ def _values(wall: SurfaceEnvironment, two_sided: bool) -> Floats:
 
 
 ALONG: Final = 1e-9  # share of a velocity that may be beside what the handle can do
-MOST_SUBSTEPS: Final = 100_000
 
 
 @dataclass(frozen=True)
@@ -463,10 +460,6 @@ def motion_inputs(
     drives: int,
 ) -> MotionInputs:
     """The numbers of a motion. Raises ArgumentError."""
-    if not (isinstance(duration, Real) and isfinite(duration) and duration > 0.0):
-        raise ArgumentError("duration", f"must be positive and finite, in seconds, got {duration!r}")
-    if not (isinstance(substeps, int | np.integer) and 1 <= substeps <= MOST_SUBSTEPS):
-        raise ArgumentError("substeps", f"must be a whole number from 1 to {MOST_SUBSTEPS}, got {substeps}")
     samples = int(np.ceil(duration / controller.sampling_period - 1e-9))
     check_memory(
         samples * (23.0 + 12.0 * drives),

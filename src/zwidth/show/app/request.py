@@ -6,13 +6,16 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, TypeAdapter
 
-LARGEST: Final = 1e15  # of any number: beyond, answers would be rounding
+from zwidth.argument import LARGEST, Argument
+from zwidth.model.reduction import Model
+from zwidth.questions import SENSITIVITY, SIMULATE
+
 MOST_SETTINGS: Final = 500
+LONGEST: Final = 60.0  # s, of a contact that a page waits for
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=120)]
 FileName = Annotated[str, StringConstraints(pattern=r"^[^/\\\x00-\x1f]{1,120}$")]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST)]
 Point = tuple[Number, Number, Number]
 # What a view may show beside the chart's own numbers.
 Layer = Literal[
@@ -29,6 +32,11 @@ Layer = Literal[
     "eigenvalues",
     "touch",
 ]
+
+
+def limits(argument: Argument) -> Any:
+    """The limits of an argument, for a field of a request."""
+    return Field(gt=argument.above, ge=argument.least, le=argument.most)
 
 
 class Asked(BaseModel):
@@ -72,7 +80,7 @@ class State(Asked):
     direction: Point | None = None
     axis: Point | None = None
     assembly: Name | None = None
-    model: Literal["full", "two-mass", "motor-mass", "rigid"] | None = None
+    model: Model | None = None
     operator: Name | None = None
     hand: HandRequest | None = None
     wall: Wall | None = None
@@ -133,7 +141,7 @@ class SensitivityRequest(Request):
 
     kind: Literal["sensitivity"]
     state: State
-    goal: Positive | None = None
+    goal: Annotated[Number, limits(SENSITIVITY["goal"])] | None = None
 
 
 class ContactRequest(Request):
@@ -142,10 +150,10 @@ class ContactRequest(Request):
     kind: Literal["contact"]
     state: State
     one_sided: bool = False
-    velocity: Number = 0.0
-    depth: Number = 1e-3
-    push: Number = 0.0
-    duration: Annotated[Positive, Field(le=60.0)] | None = None
+    velocity: Annotated[Number, limits(SIMULATE["start_velocity"])] = SIMULATE["start_velocity"].default
+    depth: Annotated[Number, limits(SIMULATE["start_position"])] = 1e-3
+    push: Annotated[Number, limits(SIMULATE["push"])] = 0.0
+    duration: Annotated[Number, limits(SIMULATE["duration"]), Field(le=LONGEST)] | None = None
 
 
 class PointsRequest(Request):

@@ -303,7 +303,8 @@ class Command:
             with show_progress(compiling) as progress:
                 case = CommandLine(question, options, path, progress)
                 self.check(case)
-                case = replace(case, options={**options, **self.parse(case)})
+                with translate_errors(question):
+                    case = replace(case, options={**options, **self.parse(case)})
                 answer = self.answer(case)
             return deliver(answer, as_json)
 

@@ -42,6 +42,7 @@ def translate_errors(question: Question) -> Iterator[None]:
             BadInput  where the model, or the loop, does not fit the device
     """
     from zwidth.errors import (
+        ArgumentError,
         ChartError,
         DirectionError,
         EquilibriumError,
@@ -59,6 +60,9 @@ def translate_errors(question: Question) -> Iterator[None]:
 
     try:
         yield
+    except ArgumentError as error:
+        option = f"{as_option(error.argument)}: " if error.argument else f"{question.name}: "
+        raise BadInput(*(f"{option}{reason}" for reason in error.reasons)) from None
     except SidewaysForceError as error:
         raise BadInput(f"{question.name}: load: {error}") from None
     except (PostureError, EquilibriumError) as error:

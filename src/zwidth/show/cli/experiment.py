@@ -62,7 +62,7 @@ class ExperimentCommand(Command):
         return {"left_out": []} | super().circumstances(case)
 
     def compute(self, case: CommandLine) -> Experiment:
-        from zwidth.errors import ArgumentError, StoreError
+        from zwidth.errors import StoreError
         from zwidth.study.boundary.experiment import measure_boundary
 
         file = _journal(case)
@@ -71,8 +71,6 @@ class ExperimentCommand(Command):
                 return measure_boundary(
                     case.point, case["plan"], case["measured"], file=file, progress=case.progress
                 )
-        except ArgumentError as error:
-            raise BadInput(f"--{error.argument}: {error.reasons[0]}") from None
         except StoreError as error:
             raise BadInput(str(error)) from None
         except OSError as error:  # of the journal
@@ -101,7 +99,6 @@ class ExperimentCommand(Command):
 def _plan(case: CommandLine) -> Plan:
     """What is to be measured. Raises BadInput."""
     from zwidth.contact.boundary_experiment import SearchWindow
-    from zwidth.errors import ArgumentError
     from zwidth.study.boundary.measured_boundary import Plan
 
     stiffness, damping = case["stiffness"], case["damping"]
@@ -117,10 +114,7 @@ def _plan(case: CommandLine) -> Plan:
     ]  # the options that are numbers of the plan
     given = {name: case[name] for name in numbers if case[name] is not None}
     box = None if stiffness is None else SearchWindow(stiffness, damping)
-    try:
-        return Plan.touching(box=box, **given) if one_sided else Plan(box=box, **given)
-    except ArgumentError as error:
-        raise BadInput(f"--{error.argument}: {error.reasons[0]}") from None
+    return Plan.touching(box=box, **given) if one_sided else Plan(box=box, **given)
 
 
 def _journal(case: CommandLine) -> Path | None:

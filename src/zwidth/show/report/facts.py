@@ -18,8 +18,9 @@ from zwidth.measures.felt import FeltChart, felt_chart
 from zwidth.model.effective_mass import EffectiveParameters
 from zwidth.model.modes import natural_frequencies
 from zwidth.model.posture import Posture
+from zwidth.questions import LOAD
 from zwidth.study.link_bending import Bending, bending
-from zwidth.study.loaded_charts import PUSH, LoadPath, load_path
+from zwidth.study.loaded_charts import LoadPath, load_path
 from zwidth.study.model_validity import Validity, validity
 from zwidth.study.sensitivity.result import Sensitivities
 from zwidth.study.sensitivity.sensitivities import sensitivities
@@ -120,7 +121,7 @@ class Facts:
         if self.point.load is None:
             return None
         push = self.point.load.along(self.point.equilibrium.screw)
-        return load_path(self.device, PUSH if push is None else abs(push), PUSHES, self.point)
+        return load_path(self.device, LOAD["push"].default if push is None else abs(push), PUSHES, self.point)
 
     @cached_property
     def felt(self) -> FeltChart | None:

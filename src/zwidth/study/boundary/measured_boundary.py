@@ -6,16 +6,17 @@ Plan of a virtual experiment: what is measured, by how many operators, and in wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from math import isfinite, isnan, nan
+from math import isnan, nan
 from typing import Any, Final, NamedTuple
 
+from zwidth.argument import check_arguments
 from zwidth.chart.chart import StabilityChart
 from zwidth.chart.edge_crossings import EdgeKind
 from zwidth.contact.boundary_experiment import EdgePoint, SearchWindow, StableExtent
-from zwidth.errors import ArgumentError
 from zwidth.model.operator import Operator
+from zwidth.questions import EXPERIMENT
 from zwidth.result import Result
 from zwidth.study.boundary.points_file import PointsComparison
 
@@ -225,7 +226,6 @@ def _stable_ranges(experiment: Experiment) -> dict[float, tuple[float, float]]:
     return ranges
 
 
-FARTHEST, FASTEST = 1.0, 100.0  # m, m/s; largest disturbance and speed allowed
 PUSH: Final = 2.0  # N; default push on a one-sided wall
 SPEED: Final = 0.02  # m/s; default speed of the touch
 
@@ -261,16 +261,9 @@ class Plan:
     box: SearchWindow | None = None
 
     def __post_init__(self) -> None:
-        for name, least in (("stiffnesses", 1), ("tips", 0), ("subjects", 1), ("trials", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise ArgumentError(name, f"must be {least} or more, got {getattr(self, name)}")
-        for name, most, unit in (("disturbance", FARTHEST, "m"), ("speed", FASTEST, "m/s")):
-            if isfinite(getattr(self, name)) and abs(getattr(self, name)) > most:
-                raise ArgumentError(name, f"must be {most:g} {unit} or less, got {getattr(self, name):g}")
-        if not (isfinite(self.spread) and 0.0 <= self.spread <= 2.0):
-            raise ArgumentError("spread", f"must be from 0 to 2, got {self.spread!r}; 0.2 is 20 %")
-        if not isfinite(self.push):
-            raise ArgumentError("push", f"must be finite [N], got {self.push!r}")
+        check_arguments(
+            EXPERIMENT, **{one.name: getattr(self, one.name) for one in fields(self) if one.name in EXPERIMENT}
+        )
 
     @classmethod
     def touching(cls, *, push: float = PUSH, speed: float = SPEED, **more: Any) -> Plan:

@@ -26,11 +26,13 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
+from zwidth.argument import check_arguments
 from zwidth.arrays import Flags
 from zwidth.measures.definition import MISSING
 from zwidth.memory_limit import check_memory
 from zwidth.processors import Processor, check_processor, computing_on
 from zwidth.progress import Progress
+from zwidth.questions import RUN
 from zwidth.study.jobs.job import Cells, CellValues, Job, Notes, merge_notes
 from zwidth.study.jobs.workers import (
     GRACE,
@@ -452,10 +454,7 @@ def open_executor(
     >>> open_executor(workers=2).slots
     2
     """
-    if time_limit is not None and not 0.0 < time_limit < float("inf"):
-        raise ValueError(f"time_limit must be positive, got {time_limit:g}; leave it out for none")
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers}")
+    check_arguments(RUN, time_limit=time_limit, workers=workers)
     if cluster is None:
         return Processes(workers or cores(), time_limit)
     if cluster != LOCAL and workers is not None:

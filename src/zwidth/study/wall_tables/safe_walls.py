@@ -8,19 +8,20 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 from numbers import Integral, Real
 from typing import Any, Final
 
 import numba
 import numpy as np
 
+from zwidth.argument import check_arguments
 from zwidth.device.device import Device
 from zwidth.device.operator_choice import NOBODY
 from zwidth.errors import Advice, WorkspaceError
 from zwidth.measures.definition import OK, STATUS, Note
-from zwidth.model.argument_checks import check_kind, describe_value, wrong_type
+from zwidth.model.argument_checks import check_kind, wrong_type
 from zwidth.progress import Progress
+from zwidth.questions import EXPORT
 from zwidth.study.jobs.executor import run_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
@@ -29,9 +30,6 @@ from zwidth.study.wall_tables.cell_walls import CellQuestion, cell_walls
 from zwidth.study.wall_tables.grid import Sectors, cells_of
 from zwidth.study.wall_tables.table import SafeWalls, table_of_cells, table_size
 
-LEVELS: Final = 12
-MOST_LEVELS: Final = 255  # what a byte of the exported program counts
-MOST_PARTS: Final = 16
 BATCH: Final = 4  # cells
 
 
@@ -43,7 +41,7 @@ def safe_walls(
     y: Sequence[float] | None = None,
     z: Sequence[float] | None = None,
     cells: Sequence[int] | None = None,
-    levels: int = LEVELS,
+    levels: int = 12,
     directions: int = 1,
     margin: float = 0.0,
     span: float | None = None,
@@ -73,8 +71,9 @@ def safe_walls(
     store       a folder that keeps the cells that are done
     progress    is called with "cells", cells done, and cells of all
     workers     processes at most; left out: one for each core
-    Raises      WorkspaceError  for arguments that are not allowed, a table beyond the limit, a device under load,
-                                one that renders moments, a measured response
+    Raises      ArgumentError   for numbers that are not allowed
+                WorkspaceError  for a table beyond the limit, a device under load, one that renders moments, a
+                                measured response
                 WorkspaceError      as `grid.cells_of` does
                 DeviceError     for hands that cannot be read, and as `Device.at` does
                 what `OperatingPoint.loop`, `executor.run_job` and `Store` raise
@@ -112,7 +111,7 @@ def safe_walls_job(
     """Check the arguments of `safe_walls` and return its job, for which a `Store` can be made."""
     check_kind("device", device, Device)
     _check_kinds(hands, cells, ranges)
-    _check_numbers(levels, directions, margin)
+    check_arguments(EXPORT, levels=levels, directions=directions, margin=margin, size_limit=size_limit, seed=seed)
     _check_device(device)
     grid = cells_of(device, ranges, cells, assembly)
     if directions > 1 and not grid.dimensions:
@@ -162,8 +161,7 @@ def compute_table(
     time_limit: float | None = None,
 ) -> SafeWalls:
     """Compute the cells of a job and make their table. Raises what `safe_walls` does."""
-    if span is not None and not (isinstance(span, Real) and isfinite(span) and span > 0.0):
-        raise WorkspaceError(f"the span of damping must be positive, got {describe_value(span)}")
+    check_arguments(EXPORT, span=span)
     cells = run_job(
         job, store, progress, workers, batch=BATCH, stage="cells", cluster=cluster, time_limit=time_limit
     )
@@ -193,14 +191,6 @@ def _all(values: Any, kind: type[Any]) -> bool:
     """Whether these are a sequence, or an array, of numbers of this kind."""
     whole = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
     return whole and all(isinstance(one, kind) and not isinstance(one, bool) for one in values)
-
-
-def _check_numbers(levels: int, directions: int, margin: float) -> None:
-    for name, value, most in (("levels", levels, MOST_LEVELS), ("directions", directions, MOST_PARTS)):
-        if not (isinstance(value, Integral) and 1 <= value <= most):
-            raise WorkspaceError(f"{name} must be a whole number from 1 to {most}, got {describe_value(value)}")
-    if not (isinstance(margin, Real) and 0.0 <= margin < 1.0):
-        raise WorkspaceError(f"margin must be at least 0 and below 1, got {describe_value(margin)}")
 
 
 def _check_point(question: CellQuestion) -> None:
