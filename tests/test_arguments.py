@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from functools import cache
 from math import inf, nan
 
@@ -9,16 +11,67 @@ import numpy as np
 import pytest
 
 import zwidth
+from docs import make_commands
 from tests import systems
+from tests.cli.command_runner import refusal_lines
 from tests.measured_cases import measured_response
-from zwidth.chart import eigenvalues, hysteretic_chart, measured_chart, multi_chart, spectral_radius
-from zwidth.conditions import compare
-from zwidth.contact import judge_response, limit_cycles, simulate
+from zwidth import questions
+from zwidth.argument import Argument
+from zwidth.chart import (
+    eigenvalues,
+    hysteretic_chart,
+    largest_stiffness_around,
+    measured_chart,
+    multi_chart,
+    spectral_radius,
+)
+from zwidth.conditions import compare, compare_bounds
+from zwidth.contact import (
+    judge_response,
+    limit_cycles,
+    predict_limit_cycles,
+    simulate,
+    simulate_contact,
+    simulate_mechanism,
+)
+from zwidth.device import import_file
+from zwidth.errors import ArgumentError
 from zwidth.guarantees import find_guarantees, passive_region, spring_stable_region
+from zwidth.identify import (
+    identify_arm,
+    identify_boundary,
+    identify_friction,
+    identify_impedance,
+    identify_mass,
+    identify_modes,
+    identify_response,
+    identify_stiffness,
+)
 from zwidth.loop import MultiLoop, velocity_of
-from zwidth.measures import decay_time, evaluate, felt_chart, felt_impedance, static_stiffness, wall_paths
+from zwidth.measures import (
+    WantedWall,
+    decay_time,
+    evaluate,
+    felt_chart,
+    felt_impedance,
+    felt_wall,
+    static_stiffness,
+    wall_paths,
+)
 from zwidth.model import MultiPlant, attach, natural_frequencies, reduce_plant, solve_posture
-from zwidth.study import plane_of, sensitivities, validity
+from zwidth.show.app.request import REQUEST
+from zwidth.study import (
+    Plan,
+    StudyFile,
+    load_path,
+    open_executor,
+    optimise,
+    plane_of,
+    safe_walls,
+    sensitivities,
+    tolerance,
+    validity,
+)
 
 ONE = np.ones(1)
 NONE = np.zeros((1, 1))
@@ -308,3 +361,118 @@ def test_settings_may_be_a_dictionary():
 def test_a_plant_of_lists_becomes_one_of_arrays():
     given = zwidth.Plant([[0.3]], [[0.0]], [[0.0]], [1.0], [1.0])
     assert zwidth.judge(zwidth.Loop(given, zwidth.Controller(0.001)), 1000.0, 10.0).names == ["stable"]
+
+
+IDENTIFY = {
+    "arm": identify_arm,
+    "boundary": identify_boundary,
+    "friction": identify_friction,
+    "impedance": identify_impedance,
+    "mass": identify_mass,
+    "modes": identify_modes,
+    "response": identify_response,
+    "stiffness": identify_stiffness,
+}
+# A table of arguments, and what takes them in Python.
+TAKEN = [
+    (questions.PLACE | questions.DEVICE, zwidth.Device.at),
+    (questions.SIMULATE, simulate_contact),
+    (questions.SIMULATE, zwidth.OperatingPoint.simulate),
+    (questions.MOVE, simulate_mechanism),
+    (questions.MOVE, zwidth.OperatingPoint.move),
+    (questions.EXPERIMENT, Plan),
+    (questions.LIMIT_CYCLES, predict_limit_cycles),
+    (questions.LIMIT_CYCLES, zwidth.OperatingPoint.limit_cycles),
+    (questions.LOAD, load_path),
+    (questions.LOAD, zwidth.Device.load_path),
+    (questions.POLAR, largest_stiffness_around),
+    (questions.POLAR, zwidth.OperatingPoint.by_direction),
+    (questions.WALL, felt_wall),
+    (questions.BOUNDS, compare_bounds),
+    (questions.BOUNDS, zwidth.OperatingPoint.bounds),
+    (questions.WANTED, WantedWall),
+    (questions.WANTED, zwidth.OperatingPoint.measure),
+    (questions.ROBUST, zwidth.robust_study),
+    (questions.TOLERANCE | questions.RUN, tolerance),
+    (questions.EXPORT | questions.RUN, safe_walls),
+    (questions.RUN, zwidth.workspace_map),
+    (questions.RUN, zwidth.sweep),
+    (questions.RUN, optimise),
+    (questions.RUN, open_executor),
+    (questions.IMPORT, import_file),
+    *((questions.IDENTIFY[kind], function) for kind, function in IDENTIFY.items()),
+]
+SHARED = [
+    pytest.param(arguments[name], parameter, function, id=f"{function.__qualname__}-{name}")
+    for arguments, function in TAKEN
+    for name, parameter in inspect.signature(function).parameters.items()
+    if name in arguments
+]
+
+
+def test_most_arguments_are_taken_in_python():
+    assert len(SHARED) > 160
+    assert set(IDENTIFY) == set(questions.IDENTIFY)
+
+
+@pytest.mark.parametrize(("argument", "parameter", "function"), SHARED)
+def test_a_signature_has_the_default_of_the_table(argument, parameter, function):
+    if parameter.default is parameter.empty or parameter.default in (None, ()):
+        assert argument.default is None
+    elif argument.default is not None:
+        assert parameter.default == argument.default
+    else:
+        assert argument.left_out, "a default that the command line does not have"
+
+
+@pytest.mark.parametrize(("argument", "parameter", "function"), SHARED)
+def test_a_docstring_has_the_sentence_of_the_table(argument, parameter, function):
+    """Up to its first stop, and without the argument's name where that stands before it anyhow."""
+    text = inspect.getdoc(function) or ""
+    described = re.search(rf"^ *(?:[\w.]+(?: \.\.\.|,) )*{argument.name}(?:,| {{2,}})", text, re.MULTILINE)
+    if argument.kind not in ("number", "whole", "choice") or described is None:
+        return
+    first = re.split(r"[:;]| \[", argument.sentence)[0].lower()
+    without_choices = " ".join(re.sub(r'"[\w-]+",? ?', "", text).lower().split())
+    assert first.removeprefix(f"{argument.name.replace('_', ' ')} ") in without_choices
+
+
+NUMBERS = {
+    f"{name}-{one.name}": one
+    for name, table in (vars(questions) | questions.IDENTIFY).items()
+    if isinstance(table, dict)
+    for one in table.values()
+    if isinstance(one, Argument) and one.kind in ("number", "whole")
+}
+
+
+@pytest.mark.parametrize("one", NUMBERS.values(), ids=NUMBERS)
+def test_a_default_is_within_the_limits_and_what_is_beyond_them_is_refused_by_name(one):
+    assert one.default is None or one.allows(one.default)
+    beyond = np.nextafter(one.least, -inf), np.nextafter(one.most, inf)
+    for value in (one.above, one.below, *beyond, nan, "1", True):
+        with pytest.raises(ArgumentError) as caught:
+            one.check(value)
+        assert caught.value.argument == one.name
+    for value in (one.least, one.most):
+        assert one.allows(value) == (abs(value) < inf and one.above < value < one.below)
+
+
+def test_a_command_line_a_study_file_and_the_page_have_the_limits_of_the_table():
+    words = ("--stiffness", "1", "--damping", "1")
+    assert (
+        "at least -1000 and at most 1000 [m/s]"
+        in refusal_lines("simulate", "five-bar", *words, "--start-velocity", "1001")[0]
+    )
+    contact = {"id": 1, "kind": "contact", "state": {"device": "five-bar"}}
+    assert REQUEST.validate_python({**contact, "velocity": 1000.0}).velocity == 1000.0
+    with pytest.raises(ValueError, match="velocity"):
+        REQUEST.validate_python({**contact, "velocity": 1001.0})
+    study = {"device": "five-bar", "measures": ["isotropy"]}
+    assert StudyFile(**study, spectral_radius=1.0).spectral_radius == 1.0
+    with pytest.raises(ValueError, match="spectral_radius"):
+        StudyFile(**study, spectral_radius=1.1)
+
+
+def test_the_tables_of_the_page_on_commands_are_those_of_the_commands():
+    assert make_commands.PAGE.read_text(encoding="utf-8") == make_commands.page()

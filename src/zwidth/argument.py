@@ -87,8 +87,8 @@ class Argument:
             return self.kind != "choice" or value in self.choices
         if not isinstance(value, Integral if self.kind == "whole" else Real) or isinstance(value, bool):
             return False
-        number = float(value)
-        return self.least <= number <= self.most and self.above < number < self.below and isfinite(number)
+        within: bool = self.least <= value <= self.most and self.above < value < self.below and abs(value) < inf
+        return within
 
     def check(self, value: Any) -> None:
         """Raise ArgumentError for a number or a word that is not allowed.

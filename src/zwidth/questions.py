@@ -79,7 +79,7 @@ RUN: Final = by_name(
         "store", "Keep finished work in this folder; the same command continues from it", value="FOLDER",
         option="resume",
     ),
-    _whole("workers", "Largest number of processes of a long run", least=1, left_out="one for each core"),
+    _whole("workers", "Largest number of processes", least=1, left_out="one for each core"),
     _text(
         "cluster", "Compute on the dask cluster whose scheduler has this address, such as tcp://192.168.1.5:8786, "
         "or 'local' for one on this computer", value="ADDRESS",
@@ -371,8 +371,14 @@ EXPERIMENT: Final = by_name(
         "stiffnesses", "Number of stiffnesses at which the damping is bisected", default=16, least=1, most=1000,
     ),
     _whole("tips", "Number of dampings, near the tip, at which the stiffness is bisected", default=8, most=1000),
-    _vector("stiffness", "Range of stiffness to search", "N/m", value="KMIN,KMAX", lengths=(2,), example="0,8000"),
-    _vector("damping", "Range of damping to search", "N s/m", value="BMIN,BMAX", lengths=(2,), example="0,30"),
+    _vector(
+        "stiffness", "Range of stiffness to search", "N/m", value="KMIN,KMAX", lengths=(2,), example="0,8000",
+        left_out="found by trying",
+    ),
+    _vector(
+        "damping", "Range of damping to search", "N s/m", value="BMIN,BMAX", lengths=(2,), example="0,30",
+        left_out="found by trying",
+    ),
     _number(
         "disturbance", "Displacement at the start, for a two-sided wall", "m", above=0.0, most=1.0, value="M",
         left_out="0.001",
@@ -386,7 +392,7 @@ EXPERIMENT: Final = by_name(
         "speed", "Velocity at the start", "m/s", least=-100.0, most=100.0, value="V",
         left_out="0.02 towards a one-sided wall, else 0",
     ),
-    _flag("reflex", "The hand stiffens threefold, 50 ms after the wall has half of the push"),
+    _flag("reflex", "The hand stiffens threefold, 50 ms after the wall has half of the push; needs an operator"),
     _whole("subjects", "Number of operators", default=1, least=1, most=1000),
     _whole("trials", "Number of trials with each operator", default=1, least=1, most=1000),
     _number(
@@ -451,7 +457,8 @@ MOVE: Final = by_name(
 )
 
 _JOINT = _text(
-    "joint", "Drive, or link whose joint it drives, that was measured", left_out="the only one, or a column joint",
+    "joint", "Drive that was measured, link whose joint it drives, or its number from 1",
+    left_out="the only one, or a column joint",
 )
 _SPRING = _flag(
     "spring", "Whether a spring holds the joint", option="spring/no-spring", default=None,
@@ -532,8 +539,8 @@ IDENTIFY: Final[Mapping[str, Arguments]] = {
             default="measured",
         ),
         _choice(
-            "rotors", "Whether the rotors' inertias are fitted, or taken from DEVICE", choices=("fitted", "known"),
-            default="fitted",
+            "rotors", "Whether the rotors' inertias are fitted, or taken from the device file",
+            choices=("fitted", "known"), default="fitted",
         ),
     ),
 }

@@ -130,7 +130,8 @@ class BoundsComparison(Result):
 def compare_bounds(point: OperatingPoint, damping: float | None = None) -> BoundsComparison:
     """Compare every published condition with the exact stability limit at one operating point.
 
-    damping  B of the walls compared [N s/m]; left out: that of the stiffest stable wall, 0 if there is none
+    damping  at which the conditions are compared [N s/m]; left out: that of the stiffest stable wall, 0 if there
+             is none
     Raises   ValueError  for a damping that is not finite
              what `OperatingPoint.loop` and `stability_chart` raise, except ChartError: its text is in `undecided`
 

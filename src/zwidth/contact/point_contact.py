@@ -74,22 +74,24 @@ def simulate_contact(
 
     point              the device, and the operator who holds it
     stiffness, damping  of the wall, or of an environment that has them [N/m], [N s/m]; a wall needs a stiffness
-    wall               does it act on both sides of its position? Under load, of that from which F/K is left
+    wall               whether the wall acts on both sides of its position, under load of that from which F/K is
+                       left
     no_pull            the one-sided wall, or an environment that can, never pulls the device inwards
     environment        something else to touch: an Environment, a bundled name or "file.py:name"; None: the wall
     parameters         of the environment by name; those left out have its defaults
-    wall_position      where wall or environment begins [m]
-    start_position     of the reading [m]; None: 1 mm inside what acts everywhere, 1 mm outside a surface
-    start_velocity     [m/s]
-    push               the hand's force towards the wall [N]; None: 2 against a surface if the hand does not reach,
-                       else 0
-    ramp               time in which the push grows to it [s]
+    wall_position      position of the wall's surface, or of where the environment begins [m]
+    start_position     position at the start, of the reading [m]; None: 1 mm outside an environment with a surface,
+                       1 mm inside any other
+    start_velocity     velocity at the start [m/s]
+    push               constant force of the hand towards the wall [N]; None: 2 against a surface, unless the hand
+                       reaches; else 0
+    ramp               time in which the push rises to its full value [s]
     tremor, reach, reflex  of the hand; None: none
-    passivity_damping  largest damping of a time-domain passivity controller [N s/m]; None: no controller. With one
-                       the same run is made without it, too
-    duration           [s]; None: a tenfold change at the predicted rate and at least eight periods, at most 60 s;
-                       2 s and more where something is not linear (see `run_length`)
-    substeps           between samples, where something is nonlinear
+    passivity_damping  add a time-domain passivity controller, whose damper is at most B, this [N s/m]; None: none.
+                       The same run is then made without it, too
+    duration           simulated time [s]; None: a tenfold change at the predicted rate and at least eight periods,
+                       at most 60 s; 2 s and more where something is not linear (see `run_length`)
+    substeps           integration steps per sample, where the device or the environment is not linear
     seed               of the encoders' noise
     trail              keep the handle's position after each substep
     seconds_to_hear    of a run that is to be heard: seconds that it lasts at least, by its frequency [Hz]

@@ -72,8 +72,8 @@ def predict_limit_cycles(
 
     point               the device, and the operator who holds it
     stiffness, damping  of the wall [N/m], [N s/m]
-    offset    middle of the vibrations as a share of each encoder's step: 0 on a count, 0.5 between two, the worst
-              that a constant push can do
+    offset    middle of the vibration, as a share of an encoder step: 0 on a count, 0.5 halfway between two, the
+              most that a constant push can do
     simulate  simulate from near each stable cycle within the range, or from close by where there is none
     progress  called with a stage's name, steps done, steps of all
     Raises    NoAnswerError   where nothing depends on the amplitude

@@ -170,8 +170,9 @@ class Device:
         orientation (..., 3) roll, pitch, yaw [rad] or (..., 3, 3) axes of the handle, where the drives control it;
                     left out: the file's
         assembly    name of the way the mechanism is assembled; left out: the file's
-        model       "full", "two-mass", "motor-mass" or "rigid"; left out: full for a mechanism, and a given plant
-                    as it is. "motor-mass" holds the link side, and so the operator, fixed: he does nothing to it
+        model       how much of the device is modelled: "full", "two-mass", "motor-mass" or "rigid"; left out: full
+                    for a mechanism, and a given plant as it is. "motor-mass" holds the link side, and so the
+                    operator, fixed: he does nothing to it
         operator    who holds the handle: an Operator, a bundled name or a file, "none"; left out: as the file says
         load        force of the hand on the handle (2,) or (3,) [N], about an axis its moment [N m], or a `Load`:
                     the device is linearised about the haptic equilibrium under it, see `docs/equilibrium.md`. Left

@@ -326,7 +326,7 @@ class OperatingPoint(PosedDevice):
     def bounds(self, damping: float | None = None) -> BoundsComparison:
         """Every published condition beside the exact limit; see `conditions.comparison.compare_bounds`.
 
-        damping  of the walls compared [N s/m]; left out: that of the stiffest stable wall
+        damping  at which the conditions are compared [N s/m]; left out: that of the stiffest stable wall
         """
         return _verbs.bounds(self, damping).about(self)
 

@@ -28,13 +28,15 @@ if TYPE_CHECKING:
 class WantedWall:
     """The wall to be rendered and what is asked of it, which some measures need; None where a number is not given.
 
-    stiffness, damping  [N/m], [N s/m]
+    stiffness, damping  of the wanted wall [N/m], [N s/m]
     frequency           at which the hand moves on it [Hz]
     spectral_radius     that the wall must not exceed
-    stiffness_margin, damping_margin  shares by which stiffness and damping may be off
-    delay_margin        by which the delay may be longer [samples]
-    lowest_frequency, highest_frequency  of a band of motion [Hz]
-    force               to be held [N]
+    stiffness_margin    share by which the wall's stiffness may be off
+    damping_margin      share by which the wall's damping may be off
+    delay_margin        how much longer the delay may be [samples]
+    lowest_frequency    lower end of the band of motion [Hz]
+    highest_frequency   upper end of the band of motion [Hz]
+    force               to be held along the rendered direction [N]
     link_radius         of the links, taken for rods with round ends [m]
     colliding_links     pairs of links that can collide, each "A:B"; None: all that are no neighbours
     """

@@ -77,14 +77,14 @@ def simulate_mechanism(
                     direction, model and operator take no part
     wall, surface   what is rendered, a `SurfaceWall` or a `SurfaceEnvironment`, and where; both or neither:
                     without them the motors stay without current
-    duration        [s]
+    duration        simulated time [s]
     start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
     push            (3,) force at the handle [N], or (samples, 3), each held for one period
-    gravity         (3,) [m/s²]; None: none
-    substeps        steps per sampling period; each is of fourth order
+    gravity         (3,) [m/s^2]; None: none
+    substeps        integration steps per sample; each is of fourth order
     counted         False: the encoders are read as finely as you like
-    torque_limits   "each": every motor's torque is cut at its own limit; "together": all are scaled alike, so that
-                    the force keeps its direction
+    torque_limits   limit each motor by itself, "each", or scale all together, "together", so that the force keeps
+                    its direction
     seed            of the encoders' noise
     progress        called with "simulating", the samples done, and all samples
     Returns  MechanismMotion; a motion that meets a singularity ends there, and says so

@@ -133,11 +133,11 @@ def identify_arm(
               a single one its last 30 %
     point     posture and directions of the effective masses; None: the device's reference
     gravity   (2,) or (3,) [m/s²]; None: that of the file's [load], or none
-    side      "joint": coordinates of the links' joints and torques at the joints; "motor": angles and torques of
-              the motors. Either way the torques are the motors', which accelerate the rotors too
-    torque    "measured": it acts when it is recorded; "commanded": the computer's command, which acts after the
-              loop's delay and is held for a period
-    rotors    "fitted": their inertias are parameters; "known": those of the file are taken as they are
+    side      where angles and torques were recorded: at the links' joints, "joint", or at the motors' shafts,
+              "motor". Either way the torques are the motors', which accelerate the rotors too
+    torque    whether the torque acted when it was recorded, "measured", or is the computer's command, "commanded",
+              which acts after the loop's delay and is held for a period
+    rotors    whether the rotors' inertias are fitted, "fitted", or taken from the device file, "known"
     Raises    DeviceError  for columns that are missing, options that do not fit, and devices without a mechanism
     """
     mechanism = check_mechanism(device)

@@ -81,8 +81,9 @@ def identify_boundary(
                     place of the device's own damping, and they are compared; the estimates are those of the best
     through         "chart", "experiment": what the points are compared with; None: the chart, and trials on the
                     simulated device where it has dry friction or an estimate of velocity that is not linear
-    disturbance     of those trials [m]; None: each point's own perturbation_N over its stiffness, or 1 mm
-    visible         amplitude up to which a vibration counts as none in those trials [m]; None: each point's own
+    disturbance     initial disturbance of those trials [m]; None: each point's own perturbation_N over its
+                    stiffness, or 1 mm
+    visible         amplitude up to which those trials count as still [m]; None: each point's own
                     amplitude_m, or three encoder steps
     progress        called with stage, steps done, and steps
     Raises          DeviceError  for faults of the records and of the arguments, and where the device has no chart

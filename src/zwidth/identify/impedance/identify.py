@@ -95,7 +95,7 @@ def identify_impedance(
                         is given
     point               posture and direction; None: `device.at()`
     stiffness, damping  of the wall that was on [N/m], [N s/m]
-    segment             samples of a segment of the spectra; None: a third of the longest stretch
+    segment             samples of a segment of the transforms; None: a third of the longest stretch
     progress            called with stage, steps done, and steps
     Raises              DeviceError  for faults of the records and of the arguments
     """
@@ -158,7 +158,7 @@ def _measured_states(
 ) -> tuple[list[_State], list[Check]]:
     """Measure the impedance in each state of the wall.
 
-    segment  samples of a segment of the spectra; None: a third of the longest stretch
+    segment  samples of a segment of the transforms; None: a third of the longest stretch
     Returns  the states in which force and motion are coherent, and the check of each one
     Raises   DeviceError  for words of the column wall that name no state
     """

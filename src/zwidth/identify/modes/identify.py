@@ -109,9 +109,9 @@ def identify_modes(
                identified, and the device's are held
     paths      of the numbers to identify; (): masses, springs, dampers and delay of a [plant], stiffness of the
                drives, damping ratio and delay of a mechanism, the five numbers of a hand
-    fitted     "device": its numbers, and the modes; "modes": the modes alone
+    fitted     fit the file's numbers and the modes, "device", or the modes alone, "modes"
     estimator  of the response that is drawn: H1, H2, Hv, or joint with a reference; None: H1, or joint
-    segment    samples in a segment of the averaged spectra; None: 15 segments, or the period of the force
+    segment    samples of a segment of the averaged spectra; None: 15 segments, or the period of the force
     Returns    what each check saw; the numbers with their intervals where none refuses
     Raises     DeviceError  for columns or options that do not go together, cells that are no numbers
     """

@@ -53,7 +53,7 @@ def identify_response(
     """The response of a device from raw sweeps: force command sample to encoder sample, with coherence.
 
     records      every sample of the loop; each is a sweep of its own, and several are repetitions
-    integrators  poles at z = 1: 0, 1 or 2; None: read off the response
+    integrators  poles at z = 1: 2 of a free device, 1 with a dashpot, 0 on a spring; None: read off the response
     segment      samples whose transform resolves what must be told apart, see `sweep_response`; None: by itself
     Returns      `curves` are the columns of a file that a [response] reads; the number is the largest stiffness,
                  its interval from what is stable beyond doubt to what may be

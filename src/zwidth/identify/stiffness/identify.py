@@ -50,8 +50,8 @@ def identify_stiffness(
     records  torque and angle in the order in which they were measured, each record a run; a column joint says of
              which drive each row is
     joint    name of the drive or of its link, where the records do not say; None: the only drive
-    side     "motor": torque and angle of the motor's shaft, the link blocked; "link": of the joint, the motor
-             blocked
+    side     where torque and angle were measured: "motor", at the motor's shaft, the link blocked; "link", at the
+             link's joint, the motor blocked
     Raises   DeviceError  for records without the columns, and drives that the device does not have
     """
     parts = [

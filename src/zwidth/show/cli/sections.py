@@ -10,12 +10,12 @@ import click
 from zwidth.device.faults import nearest
 from zwidth.questions import DEVICE, LOADS, PLACE, RUN
 
-OWN: Final = "Options"
+OWN, POSTURE, RUNS, OUTPUT = "Options", "Posture and device", "Long runs", "Output"
 # Titles below a command's own options, and the parameters that stand there.
 SHARED: Final[dict[str, Collection[str]]] = {
-    "Posture and device": {*PLACE, *LOADS, *DEVICE},
-    "Long runs": set(RUN),
-    "Output": {"output", "write", "as_json", "help"},
+    POSTURE: {*PLACE, *LOADS, *DEVICE},
+    RUNS: set(RUN),
+    OUTPUT: {"output", "write", "as_json", "help"},
 }
 FIRST_COLUMN: Final = 30  # characters; longer options stand on a line of their own
 WHOLE: Final = 200  # characters of a summary: all of it
@@ -41,7 +41,7 @@ class SectionedCommand(click.Command):
         for param in self.get_params(ctx):
             record = param.get_help_record(ctx)
             if record is not None and isinstance(param, click.Option):
-                rows[_section_of(param)].append(record)
+                rows[section_of(param)].append(record)
         width = min(max(len(name) for records in rows.values() for name, _ in records), FIRST_COLUMN)
         for title, records in rows.items():
             if records:
@@ -71,7 +71,7 @@ class GroupedCommands(click.Group):
             _write_section(formatter, title, rows, width)
 
 
-def _section_of(param: click.Option) -> str:
+def section_of(param: click.Option) -> str:
     """Title of the section in which an option stands."""
     name = "help" if "--help" in param.opts else param.name
     return next((title for title, names in SHARED.items() if name in names), OWN)

@@ -234,14 +234,18 @@ SPEED: Final = 0.02  # m/s; default speed of the touch
 class Plan:
     """What a virtual experiment measures.
 
-    one_sided    touch a one-sided wall with `push` [N] and `speed` [m/s]; else displace by `disturbance` [m]
+    one_sided    touch a one-sided wall, with `push` and `speed`; else displace by `disturbance`
     stiffnesses  number of stiffnesses at which the damping is bisected, for the lower and the upper edge
-    tips         number of dampings at which the stiffness is bisected
-    visible      amplitude that counts as a vibration, see `StabilityTrial` [m]; None: three encoder steps and ten
-                 standard deviations of the noise
-    reflex       the hand stiffens threefold, 50 ms after half of the push is felt
-    subjects, trials  number of operators, and of trials of each
-    spread, seed      of the numbers of operators and trials: see `study.boundary.experiment`
+    tips         number of dampings, near the tip, at which the stiffness is bisected
+    disturbance  displacement at the start, for a two-sided wall [m]
+    visible      largest amplitude of a lasting vibration that counts as none, see `StabilityTrial` [m]; None:
+                 three encoder steps and ten standard deviations of the noise
+    push         constant force of the hand [N]
+    speed        velocity at the start [m/s]
+    reflex       the hand stiffens threefold, 50 ms after the wall has half of the push
+    subjects     number of operators;   trials  number of trials with each operator
+    spread       of operators and trials, see `study.boundary.experiment`: standard deviation of the logarithm
+    seed         of the random numbers
     box          range of walls to search; None: no limit
     Raises       ArgumentError  for a number outside its allowed range
     """

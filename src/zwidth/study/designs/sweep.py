@@ -160,12 +160,13 @@ def sweep(
     user_measures  measures of a user's own, by name (`measures.user_measures.load_measures`)
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with the stage, the number of designs done, and of all designs
-    workers        processes at most; left out: one for each core
-    time_limit     s that a design may take; one that takes longer is `out of time`, the others keep their values
+    workers        largest number of processes; left out: one for each core
+    time_limit     time after which a design or cell is given up [s]: it is `out of time`, the others keep their
+                   values
     cluster        address of a scheduler of dask.distributed, or "local"; left out: processes of this computer
     executor       what computes, opened before for many calls (`study.open_executor`), in place of workers,
                    time_limit and cluster
-    processor      "cuda": charts are computed on an NVIDIA GPU, by one process (`processors`); else "cpu"
+    processor      where charts are computed; "cuda": on an NVIDIA GPU, by one process (`processors`); else "cpu"
     Returns        a dataset with a dimension for each axis, named by its path, or with the one dimension `design`
                    of paired axes: for each measure its values, nan where a design has none, and NAME_status. Why
                    they have none stands in the attribute `notes`

@@ -444,10 +444,11 @@ def open_executor(
             for job in jobs:
                 run(job, executor=executor)
 
-    workers     number of processes; left out: one for each core. A cluster at an address has its own
+    workers     largest number of processes; left out: one for each core. A cluster at an address has its own
     cluster     address of a scheduler of dask.distributed, such as "tcp://192.168.1.5:8786"; "local": a cluster of
                 its own on this computer; left out: processes of this computer, without dask
-    time_limit  s that a cell may take; its process is ended then, and it is out of time. Left out: no limit
+    time_limit  time after which a design or cell is given up [s]: its process is ended, and it is out of time.
+                Left out: no limit
     Raises      ValueError    for numbers that are not positive, and workers of a cluster at an address
                 ClusterError  where the cluster cannot be used; the text says why
 

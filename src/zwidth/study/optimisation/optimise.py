@@ -67,9 +67,9 @@ def optimise(
     study     a study file, or a `Study` read with bounds
     store     a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress  is called with the stage, the number of designs done, and of all designs
-    workers   processes at most; left out: one for each core
+    workers   largest number of processes; left out: one for each core
     cluster   address of a dask scheduler, or "local"
-    time_limit  s that a design may take; one that takes longer has no values
+    time_limit  time after which a design or cell is given up [s]: it has no values
     Returns   the front, the baseline and how they were found; equal for equal studies, however it was divided
     Raises    DeviceError  with all faults of the study, measures that do not exist for this device among them
               what `executor.run` and `Store` raise

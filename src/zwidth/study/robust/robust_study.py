@@ -185,7 +185,7 @@ def robust_study(
                256, of a measured device 24
     unseen     number of random members tried afterwards (see `Violation`). Left out: 10000, of a measured device
                200
-    seed       seed of all random numbers: equal seeds give equal answers
+    seed       seed of the random numbers: equal seeds give equal answers
     tolerance  the search ends with a round that changes the area by a smaller share
     Raises     RangeError      for ranges that cannot be used
                DeviceError     for operators that cannot be read

@@ -95,12 +95,15 @@ def tolerance(
     stiffness, damping   of the wanted wall [N/m], [N s/m], whose probability is asked for; both or none
     frequency      of the hand's motion [Hz], for measures about it
     position, direction, assembly, model   of all devices, as for `Device.at`
-    samples, index_samples, quantiles_percent, seed   as in [draw] of a study file
+    samples        devices drawn; left out: 1000
+    index_samples  base samples of the sensitivity indices, a power of 2 from 32 on, 0 for none; left out: 512
+    quantiles_percent  of measures and of charts; left out: 5, 50 and 95
+    seed           seed of the random numbers; left out: 1
     store          a folder that keeps what is done, so that the same call goes on from there after it was stopped
     progress       is called with the stage, the number of devices done, and of all of them
-    workers        processes at most; left out: one for each core
+    workers        largest number of processes; left out: one for each core
     cluster        address of a dask scheduler, or "local"
-    time_limit     s that a device may take; one that takes longer is out of time
+    time_limit     time after which a design or cell is given up [s]: it is out of time
     Raises         DeviceError   with all faults of the arguments
                    MeasureError  for measures that do not exist for this device
                    TooLarge      where the devices would not fit into memory

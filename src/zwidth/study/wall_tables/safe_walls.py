@@ -60,17 +60,17 @@ def safe_walls(
     x, y, z     lowest and highest coordinate of the handle [m]; left out: the file's workspace, or what is reached
     cells       number of cells along each axis; left out: 20 along the longer side of a plane, 6 in space
     levels      bands of stiffness in each cell, at most 255
-    directions  into how many pieces each face of a square (a cube) of directions is cut: 1 for a table of all
-                directions; n for further tables of 2 n (3 n^2) sectors, at most 16
+    directions  further tables for sectors of directions: into how many pieces, at most 16, each face of a square
+                (a cube) of directions is cut; 1: none, n: 2 n (3 n^2) sectors
     margin      share by which stiffness and damping may both be off, at least 0 and below 1: the walls of the
                 table are stable with both times any factors from 1 - margin to 1 + margin
-    span        damping that every rectangle has at least [N s/m]; left out: the rectangles of the largest area
-    size_limit  bytes that the numbers of the exported program may take
+    span        damping range that every cell offers at least [N s/m]; left out: the rectangles of the largest area
+    size_limit  refuse a table that takes more bytes in the exported program
     assembly, model   as for `Device.at`
-    seed        of the random samples by which cells are tried
+    seed        of the random postures that cells are tried by
     store       a folder that keeps the cells that are done
     progress    is called with "cells", cells done, and cells of all
-    workers     processes at most; left out: one for each core
+    workers     largest number of processes; left out: one for each core
     Raises      ArgumentError   for numbers that are not allowed
                 WorkspaceError  for a table beyond the limit, a device under load, one that renders moments, a
                                 measured response
