@@ -16,9 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from docs._markdown import table
 from zwidth.show import zwidth
-from zwidth.show.cli.sections import GROUPS, OUTPUT, POSTURE, section_of
+from zwidth.show.cli.sections import GROUPS, POSTURE, section_of
 
 PAGE = Path(__file__).parent / "commands.md"
+SHARED = ("output", "as_json", "help")
 TABLE = re.compile(r"(<!-- (?P<what>\w+)(?: of (?P<name>[\w-]+))? -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -48,7 +49,7 @@ def _options(name: str) -> Iterator[list[str]]:
     rows: dict[tuple[str, str], list[str]] = {}
     for kind, one in kinds.items():
         for option in one.params:
-            if isinstance(option, click.Option) and section_of(option) not in (POSTURE, OUTPUT):
+            if isinstance(option, click.Option) and section_of(option) != POSTURE and option.name not in SHARED:
                 record = option.get_help_record(click.Context(one))
                 assert record is not None
                 rows.setdefault((record[0], record[1].removesuffix("  [required]")), []).append(kind)
