@@ -87,8 +87,8 @@ class Argument:
             return self.kind != "choice" or value in self.choices
         if not isinstance(value, Integral if self.kind == "whole" else Real) or isinstance(value, bool):
             return False
-        within: bool = self.least <= value <= self.most and self.above < value < self.below and abs(value) < inf
-        return within
+        x: Any = value
+        return bool(self.least <= x <= self.most and self.above < x < self.below and abs(x) < inf)
 
     def check(self, value: Any) -> None:
         """Raise ArgumentError for a number or a word that is not allowed.

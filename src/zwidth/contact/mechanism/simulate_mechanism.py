@@ -80,7 +80,7 @@ def simulate_mechanism(
     duration        simulated time [s]
     start_velocity  (2,) or (3,)  of the handle [m/s]; joints and motors move with it
     push            (3,) force at the handle [N], or (samples, 3), each held for one period
-    gravity         (3,) [m/s^2]; None: none
+    gravity         (3,) [m/s²]; None: none
     substeps        integration steps per sample; each is of fourth order
     counted         False: the encoders are read as finely as you like
     torque_limits   limit each motor by itself, "each", or scale all together, "together", so that the force keeps
