@@ -12,7 +12,7 @@ import zwidth
 from tests.cli.command_runner import run_command
 from tests.undrawn_figures import listed_svg
 from zwidth.measures import felt_chart
-from zwidth.show import caption_of_result, figure, save, write_caption
+from zwidth.show import caption_of_result, computer_text, figure, save, typed, write_caption
 from zwidth.show.figures.caption import MARGIN, SIZE, caption_of_facts
 from zwidth.show.figures.style import text_width, wrapped
 from zwidth.study import study_over
@@ -128,15 +128,31 @@ def test_axes_of_ones_own_are_left_alone():
         pyplot.close(one)
 
 
-def test_the_report_captions_all_its_figures(monkeypatch, tmp_path):
-    captions = []
+def test_every_figure_of_a_report_has_one_caption_which_is_that_of_the_page(monkeypatch, tmp_path):
+    below = []
     monkeypatch.setattr(
         "zwidth.show.report.figures.inline_svg",
-        lambda made, *rest: captions.append(made.get_supxlabel()) or listed_svg(made, *rest),
+        lambda made, *rest: below.append(made.get_supxlabel()) or listed_svg(made, *rest),
     )
     zwidth.load("hapkit-course").report(tmp_path / "a.html")
-    assert len(captions) > 3
-    assert all(text.startswith("Hapkit, course model") for text in captions)
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert len(below) == 2 * page.count("<figure ") > 6  # wide and narrow
+    assert not any(below)
+    assert page.count("<figcaption>") == page.count("<figure ")
+
+
+def test_what_is_varied_has_no_value():
+    study = study_over(zwidth.load("hapkit-course"), {"loop.delay_samples": [0, 1]}, "stiffness_max")
+    assert "delay," not in said(zwidth.run_study(study))
+    computer = zwidth.load("hapkit-course").controller
+    whole = "sampled every 1 ms, no delay, velocity not filtered"
+    for varied, left in (
+        ("plant.mass_kg", whole),
+        ("loop.delay_samples", "sampled every 1 ms, velocity not filtered"),
+        ("loop.sampling_period_s", "no delay, velocity not filtered"),
+        ("loop.velocity_filter.cutoff_Hz", "sampled every 1 ms, no delay"),
+    ):
+        assert typed(computer_text(computer, [varied])) == left
 
 
 def test_lines_fit_the_figure_and_the_axes_keep_their_height():

@@ -39,14 +39,23 @@ def omission_text(left_out: Sequence[str]) -> str:
     return "; ".join(parts + [text for text in left_out if text == STRAIGHT])
 
 
-def computer_text(controller: Controller) -> str:
-    """Computer and amplifier in one line."""
-    period = _given(controller.sampling_period, "s")
-    samples = "sample" if controller.delay == 1.0 else "samples"
-    delay = f"{_given(controller.delay)} {samples} of delay" if controller.delay else "no delay"
-    known = math.isfinite(controller.sampling_period)
-    parts = [f"sampled every {period}" if known else "sampling period not known", delay]
-    return ", ".join([*parts, *wall_law_parts(controller)])
+def computer_text(controller: Controller, varied: Sequence[str] = ()) -> str:
+    """Computer and amplifier in one line.
+
+    varied  paths of the device file that have no one value, which is left out
+    """
+    own = [path.removeprefix("loop.") for path in varied if path.startswith("loop.")]
+    parts = []
+    if "sampling_period_s" not in own:
+        known = math.isfinite(controller.sampling_period)
+        period = _given(controller.sampling_period, "s")
+        parts.append(f"sampled every {period}" if known else "sampling period not known")
+    if not any(key.startswith("delay") for key in own):
+        samples = "sample" if controller.delay == 1.0 else "samples"
+        parts.append(f"{_given(controller.delay)} {samples} of delay" if controller.delay else "no delay")
+    if all(key == "sampling_period_s" or key.startswith("delay") for key in own):
+        parts += wall_law_parts(controller)
+    return ", ".join(parts)
 
 
 def wall_law_parts(controller: Controller, *, spell_out: bool = False) -> list[str]:

@@ -69,12 +69,15 @@ def caption_of_facts(facts: Mapping[str, Any], controller: Controller | None) ->
     first = [part for part in _place(facts) if part]
     name = printable(str(facts.get("name") or ""))
     about = f"{name}: {', '.join(first)}" if name and first else name or ", ".join(first)
-    last = [] if controller is None else [computer_text(controller)]
-    if varied := facts.get("varied"):
+    varied = facts.get("varied") or ()
+    last = [] if controller is None else [computer_text(controller, varied)]
+    if varied:
         last.append(f"varied: {', '.join(map(printable, varied))}")
+    if error_band := facts.get("error_band"):
+        last.append(f"band: {error_band}")
     if left_out := facts.get("left_out"):
         last.append(omission_text(left_out))
-    return [paragraph for paragraph in (doubt, about, "; ".join(last)) if paragraph]
+    return [paragraph for paragraph in (doubt, about, "; ".join(filter(None, last))) if paragraph]
 
 
 def caption_of_result(result: Any) -> list[str]:
@@ -150,15 +153,17 @@ def wall_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def doubt_of_document(document: Mapping[str, Any]) -> dict[str, Any]:
-    """What is in doubt about a result, from its document; {} where it is decided."""
+    """What is in doubt about a result, and what its error band covers, from its document; {} of neither."""
     reason = document.get("reason")
-    return {"doubt": reason} if document.get("decided") is False and reason else {}
+    band = {"error_band": document["band"]["meaning"]} if document.get("band") else {}
+    return band | ({"doubt": reason} if document.get("decided") is False and reason else {})
 
 
 def facts_of_doubt(result: Any) -> dict[str, Any]:
-    """What is in doubt about a chart, or a study of charts; {} where nothing is."""
-    doubt = getattr(result, "doubt", "")
-    return {"doubt": doubt} if isinstance(doubt, str) and doubt else {}
+    """What is in doubt about a chart, or a study of charts, and what its error band covers; {} of neither."""
+    doubt, band = getattr(result, "doubt", ""), getattr(result, "band", None)
+    covered = {} if band is None else {"error_band": band.meaning}
+    return covered | ({"doubt": doubt} if isinstance(doubt, str) and doubt else {})
 
 
 def facts_of_wall(result: Any) -> dict[str, Any]:

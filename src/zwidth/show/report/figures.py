@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import isfinite
 from typing import Final
 
@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from zwidth.chart.chart import StabilityChart
 from zwidth.measures.felt import FeltChart
-from zwidth.show.figures.caption import caption_of_facts, caption_of_result, facts_of_point, write_caption
 from zwidth.show.figures.felt import draw_felt_chart
 from zwidth.show.figures.load_path import load_path_figure
 from zwidth.show.figures.mechanism_motion import draw_chain, draw_mechanism
@@ -30,19 +29,17 @@ def svg_figures(facts: Facts) -> dict[str, str]:
     """Name -> HTML of both drawings; "" for a figure that does not apply to this device."""
     device, chart, plant = facts.device, facts.chart, facts.loop.plant
     drawn = {
-        "chart": _svg(facts, "chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
+        "chart": _svg("chart", "Stability chart: stable walls", lambda ax: draw_chart(ax, chart))
         if chart.regions
         else "",
-        "models": _svg(
-            facts, "models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))
-        ),
+        "models": _svg("models", "Stability charts of simpler models", lambda ax: draw_models(ax, _models(facts))),
         "frequency": _svg(
-            facts, "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2
+            "frequency", "Frequency along the edge of stability", lambda ax: draw_frequency(ax, chart), 3.2
         )
         if facts.renders
         else "",
         "decay": _svg(
-            facts, "decay", "Contours of equal decay", lambda ax: draw_decay_contours(ax, facts.loop, chart=chart)
+            "decay", "Contours of equal decay", lambda ax: draw_decay_contours(ax, facts.loop, chart=chart)
         )
         if chart.regions
         else "",
@@ -55,14 +52,13 @@ def svg_figures(facts: Facts) -> dict[str, str]:
     if facts.posture is not None and facts.direction is not None:
         posture, direction = facts.posture, facts.direction
         drawn["device"] = _svg(
-            facts,
             "device",
             "The mechanism in its posture",
             lambda ax: draw_mechanism(ax, device, posture, direction),
             4.4,
         )
     elif (chain := as_chain(plant)) is not None:
-        drawn["device"] = _svg(facts, "device", "The plant", lambda ax: draw_chain(ax, plant, chain), 2.0)
+        drawn["device"] = _svg("device", "The plant", lambda ax: draw_chain(ax, plant, chain), 2.0)
     return drawn
 
 
@@ -72,15 +68,14 @@ def _load_path(facts: Facts) -> str:
     if path is None:
         return ""
     description = "Charts under pushes of the hand to both sides"
-    caption = caption_of_result(path)
-    return both_drawings("load", description, lambda width: load_path_figure(path, width, 4.6), caption)
+    return both_drawings("load", description, lambda width: load_path_figure(path, width, 4.6))
 
 
 def _felt(facts: Facts, felt: FeltChart | None) -> str:
     """Only where what is felt differs from what is commanded."""
     if felt is None or not isfinite(felt.limit) or not felt.regions:
         return ""
-    return _svg(facts, "felt", "Stable walls at the stiffness that is felt", lambda ax: draw_felt_chart(ax, felt))
+    return _svg("felt", "Stable walls at the stiffness that is felt", lambda ax: draw_felt_chart(ax, felt))
 
 
 def _sensitivities(facts: Facts) -> str:
@@ -89,7 +84,6 @@ def _sensitivities(facts: Facts) -> str:
         return ""
     height, narrow_height = (0.8 + row * max(rows, 2) for row in (0.24, 0.33))  # paths on two lines
     return _svg(
-        facts,
         "sensitivities",
         "Sensitivity of the largest stiffness to each number",
         lambda ax: draw_sensitivities(ax, facts.sensitivities, TOP, grouped=True),
@@ -101,7 +95,7 @@ def _sensitivities(facts: Facts) -> str:
 def _validity(facts: Facts, fits: Validity | None) -> str:
     if fits is None or not len(fits.frequency) or not any(len(fit.error) for fit in fits.fits):
         return ""
-    return _svg(facts, "validity", "Error of simpler models by frequency", lambda ax: draw_validity(ax, fits))
+    return _svg("validity", "Error of simpler models by frequency", lambda ax: draw_validity(ax, fits))
 
 
 def _models(facts: Facts) -> dict[str, StabilityChart]:
@@ -113,7 +107,6 @@ def _models(facts: Facts) -> dict[str, StabilityChart]:
 
 
 def _svg(
-    facts: Facts,
     name: str,
     description: str,
     draw: Callable[[Axes], None],
@@ -121,7 +114,6 @@ def _svg(
     narrow_height: float | None = None,
 ) -> str:
     """Both drawings of a figure; the style sheet shows the one that suits the screen."""
-    caption = caption_of_facts(facts_of_point(facts.point), facts.point.controller)
     heights = {WIDTHS["wide"]: height, WIDTHS["narrow"]: narrow_height or height}
 
     def drawn(width: float) -> Figure:
@@ -129,18 +121,19 @@ def _svg(
         draw(ax)
         return made
 
-    return both_drawings(name, description, drawn, caption)
+    return both_drawings(name, description, drawn)
 
 
-def both_drawings(name: str, description: str, draw: Callable[[float], Figure], caption: Sequence[str]) -> str:
+def both_drawings(name: str, description: str, draw: Callable[[float], Figure]) -> str:
     """Both drawings of a figure as HTML; the style sheet shows the one that suits the screen.
+
+    The caption is the page's, below them: device, posture and computer stand once, at its head.
 
     draw  makes the figure of a width [inches]
     """
     drawings = []
     for kind, width in WIDTHS.items():
         with context():
-            made = draw(width)
-            write_caption(made, caption)
-            drawings.append(f'<div class="{kind}">{inline_svg(made, f"{name}-{kind}", description)}</div>')
+            drawing = inline_svg(draw(width), f"{name}-{kind}", description)
+        drawings.append(f'<div class="{kind}">{drawing}</div>')
     return "\n".join(drawings)

@@ -17,7 +17,7 @@ from zwidth.chart.chart import stability_chart
 from zwidth.device.faults import comma_list, plural
 from zwidth.errors import ChartError, DeviceError
 from zwidth.measures.definition import FAILED, OUT_OF_TIME
-from zwidth.show.figures.caption import caption_of_facts, facts_of_point, facts_of_study
+from zwidth.show.figures.caption import caption_of_facts, facts_of_study
 from zwidth.show.figures.optimise import front_figure
 from zwidth.show.figures.stability import draw_models
 from zwidth.show.figures.style import context, figure
@@ -44,6 +44,7 @@ def optimisation_page(found: Optimisation) -> str:
             demands=_demands(found),
             front=_front(found),
             percent=percent,
+            setting="; ".join(caption_of_facts(facts_of_study(found.study), None)),
             picture={"front": Markup(_front_drawing(found)), "charts": Markup(_charts(found))},
             version=__version__,
         )
@@ -102,15 +103,14 @@ def _front(found: Optimisation) -> tuple[list[str], list[list[str]]]:
 def _front_drawing(found: Optimisation) -> str:
     if not len(found.front):
         return ""
-    caption = caption_of_facts(facts_of_study(found.study), None)
-    return both_drawings("front", "The front", lambda width: front_figure(found, width, 3.9), caption)
+    return both_drawings("front", "The front", lambda width: front_figure(found, width, 3.9))
 
 
 def _charts(found: Optimisation) -> str:
     """The charts before and after where the first objective is worst; "" where neither can be drawn."""
     if found.knee is None:
         return ""
-    charts, caption = {}, list[str]()
+    charts = {}
     cases: list[tuple[str, dict[str, Any], Any]] = []
     if found.baseline is not None:
         cases.append(("as it is", {}, found.baseline.cells[0]))
@@ -121,7 +121,6 @@ def _charts(found: Optimisation) -> str:
             charts[name] = stability_chart(point.loop, decay=False).drawn()
         except (DeviceError, ValueError, ChartError):
             continue
-        caption = caption_of_facts(facts_of_point(point) | {"position_m": None, "directions": None}, None)
     if not any(chart.regions for chart in charts.values()):
         return ""
 
@@ -135,7 +134,7 @@ def _charts(found: Optimisation) -> str:
             draw_models(ax, charts, window)
         return made
 
-    return both_drawings("charts", "Stability charts before and after", draw, caption)
+    return both_drawings("charts", "Stability charts before and after", draw)
 
 
 WITHOUT: Final = {FAILED: "failed", OUT_OF_TIME: "ran out of time"}
