@@ -14,7 +14,7 @@ def bar_of(values, unit=""):
     """Tick labels and label of the bar of values."""
     drawing, ax = figure()
     colour_bar(ax, *bands_of(np.asarray(values)), "Title", unit)
-    bar = drawing.axes[1]
+    (bar,) = ax.child_axes
     drawing.canvas.draw()
     return [tick.get_text() for tick in bar.get_yticklabels()], bar.get_ylabel()
 

@@ -25,5 +25,18 @@ def test_shades_tell_the_sets_apart_in_grey_and_edges_where_they_coincide():
 
     shades = [lightness(fill) for fill, *_ in FILLS.values()]
     assert all(a - b > 40 for a, b in pairwise(shades))
-    upwards = sorted(FILLS.values(), key=lambda look: look[3])
-    assert all(below[2] > 1.3 * above[2] for below, above in pairwise(upwards))
+    lowest, *above = sorted(FILLS.values(), key=lambda look: look[3])
+    assert lowest[2] == "-"
+    assert len({(edge, dashes) for _, edge, dashes, _ in FILLS.values()}) == len(FILLS)
+    for _, _, (_, (drawn, gap)), _ in above:  # what lies below is seen through the gaps
+        assert gap > 0.4 * drawn
+
+
+def test_small_sets_are_enlarged_beside_the_axes():
+    made, ax = figure(6.2, 4.2)
+    draw_guarantees(ax, find_guarantees(Loop(mass(0.03, 1.0), Controller(0.001))))
+    made.draw_without_rendering()
+    (inset,) = ax.child_axes
+    assert not inset.get_window_extent().overlaps(ax.get_window_extent())
+    assert inset.get_window_extent().x1 <= made.bbox.x1
+    assert inset.get_xlim()[1] < 0.2 * ax.get_xlim()[1]

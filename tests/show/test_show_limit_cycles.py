@@ -27,10 +27,10 @@ def test_growth_is_seen_on_both_sides_of_zero_and_cycles_are_named():
     swings = np.isfinite(found.growth)
     assert ax.lines[0].get_ydata()[swings] == pytest.approx(found.growth[swings])
     small, large = (cycle.amplitude for cycle in found.cycles)
-    assert texts(ax)[1].startswith("larger ones grow, smaller ones die: 2.015 mm, 10.06 Hz")
+    assert texts(ax)[1].startswith("unstable limit cycle: 2.015 mm, 10.06 Hz")
     assert texts(ax)[2].startswith("stable limit cycle: ")
     left, right = ax.get_xlim()
-    assert left <= small / 50.0
+    assert left <= small / 5.0
     assert 2.0 * large <= right <= 2.0 * found.largest_motion
     low, high = ax.get_ylim()
     assert low < 0.0 < np.max(found.growth) < high
@@ -78,7 +78,7 @@ def test_what_is_farther_than_the_device_moves_is_grey():
     draw_balance(ax, found)
     assert ax.get_xlim()[1] == pytest.approx(2.0 * 2.5e-3)
     said = texts(ax)
-    assert any(line.startswith("larger ones grow, smaller ones die: 2.015 mm") for line in said)
+    assert any(line.startswith("unstable limit cycle: 2.015 mm") for line in said)
     assert any(line.startswith("predicted beyond the range: ") for line in said)
     assert "farther than the device moves, 2.500 mm" in said
     made.draw_without_rendering()

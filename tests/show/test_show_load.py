@@ -15,7 +15,7 @@ from tests.model.beam_devices import slides
 from zwidth.device import new_device
 from zwidth.measures import MISSING, OK, OUT_OF_REACH, STATUS
 from zwidth.model import PRISMATIC, Load
-from zwidth.show import MARKS, gather, keys_of_moments, load_path_figure, load_text, typed
+from zwidth.show import MARKS, gather, keys_of_moments, load_path_figure, load_text, percent, typed
 from zwidth.show.figures.load_path import COLOURS, draw_close_up
 from zwidth.show.figures.study import SYMBOLS
 from zwidth.show.load_text import balance_text, drive_rows, pushes_text
@@ -23,6 +23,7 @@ from zwidth.show.report import load as section
 from zwidth.study import LoadPath
 from zwidth.study.loaded_charts import PushedChart
 
+BENT = {f"drives.motor-{side}.backward_stiffness_Nm_per_rad": 0.3 for side in ("right", "left")}
 WEAK = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
 
 
@@ -146,7 +147,8 @@ def test_the_balance_names_a_force_across_only_where_there_is_one(device):
 
 
 @pytest.mark.parametrize(("width", "columns"), [(7.6, 2), (3.75, 1)])
-def test_every_push_has_its_colour_in_every_panel(path, width, columns):
+def test_every_push_has_its_colour_in_every_panel(device, width, columns):
+    path = device.with_(BENT).load_path(4.0, 5)
     made = load_path_figure(path, width)
     outlines, close, stiffness, growth, bar = made.axes
     made.draw_without_rendering()
@@ -161,6 +163,24 @@ def test_every_push_has_its_colour_in_every_panel(path, width, columns):
         assert {dot.get_color() for dot in dots} == colours
     assert len(bar.get_xticks()) == len(path.steps)
     pyplot.close("all")
+
+
+def test_a_change_that_is_next_to_nothing_looks_so_and_is_said(path):
+    made = load_path_figure(path)
+    outlines, stiffness, growth, _ = made.axes  # no close-up
+    made.draw_without_rendering()
+    assert np.ptp(path.stiffness_max) < 0.001 * path.unpushed.stiffness_max
+    low, high = stiffness.get_ylim()
+    assert low <= -1.0 < 1.0 <= high
+    assert growth.get_ylim()[0] <= -1.0
+    share = np.abs(path.stiffness_max / path.unpushed.stiffness_max - 1.0).max()
+    assert f"changes by {percent(share)} at most" in stiffness.get_legend().get_title().get_text()
+    assert outlines.get_position().height > 1.5 * growth.get_position().height
+
+
+def test_a_device_without_free_motions_has_no_panel_of_growth():
+    made = load_path_figure(template("paddle").load_path(1.0, 3))
+    assert [ax.get_ylabel() for ax in made.axes[:-1]] == ["Virtual damping B [Ns/m]", "Change of stiffness [%]"]
 
 
 def test_the_close_up_shows_every_stiffest_wall_on_its_own_curve(path):
@@ -182,7 +202,7 @@ def test_the_close_up_shows_every_stiffest_wall_on_its_own_curve(path):
 
 def test_pushes_without_an_answer_are_crosses(device):
     weak = device.with_(WEAK).load_path(24.0, 7)
-    _, _, stiffness, growth, _ = load_path_figure(weak).axes
+    _, stiffness, growth, _ = load_path_figure(weak).axes
     for ax in (stiffness, growth):
         (crosses,) = [line for line in ax.lines if line.get_marker() == "x"]
         assert crosses.get_xdata().tolist() == [-24.0, -16.0, 16.0, 24.0]
@@ -193,7 +213,7 @@ def test_a_path_without_any_wall_says_so(device):
     made = load_path_figure(unstable.load_path(2.0, 3))
     made.draw_without_rendering()
     texts = [text.get_text() for ax in made.axes for text in ax.texts]
-    assert texts.count("no wall is stable") == 2  # in the close-up, and of the largest stiffness
+    assert texts.count("no wall is stable") == 1  # of the largest stiffness
     assert made.axes[0].lines  # of walls with negative damping some are stable
 
 
@@ -217,7 +237,6 @@ def test_every_status_of_a_map_or_a_study_has_its_mark():
 # --- the report's section ---------------------------------------------------------------------------
 
 GRAVITY = {"load.gravity_m_per_s2": [0.0, -9.81]}
-BENT = {f"drives.motor-{side}.backward_stiffness_Nm_per_rad": 0.3 for side in ("right", "left")}
 
 
 def facts(name, settings):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
@@ -18,11 +20,13 @@ from zwidth.measures import (
     OUT_OF_REACH,
     OUT_OF_TIME,
     SINGULAR,
+    STATUS,
     UNDECIDED,
     Measure,
 )
 from zwidth.show import MARKS, area_text, draw_map, figure, map_figure, percent, save
-from zwidth.study import common_area, parse_requirement, plane_of, workspace_map
+from zwidth.show.figures.map import draw_safe_walls
+from zwidth.study import common_area, parse_requirement, plane_of, safe_walls, workspace_map
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +54,8 @@ def test_the_bar_names_the_measure_and_its_unit(dataset, device):
         ("stiffness", "Structural stiffness [kN/m]"),
     ):
         drawing = map_figure(dataset, name, device)
-        ax, bar = drawing.axes
+        (ax,) = drawing.axes
+        (bar,) = ax.child_axes
         assert bar.get_ylabel() == said
         drawing.canvas.draw()
         assert bar.get_ylabel() == said  # whatever a locator may think
@@ -169,7 +174,7 @@ def test_the_largest_of_numbers_are_drawn(dataset, device):
     huge["rigid_mass"].values[:] = np.where(np.isnan(dataset["rigid_mass"].values), np.nan, 10.0 ** (1000.0 * x))
     drawing = map_figure(huge, "rigid_mass", device)
     drawing.canvas.draw()
-    assert len(drawing.axes[1].get_yticklabels()) > 4
+    assert len(drawing.axes[0].child_axes[0].get_yticklabels()) > 4
 
 
 @pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
@@ -183,7 +188,8 @@ def test_it_draws_into_given_axes(dataset, device):
     drawing, ax = figure(5.0, 4.0)
     draw_map(ax, dataset, "isotropy", device)
     assert ax.collections
-    assert len(drawing.axes) == 2
+    assert drawing.axes == [ax]
+    assert len(ax.child_axes) == 1
 
 
 def test_the_rendered_direction_is_shown_where_it_matters(dataset, device):
@@ -194,3 +200,21 @@ def test_the_rendered_direction_is_shown_where_it_matters(dataset, device):
     start, end = np.array(arrow.get_position()), np.array(arrow.xy)
     np.testing.assert_allclose((end - start) / np.linalg.norm(end - start), [0.0, 1.0], atol=1e-12)
     assert not arrows("isotropy")
+
+
+def test_safe_walls_are_outlined_and_cells_without_any_are_named():
+    bands = safe_walls(load("published-two-mass"), levels=4, workers=1)
+    _, ax = figure()
+    draw_safe_walls(ax, bands)
+    steps, rectangle = ax.patches
+    one = bands.rectangle(0)
+    assert rectangle.get_bbox().bounds == pytest.approx((0.0, one.low, one.stiffness, one.high - one.low))
+    assert steps.get_data().values.tolist() == bands.ranges[0, 0, :, 1].tolist()
+    assert len(ax.get_legend().get_texts()) == 2
+    cells = safe_walls(load("five-bar"), x=(-0.05, 0.05), y=(0.2, 0.25), cells=(2, 1), levels=2, workers=1)
+    partly = replace(cells, status=np.array([OK, NO_VALUE], np.uint8), level=cells.level * [1, 0])
+    _, ax = figure()
+    draw_safe_walls(ax, partly)
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [STATUS[NO_VALUE]]
+    (bar,) = ax.child_axes
+    assert bar.get_ylabel() == "Safe stiffness, every direction [kN/m]"

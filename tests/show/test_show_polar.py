@@ -1,8 +1,10 @@
 """The polar figure: what is drawn is what was computed."""
 
 import numpy as np
+import pytest
 
 from zwidth.chart import ByDirection, circle
+from zwidth.chart.polar import OUT_OF_MOTION
 from zwidth.show import figure, save
 from zwidth.show.figures.polar import draw_polar
 
@@ -45,3 +47,20 @@ def test_directions_without_an_answer_are_marked_and_open_the_outline():
 def test_nothing_at_all_can_be_drawn(tmp_path):
     drawing, _ = draw_directions(directions_of([np.nan] * 4, ["no stable wall"] * 4))
     assert save(drawing, tmp_path / "none.png").stat().st_size > 0
+
+
+def test_a_handle_on_one_line_has_bars_and_no_crosses():
+    out = OUT_OF_MOTION
+    _, ax = draw_directions(directions_of([np.nan, 2000.0, np.nan, 2000.0], [out, "ok", out, "ok"]))
+    (bars,) = ax.collections
+    ends = np.array([segment[1] for segment in bars.get_segments()])
+    assert ends == pytest.approx(np.array([[0.0, 2000.0], [0.0, -2000.0]]), abs=1e-9)
+    assert [line for line in ax.lines if line.get_marker() == "x"] == []
+    texts = [text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts()]
+    assert texts == ["largest stiffness, only where the handle moves", "largest: 2.000 kN/m along 90°"]
+
+
+def test_equal_directions_have_one_number():
+    _, ax = draw_directions(directions_of([2000.0] * 5))
+    texts = [text.get_text().replace("\u00a0", " ") for text in ax.get_legend().get_texts()]
+    assert "2.000 kN/m along every direction" in texts

@@ -53,9 +53,9 @@ def hypercube(count=30, lost=0):
 
 
 def panels_of(made):
-    """The panels, colour bars left out, after drawing."""
+    """The panels, after drawing."""
     made.canvas.draw()
-    return [ax for ax in made.axes if not hasattr(ax, "_colorbar")]
+    return made.axes
 
 
 def texts(made):
@@ -73,6 +73,15 @@ def test_curves_over_one_axis_a_panel_for_each_column():
     assert panels[0].get_ylabel() == "Stiffness [kN/m]"
     assert panels[1].get_ylabel() == "Mass [kg]"
     assert [panel.get_xlabel() for panel in panels] == ["", "length_m [m]"]
+
+
+def test_axes_end_where_the_designs_do():
+    heat = study_figure(dataset("length_m", "period_s", columns=("mass",)))
+    assert heat.axes[0].get_xlim() == (LENGTHS[0], LENGTHS[-1])
+    (panel,) = panels_of(study_figure(dataset("length_m", columns=("mass",))))
+    low, high = panel.get_xlim()
+    assert 0.0 < LENGTHS[0] - low < 0.05 * (LENGTHS[-1] - LENGTHS[0])
+    assert 0.0 < high - LENGTHS[-1] < 0.05 * (LENGTHS[-1] - LENGTHS[0])
 
 
 def test_a_line_for_each_assembly_in_order_of_the_legend():

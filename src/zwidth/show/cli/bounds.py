@@ -50,7 +50,6 @@ class BoundsCommand(Command):
         "exact_largest_N_per_m",
         "exact_damping_at_largest_Ns_per_m",
     )
-    size = (5.6, 4.6)
     may_be_undecided = True
 
     def compute(self, case: CommandLine) -> BoundsComparison:

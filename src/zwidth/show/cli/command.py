@@ -89,7 +89,6 @@ class Command:
     examples          command lines
     options           click's decorators of its own options
     outputs           endings that --output takes;   output_help  what they are
-    size              of the figure [inches]
     keys              of its answer, beside the circumstances: null where there is no answer
     linear            does the answer leave out the nonlinear parts?
     may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
@@ -106,7 +105,6 @@ class Command:
     options: ClassVar[tuple[Callable[[Any], Any], ...]] = ()
     outputs: ClassVar[tuple[str, ...]] = FIGURES + DATA
     output_help: ClassVar[str] = "Write a figure (.png .svg .pdf) or the data (.csv .json)."
-    size: ClassVar[tuple[float, float]] = (5.6, 3.9)
     keys: ClassVar[tuple[str, ...]] = ()
     linear: ClassVar[bool] = True
     may_be_undecided: ClassVar[bool] = False
@@ -166,10 +164,10 @@ class Command:
 
     def draw(self, case: CommandLine, result: Any) -> Figure:
         """The answer as a figure: as the result draws itself."""
-        from zwidth.show.figures.plots import drawing_of
+        from zwidth.show.figures.plots import drawing_of, size_of
         from zwidth.show.figures.style import figure
 
-        made, ax = figure(*self.size)
+        made, ax = figure(*size_of(result))
         drawing_of(result)(ax, result)
         return made
 

@@ -82,11 +82,12 @@ class GuaranteesCommand(Command):
 
     def draw(self, case: CommandLine, result: Guarantees) -> Figure:
         from zwidth.show.figures.guarantees import draw_couplings, draw_guarantees
+        from zwidth.show.figures.plots import size_of
         from zwidth.show.figures.style import figure
 
-        drawing, ax = figure()
+        drawing, ax = figure(*size_of(result))
         if result.couplings is not None and result.couplings.reason is None:
-            drawing.set_size_inches(5.6, 8.0)
+            drawing.set_size_inches(6.2, 8.0)
             ax.set_subplotspec(drawing.add_gridspec(2, 1)[0])
             draw_couplings(drawing.add_subplot(2, 1, 2), result.couplings)
         draw_guarantees(ax, result)

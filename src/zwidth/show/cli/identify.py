@@ -27,8 +27,6 @@ from zwidth.show.units import typed, uncertain
 from zwidth.unit_text import unit_text
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from zwidth.identify.identification import Estimate, Identification
 
 
@@ -159,11 +157,6 @@ class IdentifyCommand(Command):
         write_text(path, edited_text(path, values, sources))
         return {"written": path}
 
-    def draw(self, case: CommandLine, result: Identification) -> Figure:
-        from zwidth.show.figures.identify import identification_figure
-
-        return identification_figure(result, *self.size)
-
     def caption_facts(self, case: CommandLine, document: Mapping[str, Any]) -> dict[str, Any]:
         return self.circumstances(case) if self.takes_point else {"name": case.device.name}
 
@@ -247,7 +240,6 @@ class BoundaryCommand(IdentifyCommand):
     )
     options = options_of(IDENTIFY["boundary"])
     takes_point = True
-    size = (5.6, 4.4)
 
 
 class ImpedanceCommand(IdentifyCommand):

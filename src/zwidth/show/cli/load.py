@@ -51,7 +51,6 @@ class LoadCommand(Command):
         "stiffness_max_fixed_surface_N_per_m",
         "fixed_surface_status",
     )
-    size = (7.6, 5.4)
     takes_responses = True  # which it refuses like every device without a mechanism
 
     def check(self, case: CommandLine) -> None:
@@ -101,7 +100,7 @@ class LoadCommand(Command):
     def draw(self, case: CommandLine, result: LoadPath) -> Figure:
         from zwidth.show.figures.load_path import load_path_figure
 
-        return load_path_figure(result, *self.size)
+        return load_path_figure(result)
 
 
 def _bare(case: CommandLine) -> Device:

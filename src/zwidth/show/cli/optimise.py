@@ -135,7 +135,7 @@ class OptimiseCommand(Command):
     def draw(self, case: CommandLine, result: Optimisation) -> Figure:
         from zwidth.show.figures.optimise import front_figure
 
-        return front_figure(result, *self.size)
+        return front_figure(result)
 
 
 def _check_designs(folder: Path, study: Study) -> None:

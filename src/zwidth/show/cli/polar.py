@@ -36,7 +36,6 @@ class PolarCommand(Command):
         "frequency_at_stiffness_max_Hz",
         "status",
     )
-    size = (4.6, 5.2)
     takes_responses = True  # which it refuses like every device without a mechanism
 
     def check(self, case: CommandLine) -> None:

@@ -68,7 +68,6 @@ class RobustCommand(Command):
         "violation",
         "excluding",
     )
-    size = (5.6, 4.6)
     may_be_undecided = True
 
     def parse(self, case: CommandLine) -> dict[str, Any]:

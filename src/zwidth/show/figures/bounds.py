@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -17,7 +18,7 @@ from zwidth.arrays import Floats
 from zwidth.chart.chart import StabilityChart
 from zwidth.conditions import Bound
 from zwidth.show.figures.stability import frame
-from zwidth.show.figures.style import BLACK, GREY, LINES, STABLE, fitted_columns
+from zwidth.show.figures.style import BLACK, LINES, STABLE, fitted_columns
 from zwidth.show.units import quantity
 
 DAMPINGS: Final = 1001  # at which each line is computed
@@ -28,7 +29,9 @@ STEPS: Final = 60  # places along a line that are tried for its number
 BESIDE: Final = (0.22, 0.06)  # where the numbers of small lines stand, as shares of the view
 SMALL: Final = 0.1  # share of the view below which a line's number stands beside it
 TEXT_SIZE: Final = 7.0
-LETTERS: Final = 40  # of a line of the legend
+LETTERS: Final = 44  # of a line of the legend
+# Authors and year, or an equation of the thesis; what a source tells beyond stands in the table.
+SHORT_SOURCE: Final = re.compile(r".*?(\b\d{4}\b|eq\. [\d.]+(-[\d.]+)?( and [\d.]+)?)")
 NOT_MET: Final = "assumptions not met:"
 
 
@@ -52,9 +55,10 @@ class BoundLine:
 def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None) -> None:
     """The stable walls with K, B >= 0, and the line of each condition that has one, numbered.
 
-    Conditions whose assumptions are met are drawn in colours, that with the smallest limit named as the one that
-    binds. The others are thin and grey, and listed apart. Conditions that nearly coincide share a line, which has
-    all their numbers. What has no line in view is listed without a number. The view is that of the exact chart.
+    Each line has its colour and dashes, and the legend the authors of each condition. Conditions whose assumptions
+    are met are thick, that with the smallest limit named as the one that binds; the others are thin, and listed
+    apart. Conditions that nearly coincide share a line, which has all their numbers. What has no line in view is
+    listed without a number. The view is that of the exact chart.
 
     chart  None: only the conditions, over the dampings at which they admit stiffness
     """
@@ -66,12 +70,13 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
     not_met = _lines([bound for bound in known if not bound.holds], dampings, top[0], numbers)
     stable: list[Any] = []
     if chart is not None:
-        stable += [Patch(facecolor=STABLE, edgecolor=BLACK, linewidth=0.8, label="stable, exact")]
+        text = "stable, exact" if chart.regions else "stable, exact: no wall"
+        stable += [Patch(facecolor=STABLE, edgecolor=BLACK, linewidth=0.8, label=text)]
         for ring in chart.regions:
             ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none"))
         for arc in chart.boundary:
             ax.plot(arc.stiffness, arc.damping, color=BLACK, linewidth=0.8)
-    looks = [_look(n) for n in range(len(met))] + [{"color": GREY, "linewidth": 0.7}] * len(not_met)
+    looks = [_look(n, met=n < len(met)) for n in range(len(met) + len(not_met))]
     for line, look in zip((*met, *not_met), looks, strict=True):
         ax.plot(line.stiffness, dampings, zorder=2.5 if line in met else 1.5, **look)
     _number_lines(ax, [*met, *not_met], looks, dampings, top)
@@ -82,7 +87,7 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
         entries = [*_filled(first, rows), *_filled(second, rows)]
     else:
         entries = [*first, *second]
-    frame(ax, (0.0, top[0], 0.0, top[1]), empty=chart is not None and not chart.regions)
+    frame(ax, (0.0, top[0], 0.0, top[1]), empty=False)
     made = ax.legend(
         handles=entries,
         loc="lower left",
@@ -99,10 +104,12 @@ def draw_bounds(ax: Axes, bounds: Iterable[Bound], chart: StabilityChart | None)
     made.set_zorder(6.0)
 
 
-def _look(n: int) -> dict[str, Any]:
-    """Colour, dashes and width of the n-th line of a condition whose assumptions are met."""
-    colour, dashes = LINES[1:][n % (len(LINES) - 1)]
-    return {"color": colour, "linestyle": dashes, "linewidth": 2.2 if n >= len(LINES) - 1 else 1.6}
+def _look(n: int, *, met: bool) -> dict[str, Any]:
+    """Colour, dashes and width of the n-th line; beyond the number of colours each has the next one's dashes."""
+    coloured = LINES[1:]
+    turns, place = divmod(n, len(coloured))
+    dashes = coloured[(place + turns) % len(coloured)][1]
+    return {"color": coloured[place][0], "linestyle": dashes, "linewidth": 1.8 if met else 1.0}
 
 
 def _lines(bounds: Sequence[Bound], dampings: Floats, widest: float, numbers: Any) -> list[BoundLine]:
@@ -140,12 +147,18 @@ def _entries(
     for n, bound, look in sorted(drawn, key=lambda one: one[0]):
         strictest = met and 0.0 < bound.stiffness_max <= lowest
         limit = f", at most {quantity(bound.stiffness_max, 'N/m')}: strictest" if strictest else ""
-        text = "\n".join(wrap(f"{n}\u00a0 {bound.name}{limit}", LETTERS, break_long_words=False))
+        text = "\n".join(wrap(f"{n}\u00a0 {_named(bound)}{limit}", LETTERS, break_long_words=False))
         entries.append(Line2D([], [], label=text, **look))
     drawn_bounds = [bound for _, bound, _ in drawn]
     unseen = (bound for bound in known if bound.holds == met and bound not in drawn_bounds)
-    texts = (f"{bound.name}: no line in view" for bound in unseen)
+    texts = (f"{_named(bound)}: no line in view" for bound in unseen)
     return entries + [_without_line("\n".join(wrap(text, LETTERS))) for text in texts]
+
+
+def _named(bound: Bound) -> str:
+    """A condition with its authors and year, or the equation that it has in the thesis."""
+    short = SHORT_SOURCE.match(bound.source)
+    return f"{bound.name}, {short[0] if short else bound.source}"
 
 
 def _filled(entries: list[Any], rows: int) -> list[Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from textwrap import wrap
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 
+from zwidth.arrays import Floats
 from zwidth.guarantees.coupling import Couplings
 from zwidth.guarantees.guarantees import Guarantee, Guarantees
 from zwidth.guarantees.region import Region
@@ -17,19 +18,18 @@ from zwidth.show.figures.stability import Window, frame
 from zwidth.show.figures.style import BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, draw_empty, label, legend_above
 from zwidth.show.units import quantity
 
-# Fill, edge, and the edge's width and place above the fills; the sets get darker inwards. The narrower edge lies
-# on the wider, so that both are seen where two sets share it.
+# Fill, colour and dashes of the edge, and its place above the fills; the sets get darker inwards. The upper edges
+# have gaps, through which those below are seen where sets share an edge.
 FILLS: Final = {
-    "stable": ("#EEF3F7", BLACK, 0.8, 2.3),
-    "robust": ("#D8E3EC", GREEN, 4.8, 2.0),
-    "spring-stable": ("#BFD1E0", BLUE, 3.4, 2.1),
-    "passive": ("#A0BAD0", VERMILION, 1.5, 2.2),
+    "stable": ("#EEF3F7", BLACK, "-", 2.0),
+    "robust": ("#D8E3EC", GREEN, (0, (7, 3)), 2.1),
+    "spring-stable": ("#BFD1E0", BLUE, (0, (4, 4)), 2.2),
+    "passive": ("#A0BAD0", VERMILION, (0, (1.2, 3)), 2.3),
 }
+EDGE: Final = 1.3  # points, width of an edge
 SMALL: Final = 0.1  # share of the view below which a set is drawn enlarged, too
-# Left, bottom, width and height of the enlarged part, as shares of the axes; how many widths of the view are
-# shown then, so that it hides nothing.
-INSET: Final = (0.74, 0.55, 0.25, 0.38)
-BESIDE: Final = 1.5
+# Left, bottom, width and height of the enlarged part, as shares of the axes: beside them, it hides nothing.
+INSET: Final = (1.18, 0.0, 0.62, 1.0)
 INSET_ROOM: Final = 0.15  # of the small sets' size, about them
 REASON: Final = 40  # letters of a line
 ROOM: Final = 0.05  # of the box of what is shown, beside it
@@ -53,29 +53,26 @@ def draw_guarantees(ax: Axes, guarantees: Guarantees, window: Window | None = No
     _draw_sets(ax, guarantees)
     view = window or _box(guarantees)
     small = [ring for one in guarantees.guarantees for ring in one.region.rings if _is_small(ring, view)]
-    if not small or window is not None:
-        frame(ax, view, empty=not guarantees.chart.regions)
-    else:
-        frame(ax, (view[0], view[0] + BESIDE * (view[1] - view[0]), *view[2:]), empty=False)
-        inset = ax.inset_axes(INSET, zorder=5.0)
-        _draw_sets(inset, guarantees)
-        corners = np.vstack(small)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        room = INSET_ROOM * (high - low)
-        limits = [float(x) for pair in zip(low - room, high + room, strict=True) for x in pair]
-        frame(inset, (limits[0], limits[1], limits[2], limits[3]), empty=False)
-        inset.tick_params(labelsize=6.5, length=2.0, pad=1.5)
-        inset.locator_params(nbins=4)
-        for axis in (inset.xaxis, inset.yaxis):
-            axis.label.set_fontsize(6.5)
-            axis.labelpad = 1.0
-        for spine in inset.spines.values():
-            spine.set(visible=True, color=GREY, linewidth=0.8)
-        ax.indicate_inset(
-            (limits[0], limits[2], limits[1] - limits[0], limits[3] - limits[2]), edgecolor=GREY, alpha=1.0
-        )
-        inset.set_title("enlarged", fontsize=6.5, pad=2.0)
+    frame(ax, view, empty=not guarantees.chart.regions)
+    if small and window is None:
+        _enlarge(ax, guarantees, np.vstack(small))
     legend_above(ax, columns=2)
+
+
+def _enlarge(ax: Axes, guarantees: Guarantees, walls: Floats) -> None:
+    """The part about some walls (k, 2) [K, B] once more, enlarged beside the axes."""
+    inset = ax.inset_axes(INSET, zorder=5.0)
+    _draw_sets(inset, guarantees)
+    low, high = walls.min(axis=0), walls.max(axis=0)
+    room = INSET_ROOM * (high - low)
+    (K0, B0), (K1, B1) = (low - room).tolist(), (high + room).tolist()
+    frame(inset, (K0, K1, B0, B1), empty=False)
+    inset.locator_params(nbins=4)
+    inset.set_ylabel("")
+    for spine in inset.spines.values():
+        spine.set(visible=True, color=GREY, linewidth=0.8)
+    ax.indicate_inset((K0, B0, K1 - K0, B1 - B0), edgecolor=GREY, alpha=1.0)
+    inset.set_title("enlarged", pad=2.0, loc="right")
 
 
 def _is_small(ring: np.ndarray, view: Window) -> bool:
@@ -100,9 +97,9 @@ def _draw_sets(ax: Axes, guarantees: Guarantees) -> None:
 
 def draw_region(ax: Axes, region: Region) -> None:
     """The walls of one guarantee; why there are none, where there are none."""
-    fill, edge, width, _ = FILLS["passive"]
+    fill, edge, *_ = FILLS["passive"]
     for ring in region.rings:
-        ax.add_patch(Polygon(ring, facecolor=fill, edgecolor=edge, linewidth=width))
+        ax.add_patch(Polygon(ring, facecolor=fill, edgecolor=edge, linewidth=EDGE))
     corners = np.vstack(region.rings) if region.rings else np.array([[0.0, 0.0], [1.0, 1.0]])
     (K0, B0), (K1, B1) = corners.min(axis=0), corners.max(axis=0)
     K, B = ROOM * (K1 - K0), ROOM * (B1 - B0)
@@ -130,18 +127,17 @@ def draw_couplings(ax: Axes, couplings: Couplings) -> None:
     legend_above(ax, columns=1)
 
 
-def _area(ax: Axes, guarantee: Guarantee, look: tuple[str, str, float, float], zorder: float) -> None:
-    fill, edge, width, above = look
+def _area(ax: Axes, guarantee: Guarantee, look: tuple[str, str, Any, float], zorder: float) -> None:
+    fill, edge, dashes, above = look
     rings, text = guarantee.region.rings, _words(guarantee)
     if not rings:
         ax.plot([], [], color="none", label=text)
         return
     outline = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
     ax.add_patch(PathPatch(outline, facecolor=fill, edgecolor="none", zorder=zorder))
-    ax.add_patch(PathPatch(outline, fill=False, edgecolor=edge, linewidth=width, zorder=above))
-    ax.add_patch(
-        Polygon([[np.nan, np.nan]], facecolor=fill, edgecolor=edge, linewidth=min(width, 2.5), label=text)
-    )
+    line: dict[str, Any] = {"edgecolor": edge, "linestyle": dashes, "linewidth": EDGE}
+    ax.add_patch(PathPatch(outline, fill=False, zorder=above, **line))
+    ax.add_patch(Polygon([[np.nan, np.nan]], facecolor=fill, label=text, **line))
 
 
 def _patch(ax: Axes, region: Region, text: str, look: tuple[str, str, str], zorder: float) -> None:
@@ -168,4 +164,4 @@ def _with_peak(words: str, region: Region) -> str:
 
 def _box(guarantees: Guarantees) -> Window:
     K0, K1, B0, B1 = guarantees.chart.box
-    return max(K0, -0.05 * K1), K1, max(B0, -0.1 * B1), B1
+    return max(K0, -0.05 * K1), K1, max(B0, -0.2 * B1), B1

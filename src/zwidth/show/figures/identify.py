@@ -23,7 +23,6 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from zwidth.identify.identification import Identification
 from zwidth.identify.joint.friction import JointIdentification
@@ -39,7 +38,6 @@ from zwidth.show.figures.style import (
     PURPLE,
     VERMILION,
     draw_empty,
-    figure,
     label,
     legend_above,
     number_logarithmic,
@@ -53,13 +51,6 @@ def draw_identification(ax: Axes, result: Identification) -> None:
         draw_empty(ax, "nothing was fitted")
         return
     DRAWINGS[result.kind](ax, result)
-
-
-def identification_figure(result: Identification, width: float = 5.6, height: float = 3.9) -> Figure:
-    """One identification as a figure of its own [inches]."""
-    made, ax = figure(width, height)
-    draw_identification(ax, result)
-    return made
 
 
 MEASURED: Final = "measured_"
@@ -294,41 +285,40 @@ def draw_modes(ax: Axes, identification: Any) -> None:
 
 
 DISK = float(np.sqrt(-2.0 * np.log(0.05)))  # deviations that hold 95 % of a circular error
+COHERENT: Final = 0.5  # coherence below which a frequency is marked, and does not set the view
+BESIDE: Final = 2.0  # times the coherent response, above and below, that is shown
 
 
 def draw_response(ax: Axes, identification: Identification) -> None:
-    """|P| of each sweep with its error at each frequency, and where it cannot be relied on."""
+    """|P| of each sweep with its error at each frequency, and where it cannot be relied on.
+
+    The view is that of the coherent frequencies: elsewhere the noise is drawn as far as it lies in it.
+    """
     curves = {name: np.asarray(values) for name, values in identification.curves.items()}
-    sweep = curves.get("sweep", np.ones(len(curves["frequency_Hz"])))
+    f, coherence = curves["frequency_Hz"], curves["coherence"]
+    P = np.hypot(curves["real_m_per_N"], curves["imag_m_per_N"])
     averages = float(identification.details["averages"])
-    marked = False
-    for number, one in enumerate(np.unique(sweep)):
-        mine = sweep == one
-        f = curves["frequency_Hz"][mine]
-        P = np.hypot(curves["real_m_per_N"][mine], curves["imag_m_per_N"][mine])
-        coherence = curves["coherence"][mine]
-        error = np.minimum(DISK * relative_error(np.maximum(coherence, 1e-6), averages), 0.9)
+    error = np.minimum(DISK * relative_error(np.maximum(coherence, 1e-6), averages), 0.9)
+    sweep = curves.get("sweep", np.ones(len(f)))
+    sweeps = np.unique(sweep)
+    for number, one in enumerate(sweeps):
         colour, dashes = LINES[number % len(LINES)]
-        name = f"sweep {one:g}" if len(np.unique(sweep)) > 1 else "|P|"
-        if number == 0:
-            ax.fill_between(
-                f,
-                P * (1 - error),
-                P * (1 + error),
-                color=BLUE,
-                alpha=0.25,
-                linewidth=0,
-                label="95 % at each frequency",
-            )
-        ax.plot(f, P, color=colour, linestyle=dashes, linewidth=1.1, label=name)
-        poor = coherence < 0.5
-        if poor.any():
-            text = "" if marked else "not coherent"
-            marked = True
-            ax.plot(f[poor], P[poor], color=VERMILION, marker="x", markersize=3.0, linestyle="none", label=text)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    number_logarithmic(ax.xaxis, float(np.min(curves["frequency_Hz"])), float(np.max(curves["frequency_Hz"])))
+        name = f"sweep {one:g}" if len(sweeps) > 1 else "|P|"
+        ax.loglog(f[sweep == one], P[sweep == one], color=colour, linestyle=dashes, linewidth=1.1, label=name)
+    first = sweep == sweeps[0]
+    ends = (P * (1.0 - error))[first], (P * (1.0 + error))[first]
+    text = "95 % at each frequency" + (f", sweep {sweeps[0]:g}" if len(sweeps) > 1 else "")
+    ax.fill_between(f[first], *ends, color=BLUE, alpha=0.25, linewidth=0.0, label=text)
+    poor = coherence < COHERENT
+    if poor.any():
+        ax.plot(
+            f[poor], P[poor], color=VERMILION, marker="x", markersize=3.0, linestyle="none", label="not coherent"
+        )
+    seen = P[(P > 0.0) & ~poor] if np.any((P > 0.0) & ~poor) else P[P > 0.0]
+    if len(seen):
+        ax.set_ylim(float(seen.min()) / BESIDE, float(seen.max()) * BESIDE)
+    ax.set_xlim(float(np.min(f)), float(np.max(f)))
+    number_logarithmic(ax.xaxis, *ax.get_xlim())
     ax.set_xlabel("Frequency [Hz]")
     ax.set_ylabel("Position over force [m/N]")
     ax.grid(color=GREY, alpha=0.2, linewidth=0.5)

@@ -15,7 +15,7 @@ from zwidth.contact.wall_limit_cycles import LimitCycleAnswer, LimitCyclePredict
 from zwidth.show.figures.style import BLACK, BLUE, GREY, STABLE, VERMILION, legend_above, number_logarithmic
 from zwidth.show.units import as_written, quantity
 
-AROUND = 100.0  # times, below the smallest limit cycle and above the largest, that is drawn
+AROUND = 10.0  # times, below the smallest limit cycle and above the largest, that is drawn
 BEYOND = 2.0  # times the range of the device that is drawn
 RESOLVED = 1e-3  # of the largest growth, below which the axis is linear
 LINEAR = 0.03  # of the largest growth: where half of the others are smaller, the axis is logarithmic
@@ -24,42 +24,38 @@ LINEAR = 0.03  # of the largest growth: where half of the others are smaller, th
 def draw_limit_cycles(ax: Axes, prediction: LimitCyclePrediction) -> None:
     """The growth of vibrations, with the limit cycles that are the answer: a square where it is a simulated
     one."""
-    draw_balance(ax, prediction.balance, prediction.answers)
+    draw_balance(ax, prediction.balance, prediction.answers, prediction.contradicted)
 
 
-def draw_balance(ax: Axes, balance: HarmonicBalance, answers: Sequence[LimitCycleAnswer] | None = None) -> None:
+def draw_balance(
+    ax: Axes,
+    balance: HarmonicBalance,
+    answers: Sequence[LimitCycleAnswer] | None = None,
+    contradicted: Sequence[LimitCycleAnswer] = (),
+) -> None:
     """How fast vibrations grow or die over their amplitude; limit cycles where the line crosses zero.
 
-    A full dot is a stable limit cycle, a hollow one the edge of what is recovered from; grey is what lies beyond
-    the range of the device, and is drawn as far as twice that. Growth rates that differ much have an axis that is
-    logarithmic on both sides of zero.
+    A full dot is a stable limit cycle, a hollow one an unstable one, a square a simulated one, and a cross what is
+    predicted and simulated otherwise; grey is what lies beyond the range of the device, and is drawn as far as
+    twice that. Growth rates that differ much have an axis that is logarithmic on both sides of zero.
 
-    answers  the limit cycles that are drawn; None: those of the balance
+    answers       the limit cycles that are drawn; None: those of the balance
+    contradicted  predicted ones that no simulation has
     """
     if answers is None:
         answers = [LimitCycleAnswer(cycle, "describing function", None, None, cycle) for cycle in balance.cycles]
     cycles = [answer.cycle for answer in answers]
     growth = np.where(np.isfinite(balance.growth), balance.growth, np.nan)
-    ax.semilogx(balance.amplitude, growth, color=BLACK, label="growth of a vibration")
+    ax.semilogx(balance.amplitude, growth, color=BLACK, label="growth of a vibration, predicted")
     ax.axhline(0.0, color=GREY, linewidth=0.6)
     for answer in answers:
-        cycle = answer.cycle
-        simulated = answer.source == "simulation"
-        kind = (
-            ("simulated limit cycle" if simulated else "stable limit cycle")
-            if cycle.stable
-            else "larger ones grow, smaller ones die"
-        )
+        cycle, simulated = answer.cycle, answer.source == "simulation"
+        kind = f"{'stable' if cycle.stable else 'unstable'} limit cycle{', simulated' if simulated else ''}"
         kind, color = (kind, VERMILION) if cycle.within_range else ("predicted beyond the range", GREY)
-        ax.plot(
-            cycle.amplitude,
-            0.0,
-            "s" if simulated else "o",
-            markerfacecolor=color if cycle.stable else "white",
-            markeredgecolor=color,
-            linestyle="none",
-            label=f"{kind}: {quantity(cycle.amplitude, 'm')}, {quantity(cycle.frequency_Hz, 'Hz')}",
-        )
+        _mark(ax, cycle, kind, "s" if simulated else "o", color)
+    replaced = [one.predicted for one in answers if one.source == "simulation" and one.predicted is not None]
+    for cycle in (*replaced, *(one.cycle for one in contradicted)):
+        _mark(ax, cycle, "predicted, but simulated otherwise", "x", BLACK)
     ax.set_ylabel("Growth rate [1/s]")
     low, high = _amplitude_range(balance, cycles)
     ax.set_xlim(low, high)
@@ -73,6 +69,20 @@ def draw_balance(ax: Axes, balance: HarmonicBalance, answers: Sequence[LimitCycl
     if not cycles:
         ax.plot([], [], linestyle="none", label="no limit cycle")
     legend_above(ax)
+
+
+def _mark(ax: Axes, cycle: LimitCycle, kind: str, marker: str, color: str) -> None:
+    """A mark on the zero line at the amplitude of a limit cycle, full where it is stable, with its numbers."""
+    ax.plot(
+        cycle.amplitude,
+        0.0,
+        marker,
+        markerfacecolor=color if cycle.stable else "white",
+        markeredgecolor=color,
+        linestyle="none",
+        label=f"{kind}: {quantity(cycle.amplitude, 'm')}, {quantity(cycle.frequency_Hz, 'Hz')}",
+        zorder=3.0,
+    )
 
 
 def _scale_growth(ax: Axes, visible: Floats, *, crossings: bool) -> None:

@@ -28,7 +28,8 @@ from zwidth.show.figures.style import (
     label,
     legend_above,
 )
-from zwidth.show.units import as_written, quantity, spoken_unit
+from zwidth.show.load_text import ROUNDING
+from zwidth.show.units import as_written, percent, quantity, spoken_unit
 from zwidth.study.loaded_charts import LoadPath, PushedChart
 
 # From blue over black to vermilion: the farther from no push the lighter, either side in its own colour.
@@ -37,6 +38,10 @@ COLOURS: Final = LinearSegmentedColormap.from_list(
 )
 MOST_TICKS: Final = 9
 NARROW: Final = 5.0  # inches of a figure below which panels stand under each other
+LOW: Final = 0.7  # of the height of two rows, for one
+VISIBLE: Final = 0.01  # share by which the stiffest walls differ at least where they are drawn in a close-up
+LEAST_CHANGE: Final = 1.0  # per cent, to which an axis of changes reaches at least
+LEAST_GROWTH: Final = 1.0  # 1/s, to which an axis of growth reaches at least: slower than any hand
 FOOT: Final = 0.06  # of the height of a panel, for marks of pushes without an answer
 LEAST: Final = 1e-6  # share of the largest stiffness that a close-up shows, where all are alike
 BELOW: Final = 1.5  # how far a close-up goes below the largest stiffnesses, in shares of their range
@@ -45,25 +50,39 @@ POINTS: Final = 300  # of a curve in a close-up
 
 
 def load_path_figure(path: LoadPath, width: float = 7.6, height: float = 5.4) -> Figure:
-    """The outlines and a close-up at the stiffest walls; beside them, or below, what changes over the push.
+    """The outlines, and a close-up at the stiffest walls; beside them, or below, what changes over the push.
 
-    height  of a figure of two columns; one of a single column is 1.8 times as high [inches]
+    There is no close-up of stiffest walls that are all but the same, and no growth where no motion is free along
+    the surface.
+
+    height  of a figure of two rows; in a single column a row is nearly as high [inches]
     """
-    narrow = width < NARROW
-    made, outlines = figure(width, 1.8 * height if narrow else height)
+    close = [draw_close_up] if _spread(path) > VISIBLE else []
+    growth = [draw_growth] if np.isfinite(path.growth_rates).any() else []
+    columns = [[_draw_edges, *close], [draw_stiffness, *growth]]
+    if width < NARROW:
+        count = 2 + len(close) + len(growth)
+        columns, height = [[*columns[0], *columns[1]]], 0.45 * count * height
+    rows = max(map(len, columns))
+    made, first = figure(width, height if rows > 1 else LOW * height)
     with context():
-        shape = (4, 1) if narrow else (2, 2)
-        grid = made.add_gridspec(*shape, height_ratios=(1.4, 1.2, 1.0, 1.0) if narrow else (1.1, 1.0))
-        cells = [(0, 0), (1, 0), (2, 0), (3, 0)] if narrow else [(0, 0), (1, 0), (0, 1), (1, 1)]
-        places = [grid[cell] for cell in cells]
-        outlines.set_subplotspec(places[0])
-        close, stiffness, growth = (made.add_subplot(place) for place in places[1:])
-        _draw_edges(outlines, path)
-        draw_close_up(close, path)
-        draw_stiffness(stiffness, path)
-        draw_growth(growth, path)
-        _bar(made, [outlines, close, stiffness, growth], path)
+        grid = made.add_gridspec(rows, len(columns))
+        panels: list[Axes] = []
+        for n, column in enumerate(columns):
+            for k, draw in enumerate(column):
+                place = grid[:, n] if len(column) == 1 else grid[k, n]
+                ax = made.add_subplot(place) if panels else first
+                ax.set_subplotspec(place)
+                draw(ax, path)
+                panels.append(ax)
+        _bar(made, panels, path)
     return made
+
+
+def _spread(path: LoadPath) -> float:
+    """By what share of the largest the stiffest walls under the pushes differ; 0 without any."""
+    stiffest = path.stiffness_max[np.isfinite(path.stiffness_max)]
+    return float(np.ptp(stiffest) / stiffest.max()) if len(stiffest) else 0.0
 
 
 def draw_outlines(ax: Axes, path: LoadPath) -> None:
@@ -160,7 +179,10 @@ def draw_stiffness(ax: Axes, path: LoadPath) -> None:
     title = "Largest stiffness"
     if relative:
         ax.set_ylabel("Change of stiffness [%]")
-        title += f",\nfrom {quantity(free, 'N/m')} without a push"
+        most = float(np.nanmax(np.abs(shown(path.stiffness_max))))
+        changes = f"changes by {percent(most / 100.0)} at most" if most > 100.0 * ROUNDING else "does not change"
+        title += f", from {quantity(free, 'N/m')}\nwithout a push: {changes}"
+        _reach(ax, LEAST_CHANGE)
     else:
         label(ax.yaxis, title, "N/m")
     _over_push(ax, path, path.stiffness_max)
@@ -176,11 +198,14 @@ def draw_growth(ax: Axes, path: LoadPath) -> None:
         return
     ax.plot(path.pushes, rates, color=BLACK, zorder=2.9)
     _dots(ax, path, rates)
-    ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.0)
-    if not np.any(np.nan_to_num(rates)):
-        ax.set_ylim(-1.0, 1.0)
-        ax.set_yticks([0.0])
+    _reach(ax, LEAST_GROWTH)
     _over_push(ax, path, rates)
+
+
+def _reach(ax: Axes, least: float) -> None:
+    """Widen the upright axis to so much on both sides of zero: what is less is next to nothing, and looks so."""
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -least), max(high, least))
 
 
 def _dots(ax: Axes, path: LoadPath, values: Floats) -> None:
@@ -236,7 +261,7 @@ def _bar(made: Any, axes: Sequence[Axes], path: LoadPath) -> None:
         ax=axes,
         location="top",
         ticks=ticks,
-        fraction=0.03 if len(axes) > 1 else 0.05,
+        fraction=0.03 if len(axes) > 2 else 0.05,
         pad=0.03,
         aspect=40,
     )

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Rectangle
@@ -24,8 +24,10 @@ from zwidth.measures.definition import (
     FAILED,
     NO_EQUILIBRIUM,
     NO_VALUE,
+    OUT_OF_REACH,
     OUT_OF_TIME,
     SINGULAR,
+    STATUS,
     UNDECIDED,
 )
 from zwidth.show.figures.style import (
@@ -33,15 +35,17 @@ from zwidth.show.figures.style import (
     GREY,
     LARGEST,
     LINES,
+    STABLE,
     VERMILION,
     bands_of,
     colour_bar,
     draw_empty,
     figure,
     label,
+    legend_above,
 )
 from zwidth.show.mechanism_scene import drawn_links, joint_points, link_stroke
-from zwidth.show.units import area_text, as_written, percent, spoken_unit
+from zwidth.show.units import area_text, as_written, percent, quantity, spoken_unit
 from zwidth.study.workspace.map import continued, reach_outline
 
 if TYPE_CHECKING:
@@ -63,8 +67,10 @@ MARKS: Final = {
     FAILED: ("failed", "\\\\\\\\"),
     OUT_OF_TIME: ("out of time", "oo"),
 }
+HATCH_OF: Final = {OUT_OF_REACH: "", **{kind: hatch for kind, (_, hatch) in MARKS.items()}}
 HATCHES: Final = ("\\\\", "//", "||", "--", "xx")
 INFINITE_COLOUR: Final = "#C8C8C8"
+CELL_EDGE: Final = 0.6  # points, width of the line between cells
 ARROWS: Final = 14  # direction strokes along the longer side
 
 
@@ -340,36 +346,59 @@ def draw_safe_walls(ax: Axes, table: SafeWalls) -> None:
 
 def _cells(ax: Axes, table: SafeWalls) -> None:
     grid = table.grid
-    K = table.rectangles[:, 0].reshape(grid.counts[::-1])
+    K, status = table.rectangles[:, 0].reshape(grid.counts[::-1]), table.status.reshape(grid.counts[::-1])
+    lines = grid.lines(0), grid.lines(1)
     name = ""
     if grid.dimensions == 3:
         layer = grid.counts[2] // 2
         middle = 0.5 * float(grid.lines(2)[layer] + grid.lines(2)[layer + 1])
-        K, name = K[layer], f", {grid.names[2]} = {middle:.4g} m"
+        K, status, name = K[layer], status[layer], f", {grid.names[2]} = {middle:.4g} m"
     if np.isnan(K).all():
         draw_empty(ax, f"no cell has safe walls{name}")
         return
-    image: Any = ax.pcolormesh(grid.lines(0), grid.lines(1), K, cmap=colormaps["viridis"], edgecolors="none")
-    assert ax.figure is not None
-    bar = ax.figure.colorbar(image, ax=ax)
-    label(bar.ax.yaxis, f"Safe stiffness, every direction{name}", "N/m")
+    levels, norm, colours = bands_of(K)
+    cells = np.ma.masked_invalid(K)
+    ax.pcolormesh(*lines, cells, cmap=colours, norm=norm, edgecolors="white", linewidth=CELL_EDGE)
+    colour_bar(ax, levels, norm, colours, f"Safe stiffness, every direction{name}", spoken_unit("N/m"))
+    marked = hatch_cells(ax, *lines, status)
     ax.set_aspect("equal")
     label(ax.xaxis, grid.names[0], "m", plain=True)
     label(ax.yaxis, grid.names[1], "m", plain=True)
+    if marked:
+        _add_legend(ax, [status_patch(kind) for kind in marked], one_column=False)
+
+
+def hatch_cells(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[int]:
+    """Hatch the cells between these edges that have no value. Returns the statuses that are hatched."""
+    marked = [kind for kind in HATCH_OF if (status == kind).any()]
+    for kind in marked:
+        here = np.ma.masked_where(status != kind, np.ones(status.shape))
+        blank = ListedColormap(["white"])
+        ax.pcolor(x, y, here, cmap=blank, hatch=HATCH_OF[kind], edgecolor=GREY, linewidth=0.0, zorder=1.5)
+    return marked
+
+
+def status_patch(status: int) -> Patch:
+    """A legend's entry for cells of this status."""
+    look: dict[str, Any] = {"facecolor": "white", "edgecolor": GREY, "linewidth": 0.5}
+    return Patch(hatch=HATCH_OF[status], label=STATUS[status], **look)
 
 
 def _bands(ax: Axes, table: SafeWalls) -> None:
-    for j in range(table.levels):
-        low, high = table.ranges[0, 0, j]
-        start, end = (table.stiffness_of_level(0, 0, level) for level in (j, j + 1))
-        if low <= high:
-            ax.add_patch(
-                Rectangle((start, low), end - start, high - low, facecolor=GREY, alpha=0.35, linewidth=0.0)
-            )
+    """The safe walls as steps, a band of stiffness each, and within them the rectangle that the program gives."""
+    bands = [table.stiffness_of_level(0, 0, level) for level in range(table.levels + 1)]
+    low, high = table.ranges[0, 0].T
+    some = low <= high
+    steps: dict[str, Any] = {"baseline": np.where(some, low, np.nan), "facecolor": STABLE, "edgecolor": BLACK}
+    text = "safe walls, by band of stiffness"
+    ax.stairs(np.where(some, high, np.nan), bands, fill=True, linewidth=0.8, label=text, **steps)
     one = table.rectangle(0)
-    ax.add_patch(
-        Rectangle((0.0, one.low), one.stiffness, one.high - one.low, fill=False, edgecolor=BLACK, linewidth=1.2)
-    )
-    ax.autoscale_view()
-    label(ax.xaxis, "Virtual stiffness", "N/m")
-    label(ax.yaxis, "Virtual damping", "N s/m")
+    low_text, high_text = quantity(one.low, "N s/m"), quantity(one.high, "N s/m")
+    text = f"K up to {quantity(one.stiffness, 'N/m')}, B from {low_text} to {high_text}"
+    size = one.stiffness, one.high - one.low
+    ax.add_patch(Rectangle((0.0, one.low), *size, fill=False, edgecolor=VERMILION, linewidth=1.6, label=text))
+    ax.set_xlim(0.0, 1.05 * bands[-1])
+    ax.set_ylim(bottom=0.0)
+    label(ax.xaxis, "Virtual stiffness K", "N/m")
+    label(ax.yaxis, "Virtual damping B", "N s/m")
+    legend_above(ax)

@@ -18,6 +18,14 @@ from zwidth.show.units import speaking_of_moments
 Window = tuple[float, float, float, float]
 Draw = Callable[[Axes, Any], None]
 
+SIZE: Final = (5.6, 3.9)  # inches of a figure, but of those with more above the axes, or with equal axes
+SIZES: Final = {
+    "BoundsComparison": (6.2, 6.4),
+    "CommonChart": (5.6, 4.6),
+    "RobustStudy": (5.6, 4.6),
+    "ByDirection": (4.6, 5.2),
+    "Guarantees": (6.2, 4.2),
+}
 FIGURE_NUMBERS: Final = count(1)  # numbers the figures that notebooks hold: ids in one page must differ
 
 
@@ -34,7 +42,7 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
         from matplotlib import pyplot
 
         with context():
-            made, ax = pyplot.subplots(figsize=(5.6, 3.9), layout="constrained")
+            made, ax = pyplot.subplots(figsize=size_of(result), layout="constrained")
             draw(ax, result)
             write_caption(made, caption_of_result(result))
         return ax
@@ -42,7 +50,7 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
 
 def notebook(result: Any) -> str:
     """A result as HTML: its few lines, and its figure beneath."""
-    made, ax = figure()
+    made, ax = figure(*size_of(result))
     with context(), speaking_of_moments(_turns(result)):
         drawing_of(result)(ax, result)
         write_caption(made, caption_of_result(result))
@@ -53,6 +61,11 @@ def notebook(result: Any) -> str:
 def _turns(result: Any) -> bool:
     """Whether a result is about moments about an axis."""
     return result.operating_point is not None and result.operating_point.turns
+
+
+def size_of(result: Any) -> tuple[float, float]:
+    """Width and height of the figure of a result of this kind [inches]."""
+    return next((SIZES[kind.__name__] for kind in type(result).__mro__ if kind.__name__ in SIZES), SIZE)
 
 
 def drawing_of(result: Any) -> Draw:

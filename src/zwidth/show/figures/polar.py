@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
+from typing import Final
+
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.ticker import MaxNLocator
 
-from zwidth.chart.polar import OK, ByDirection
-from zwidth.show.figures.style import BLACK, GREY, STABLE, VERMILION, label, legend_above
+from zwidth.arrays import Floats
+from zwidth.chart.polar import OUT_OF_MOTION, ByDirection
+from zwidth.show.figures.style import BLACK, GREY, STABLE, VERMILION, draw_empty, label, legend_above
 from zwidth.show.units import as_written, quantity
+
+ALIKE: Final = 1e-6  # share by which the largest stiffnesses of two directions differ that have the same
+BAR: Final = 4.0  # points, width of a bar
+LETTERS: Final = 40  # of a line that says why nothing is drawn
 
 
 def draw_polar(
@@ -16,21 +25,24 @@ def draw_polar(
 ) -> None:
     """A closed outline whose distance from the middle is the largest stiffness along each direction.
 
+    Bars where the handle does not move along all directions of the plane, as one of a single axis.
+
     ax          equal axes of a plane, both in N/m
     angles_deg  (k,) ascending, of each direction in that plane
     axes        names of the plane's axes
     """
-    along = np.deg2rad(np.append(angles_deg, angles_deg[:1]))
-    stiffness = np.append(by_direction.stiffness, by_direction.stiffness[:1])
-    x, y = stiffness * np.cos(along), stiffness * np.sin(along)
     have = np.isfinite(by_direction.stiffness)
-    if have.all():
-        ax.fill(x, y, facecolor=STABLE, edgecolor="none", zorder=1.0)
-    ax.plot(x, y, color=BLACK, solid_joinstyle="round", label="largest stiffness along each direction")
-    reach = 1.1 * float(np.max(by_direction.stiffness[have])) if have.any() else 1.0
-    for name, k, marker in _extremes(by_direction):
+    if not have.any():
+        draw_empty(ax, "\n".join(wrap(by_direction.reason or "", LETTERS)))
+        return
+    moves = np.array([status != OUT_OF_MOTION for status in by_direction.status])
+    if moves.all():
+        _draw_outline(ax, by_direction.stiffness, np.deg2rad(angles_deg))
+    else:
+        _draw_bars(ax, by_direction.stiffness[have], np.deg2rad(angles_deg[have]))
+    reach = 1.1 * float(np.max(by_direction.stiffness[have]))
+    for text, k, marker in _extremes(by_direction.stiffness, angles_deg):
         angle = np.deg2rad(angles_deg[k])
-        text = f"{name}: {quantity(by_direction.stiffness[k], 'N/m')} along {as_written(float(angles_deg[k]))}°"
         ax.plot(
             *(by_direction.stiffness[k] * np.array([[np.cos(angle)], [np.sin(angle)]])),
             marker=marker,
@@ -42,7 +54,7 @@ def draw_polar(
             zorder=5.0,
             label=text,
         )
-    missing = np.array([status != OK for status in by_direction.status])
+    missing = moves & ~have
     if missing.any():
         angle = np.deg2rad(angles_deg[missing])
         edge = reach * np.array([np.cos(angle), np.sin(angle)])
@@ -51,13 +63,40 @@ def draw_polar(
     legend_above(ax)
 
 
-def _extremes(by_direction: ByDirection) -> list[tuple[str, int, str]]:
-    """The stiffest and the least stiff direction, with a marker each."""
-    have = np.isfinite(by_direction.stiffness)
-    if not have.any():
-        return []
-    values = np.where(have, by_direction.stiffness, np.nan)
-    return [("stiffest", int(np.nanargmax(values)), "o"), ("least stiff", int(np.nanargmin(values)), "s")]
+def _draw_outline(ax: Axes, stiffness: Floats, angle: Floats) -> None:
+    """A closed outline, filled where every direction has an answer."""
+    K, along = np.append(stiffness, stiffness[:1]), np.append(angle, angle[:1])
+    x, y = K * np.cos(along), K * np.sin(along)
+    if np.isfinite(stiffness).all():
+        ax.fill(x, y, facecolor=STABLE, edgecolor="none", zorder=1.0)
+    ax.plot(x, y, color=BLACK, solid_joinstyle="round", label="largest stiffness along each direction")
+
+
+def _draw_bars(ax: Axes, stiffness: Floats, angle: Floats) -> None:
+    """A bar from the middle along each direction in which the handle moves, where it does not move along all."""
+    ends = stiffness[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    bars = LineCollection(
+        [np.vstack([np.zeros(2), end]) for end in ends],
+        colors=BLACK,
+        linewidths=BAR,
+        label="largest stiffness, only where the handle moves",
+    )
+    ax.add_collection(bars)
+
+
+def _extremes(stiffness: Floats, angles_deg: Floats) -> list[tuple[str, int, str]]:
+    """The stiffest and the least stiff direction in words, with a marker each; one where both are alike."""
+    most, least = int(np.nanargmax(stiffness)), int(np.nanargmin(stiffness))
+    if stiffness[most] - stiffness[least] > ALIKE * stiffness[most]:
+        found = [("stiffest", most, "o"), ("least stiff", least, "s")]
+    elif np.isfinite(stiffness).all():
+        return [(f"{quantity(stiffness[most], 'N/m')} along every direction", most, "o")]
+    else:
+        found = [("largest", most, "o")]
+    return [
+        (f"{name}: {quantity(stiffness[k], 'N/m')} along {as_written(float(angles_deg[k]))}°", k, marker)
+        for name, k, marker in found
+    ]
 
 
 def _frame(ax: Axes, reach: float, axes: tuple[str, str]) -> None:

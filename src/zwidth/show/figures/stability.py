@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Polygon
 
 from zwidth.arrays import Floats
@@ -29,7 +29,6 @@ from zwidth.chart.chart import StabilityChart, stability_chart
 from zwidth.chart.chart_base import BoundaryArc
 from zwidth.chart.decay import FastestDecay
 from zwidth.chart.measured.chart import MeasuredChart
-from zwidth.chart.measured.loop import UnusableRange
 from zwidth.chart.measured.stable_regions import DoubtBand
 from zwidth.chart.robust.common_chart import CommonChart
 from zwidth.errors import ChartError
@@ -67,7 +66,7 @@ def draw_chart(ax: Axes, chart: StabilityChart, window: Window | None = None) ->
     for arc in chart.boundary:
         ax.plot(arc.stiffness, arc.damping, color=BLACK, solid_capstyle="round")
     if not isnan(chart.stiffness_max):
-        mark_stiffest(ax, chart)
+        mark_stiffest(ax, chart, _stiffest_text(chart))
     frame(ax, window or chart.box, empty=not chart.regions)
     legend_above(ax)
 
@@ -113,10 +112,15 @@ def edges_of(rings: Sequence[Floats]) -> list[Floats]:
     return outlines
 
 
-def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
-    """The stiffest wall, with its numbers in the legend."""
+def _stiffest_text(chart: StabilityChart) -> str:
+    """The stiffest wall in words: stiffness, damping, and the frequencies at which it oscillates."""
     numbers = f"{quantity(chart.stiffness_max, 'N/m')} at {quantity(chart.damping_at_stiffness_max, 'N s/m')}"
     vibration = " and ".join(quantity(f, "Hz") for f in chart.frequencies_at_stiffness_max)
+    return f"stiffest{' found' if getattr(chart, 'doubt', '') else ''}: {numbers}; oscillates at {vibration}"
+
+
+def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart, text: str) -> None:
+    """A ring at the stiffest wall, with this text in the legend."""
     ax.plot(
         [chart.stiffness_max],
         [chart.damping_at_stiffness_max],
@@ -127,7 +131,7 @@ def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart) -> None:
         markeredgewidth=1.6,
         linestyle="none",
         zorder=5.0,
-        label=f"stiffest{' found' if getattr(chart, 'doubt', '') else ''}: {numbers}; oscillates at {vibration}",
+        label=text,
     )
 
 
@@ -285,33 +289,58 @@ def _natural_frequencies(ax: Axes, chart: StabilityChart) -> None:
 
 
 NAMED: Final = len(LINES) - 1  # binding members with a line of their own; the last line is for the rest
-DRAWN_MEMBERS: Final = 200  # members' outlines at most
-LIGHT: Final = "#B8B8B8"
+DRAWN_MEMBERS: Final = 200  # whose sets are shaded at most
+DRAWN_EDGES: Final = 9  # of members, at most: more lie too close to be told apart
+SHADE: Final = "#EFEFEF"  # of walls that some members allow
+LIGHT: Final = "#9A9A9A"
+MOST_REACH: Final = 10.0  # times the robust set's extent that is shown
 LONGEST: Final = 60  # signs in a line of the legend
-SHORTEST: Final = 0.02  # share of the window that a named member binds
+SHORTEST: Final = 0.02  # share of the edge in view that a named member binds at least
 NO_BREAK: Final = "\u00a0"
 
 
 def draw_robust(
     ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]] = (), window: Window | None = None
 ) -> None:
-    """The robust set filled, its edge by binding member; behind it all members' outlines, the best one's dashed.
+    """The robust set filled, its edge by binding member; behind it what single members allow, the best one dashed.
 
     members  path -> value of each, for the legend
     window   what to show; left out: the box of all outlines' part with K >= 0 and B >= 0, and 5 %
     """
     view = window or _box(chart)
-    outlines = [outline for index in list(chart.outlines)[:DRAWN_MEMBERS] for outline in chart.outlines[index]]
-    ax.add_collection(LineCollection(outlines, colors=LIGHT, linewidths=0.4, zorder=1.2, label="a member's edge"))
     for n, ring in enumerate(chart.regions):
         text = "" if n else _claim(chart)
         ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label=text, zorder=1.1))
+    _draw_members(ax, chart)
     for n, outline in enumerate(chart.outlines[chart.best_by_area]):
         text = "" if n else f"best member by area: {_words(members, chart.best_by_area)}"
         ax.plot(*outline.T, color=GREY, linewidth=1.1, linestyle=(0, (3, 2)), label=text, zorder=1.4)
     _draw_edge(ax, chart, members, view)
     frame(ax, view, empty=not chart.regions)
-    legend_above(ax)
+    legend_above(ax, columns=2)
+
+
+def _draw_members(ax: Axes, chart: CommonChart) -> None:
+    """Shade what any member allows, and draw the edges of some, spread evenly over the members by area."""
+    outlines = chart.outlines
+    by_area = sorted(outlines, key=lambda index: sum(map(_area, outlines[index])))
+    shaded, lined = (_spread(by_area, most) for most in (DRAWN_MEMBERS, DRAWN_EDGES))
+    rings = [ring for index in shaded for ring in outlines[index]]
+    ax.add_collection(PolyCollection(rings, facecolors=SHADE, zorder=1.0, label="stable for some member"))
+    edges = [ring for index in lined for ring in outlines[index]]
+    text = "a member's edge" if len(lined) == len(by_area) else f"edges of {len(lined)} of {len(by_area)} members"
+    ax.add_collection(LineCollection(edges, colors=LIGHT, linewidths=0.5, zorder=1.2, label=text))
+
+
+def _area(ring: Floats) -> float:
+    """Area within a closed walk."""
+    x, y = ring.T
+    return 0.5 * abs(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
+
+
+def _spread(items: Sequence[int], most: int) -> list[int]:
+    """At most so many of the items, evenly spread, the first and the last among them."""
+    return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int))]
 
 
 def _claim(chart: CommonChart) -> str:
@@ -331,9 +360,11 @@ def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]
         inside = (x > 0.0) & (x < 1.0) & (y > 0.0) & (y < 1.0)
         length = float(np.sum(np.hypot(np.diff(x), np.diff(y))[inside[1:] & inside[:-1]]))
         lengths[arc.member] = lengths.get(arc.member, 0.0) + length
+    least = SHORTEST * sum(lengths.values())
     ranked = sorted(lengths, key=lambda member: -lengths[member])
-    named = [member for member in ranked if lengths[member] > SHORTEST][:NAMED]
-    drawn: set[str] = set()
+    named = [member for member in ranked if lengths[member] > least][:NAMED]
+    others = sum(length for member, length in lengths.items() if member not in named)
+    drawn = {"limited by others"} if others <= least else set[str]()
     for arc in chart.boundary:
         place = named.index(arc.member) if arc.member in named else NAMED
         colour, dashes = LINES[place]
@@ -344,10 +375,10 @@ def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]
             color=colour,
             linestyle=dashes,
             linewidth=2.0,
-            label="" if text in drawn or lengths[arc.member] == 0.0 else text,
+            label="" if text in drawn else text,
             zorder=3.0,
         )
-        drawn |= {text} if lengths[arc.member] > 0.0 else set()
+        drawn.add(text)
 
 
 def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
@@ -373,7 +404,7 @@ def _box(chart: CommonChart) -> Window:
     K, B = np.maximum(np.vstack(walls).max(axis=0), 0.0)
     reach = np.vstack(chart.regions).max(axis=0)
     # a member that allows many times more would press the robust set into a corner
-    K1, B1 = min(K, 2.5 * reach[0]), min(B, 2.5 * reach[1])
+    K1, B1 = np.minimum((K, B), MOST_REACH * reach)
     return -0.04 * float(K1), 1.05 * float(K1), -0.05 * float(B1), 1.05 * float(B1)
 
 
@@ -383,12 +414,13 @@ LONGEST_LIST = 3  # stretches named in the legend
 def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = None) -> None:
     """The stable walls filled, the interpolated edge, the measured points on it, and the band of the error.
 
-    Walls, edge and points are nominal. Marked are the stiffest wall that is certain, and the nominal one.
+    Walls, edge and points are nominal. Marked are the stiffest wall that is certain, and the nominal one. Of the
+    stretches that cannot be relied on those are named through which the edge runs.
 
     window  what to show; left out: the regions' box and 5 %
     """
     for n, ring in enumerate(chart.regions):
-        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable walls"))
+        ax.add_patch(Polygon(ring, facecolor=STABLE, edgecolor="none", label="" if n else "stable as measured"))
     if chart.band is not None:
         _fill_band(ax, chart.band)
     for ring in edges_of(chart.regions):
@@ -396,7 +428,7 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
     _draw_measured_points(ax, chart)
     _unusable(ax, chart)
     if chart.stiffness_max == chart.stiffness_max:
-        mark_stiffest(ax, chart)
+        mark_stiffest(ax, chart, f"stiffest, certain: {quantity(chart.stiffness_max, 'N/m')}")
     if chart.band is not None and chart.stiffness_max_nominal == chart.stiffness_max_nominal:
         ax.plot(
             [chart.stiffness_max_nominal],
@@ -405,10 +437,10 @@ def draw_measured_chart(ax: Axes, chart: MeasuredChart, window: Window | None = 
             marker="x",
             linestyle="none",
             zorder=4.9,
-            label=f"stiffest as measured: {quantity(chart.stiffness_max_nominal, 'N/m')}",
+            label=f"as measured: {quantity(chart.stiffness_max_nominal, 'N/m')}",
         )
     frame(ax, window or chart.box, empty=not chart.regions)
-    legend_above(ax)
+    legend_above(ax, columns=2)
 
 
 def _fill_band(ax: Axes, band: DoubtBand) -> None:
@@ -421,7 +453,7 @@ def _fill_band(ax: Axes, band: DoubtBand) -> None:
                 edgecolor="none",
                 alpha=0.45,
                 zorder=1.8,
-                label="" if n else f"in doubt: {band.meaning}",
+                label="" if n else f"in doubt, {band.meaning.partition(' confidence')[0]}",
             )
         )
 
@@ -442,29 +474,24 @@ def _draw_measured_points(ax: Axes, chart: MeasuredChart) -> None:
 
 
 def _unusable(ax: Axes, chart: MeasuredChart) -> None:
-    """The edge within unusable stretches, dashed; each stretch a line of the legend."""
+    """The edge within unusable stretches through which it runs, dashed; each stretch a line of the legend."""
     edge = chart.edge
     f = edge.angles / (2.0 * np.pi * chart.loop.period)
-    for n, stretch in enumerate(chart.unusable[:LONGEST_LIST]):
-        inside = (f >= stretch.low) & (f <= stretch.high)
+    spans = sorted({(stretch.low, stretch.high) for stretch in chart.unusable if stretch.on_edge})
+    for n, (low, high) in enumerate(spans):
+        inside = (f >= low) & (f <= high)
         K, B = np.where(inside, edge.walls[:, 0], np.nan), np.where(inside, edge.walls[:, 1], np.nan)
-        shown = stretch.on_edge and np.any(inside)
+        text = f"unusable, {quantity(low, 'Hz')} to {quantity(high, 'Hz')}"
+        if n == LONGEST_LIST:
+            text = f"unusable, {len(spans) - LONGEST_LIST} more stretches"
         ax.plot(
-            K if shown else [],
-            B if shown else [],
-            color=VERMILION if shown else GREY,
-            linestyle=((0, (1.2, 1.2)), (0, (4, 1.5)), (0, (6, 1.5, 1.2, 1.5)))[n],
+            K,
+            B,
+            color=VERMILION,
+            linestyle=((0, (1.2, 1.2)), (0, (4, 1.5)), (0, (6, 1.5, 1.2, 1.5)))[n % LONGEST_LIST],
             linewidth=2.2,
-            label=_stretch_text(stretch),
+            label=text if n <= LONGEST_LIST else "",
         )
-    if len(chart.unusable) > LONGEST_LIST:
-        ax.plot([], [], linestyle="none", label=f"and {len(chart.unusable) - LONGEST_LIST} more stretches")
-
-
-def _stretch_text(stretch: UnusableRange) -> str:
-    why = stretch.reason.partition(",")[0].partition(";")[0]
-    why = why if len(why) <= 44 else "uncertain between frequencies"
-    return f"unusable: {quantity(stretch.low, 'Hz')} to {quantity(stretch.high, 'Hz')}, {why}"
 
 
 ROOM: Final = 1.08  # radius shown, over that of what is drawn

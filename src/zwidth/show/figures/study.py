@@ -18,7 +18,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator
 from numpy.typing import NDArray
 
@@ -35,7 +34,7 @@ from zwidth.measures.definition import (
     STATUS,
     UNDECIDED,
 )
-from zwidth.show.figures.map import MARKS
+from zwidth.show.figures.map import hatch_cells, status_patch
 from zwidth.show.figures.style import (
     BLACK,
     COLOURS,
@@ -69,6 +68,7 @@ SYMBOLS: Final = {
 SAME: Final = 1e-9  # share by which the values of a constant column differ
 MOST_PANELS: Final = 12
 POINTS: Final = ("o", "s", "^", "D", "v", "P")
+BESIDE: Final = 0.02  # share of an axis beside its first and last value
 MARKED: Final = 40  # points up to which each is marked
 MARK_HEIGHT: Final = 0.045  # of the height of a panel, for each line that has gaps
 MOST_TICKS: Final = 6  # of an axis: numbers such as 0.0005 are long
@@ -111,7 +111,7 @@ def draw_first_column(ax: Axes, dataset: xr.Dataset) -> None:
         _legend_above(ax, handles, [_symbol(status) for status in lost])
     elif len(numeric) == 2 and not texts and min(dataset.sizes[key] for key in numeric) > 1:
         hatched = draw_heat_map(ax, dataset, name, numeric[0], numeric[1])
-        _legend_above(ax, [], [_patch(status) for status in hatched])
+        _legend_above(ax, [], [status_patch(status) for status in hatched])
     else:
         dims = [str(dim) for dim in dataset[name].dims]
         draw_parallel(ax, dataset, dims if dims != ["design"] else _keys_of(dataset), [name])
@@ -200,6 +200,7 @@ def draw_curves(ax: Axes, dataset: xr.Dataset, name: str, along: str) -> list[in
         )
     _name_column(ax, column)
     _name_axis(ax, "x", dataset[along])
+    ax.margins(x=BESIDE)
     return [kind for kind in SYMBOLS if any((here == kind).any() for _, here in missing)]
 
 
@@ -336,7 +337,7 @@ def _heat_maps(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], t
         statuses |= dict.fromkeys(draw_heat_map(panel, dataset.sel(chosen), name, axes[0], axes[1], values))
         if chosen:
             panel.set_title(_combination_text(chosen), loc="left")
-    handles = [_patch(status) for status in sorted(statuses)]
+    handles = [status_patch(status) for status in sorted(statuses)]
     if handles:
         drawing.legend(
             handles=handles, loc="outside upper left", ncols=4, fontsize=8.0, frameon=False, borderaxespad=0.4
@@ -366,13 +367,12 @@ def draw_heat_map(
         ax.pcolormesh(x, y, cells, norm=norm, cmap=colours, linewidth=0.0, rasterized=True)
         title, unit = str(column.attrs["title"]), spoken_unit(str(column.attrs.get("unit", "")))
         colour_bar(ax, levels, norm, colours, title, unit)
-    marked = [kind for kind in _HATCHES if (status == kind).any()]
-    for kind in marked:
-        here = np.ma.masked_where(status != kind, np.ones(status.shape))
-        blank = ListedColormap(["white"])
-        ax.pcolor(x, y, here, cmap=blank, hatch=_HATCHES[kind], edgecolor=GREY, linewidth=0.0, zorder=1.5)
+    marked = hatch_cells(ax, x, y, status)
     _name_axis(ax, "x", dataset[first])
     _name_axis(ax, "y", dataset[second])
+    # the outer cells are halves: the axes say what was computed, and nothing beyond
+    ax.set_xlim(float(dataset[first].min()), float(dataset[first].max()))
+    ax.set_ylim(float(dataset[second].min()), float(dataset[second].max()))
     return marked
 
 
@@ -386,12 +386,6 @@ def constant_text(column: Any, values: Floats) -> str:
 
 
 PAPER: Final = ListedColormap(["#F2F2F2"])
-_HATCHES: Final = {OUT_OF_REACH: "", **{kind: hatch for kind, (_, hatch) in MARKS.items()}}
-
-
-def _patch(status: int) -> Patch:
-    edge: dict[str, Any] = {"facecolor": "white", "edgecolor": GREY, "linewidth": 0.5}
-    return Patch(hatch=_HATCHES[status], label=STATUS[status], **edge)
 
 
 def _edges(coordinate: Any) -> Floats:

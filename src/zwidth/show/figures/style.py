@@ -310,6 +310,7 @@ LEVELS: Final = 10
 WIDE: Final = 6.0  # ratio of the usual values from which on levels are spaced by ratios
 USUAL: Final = (2.0, 98.0)  # per cent of the values that the levels span
 LETTERS: Final = 45  # of a line beside the bar
+BAR: Final = (1.03, 0.0, 0.04, 1.0)  # left, bottom, width, height of the bar of colours, as shares of the axes
 LARGEST: Final = 1e200  # what is larger is drawn as infinite; matplotlib counts to 1e250
 
 
@@ -369,15 +370,13 @@ def bands_of(values: Floats, *, faint: bool = False) -> tuple[Floats, BoundaryNo
 def colour_bar(
     ax: Axes, levels: Floats, norm: BoundaryNorm, colours: ListedColormap, title: str, unit: str
 ) -> None:
-    """The bands' colours beside the axes."""
+    """The bands' colours beside the axes, as high as these are."""
     assert ax.figure is not None
     bar = ax.figure.colorbar(
         ScalarMappable(norm, colours),
-        ax=ax,
+        cax=ax.inset_axes(BAR),
         ticks=FixedLocator(levels.tolist()),
         spacing="uniform",
-        fraction=0.05,
-        pad=0.02,
     )
     bar.minorticks_off()
     bar.outline.set_linewidth(0.6)
