@@ -180,7 +180,7 @@ def test_a_change_that_is_next_to_nothing_looks_so_and_is_said(path):
 
 def test_a_device_without_free_motions_has_no_panel_of_growth():
     made = load_path_figure(template("paddle").load_path(1.0, 3))
-    assert [ax.get_ylabel() for ax in made.axes[:-1]] == ["Virtual damping B [Ns/m]", "Change of stiffness [%]"]
+    assert [ax.get_ylabel() for ax in made.axes[:-1]] == ["Virtual damping B [N s/m]", "Change of stiffness [%]"]
 
 
 def test_the_close_up_shows_every_stiffest_wall_on_its_own_curve(path):
