@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from numbers import Integral, Real
 from typing import Any, Final, Literal, TypeAlias
 
@@ -99,15 +99,15 @@ class Argument:
         """
         if self.allows(value):
             return
-        unit = f" [{self.unit}]" if self.unit else ""
+        unit, hint = f" [{self.unit}]" if self.unit else "", self.hint
         if self.kind == "choice":
             wanted = " or ".join(map(repr, self.choices))
         elif self.kind == "whole":
             wanted = f"a whole number from {self.least:g} {f'to {int(self.most)}' if self.most < inf else 'on'}"
+        elif isinstance(value, Real) and LARGEST < abs(value) < inf:
+            wanted, hint = f"from {-LARGEST:g} to {LARGEST:g}{unit}", "is the unit right?"
         else:
             wanted = f"a finite number{', ' if self.allowed else ''}{self.allowed}{unit}"
-        number = isinstance(value, Real)
-        hint = self.hint or ("is the unit right?" if number and not self.allowed and isfinite(value) else "")
         raise ArgumentError(self.name, f"must be {wanted}, got {_quoted(value)}{hint and '; '}{hint}")
 
 

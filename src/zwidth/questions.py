@@ -359,7 +359,8 @@ SIMULATE: Final = by_name(
     ),
     _number(
         "sound_pitch", "Raise all frequencies of a .wav by this factor; auto: by octaves, to above 200 Hz",
-        least=0.1, most=1000.0, value="FACTOR|auto", left_out="by octaves, from below 60 Hz to above 110 Hz",
+        least=0.1, most=1000.0, value="FACTOR|auto", hint="or give auto",
+        left_out="by octaves, from below 60 Hz to above 110 Hz",
     ),
 )
 EXPERIMENT: Final = by_name(

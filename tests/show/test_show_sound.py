@@ -312,9 +312,9 @@ def test_the_text_says_how_loud_what_was_clipped_and_a_better_pitch(tmp_path):
         (("--sound-full-scale", "1", "--output", "a.svg"), "--sound-full-scale belongs to a sound"),
         (
             ("--sound-pitch", "octave", "--output", "a.wav"),
-            "must be auto or a factor from 0.1 to 1000, got 'octave'",
+            "at least 0.1 and at most 1000, got 'octave'; or give auto",
         ),
-        (("--sound-pitch", "nan", "--output", "a.wav"), "must be auto or a factor from 0.1 to 1000"),
+        (("--sound-pitch", "nan", "--output", "a.wav"), "at least 0.1 and at most 1000"),
         (("--sound-full-scale", "0", "--output", "a.wav"), "must be a number"),
     ],
 )
