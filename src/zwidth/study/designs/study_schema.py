@@ -296,8 +296,8 @@ def _table(path: KeyPath) -> Any:
 def description(path: KeyPath) -> str:
     """What a key of the study file means, with its unit; "" for a value inside a key, such as a list's element.
 
-    >>> description(("workspace", "x_m"))
-    'lowest and highest coordinate along its first axis [m]'
+    >>> description(("workspace", "plane"))
+    'xy, xz, yz or six numbers'
     """
     field = _table(path).model_fields.get(str(path[-1]))
     if field is None or not field.description:
