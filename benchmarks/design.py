@@ -38,9 +38,9 @@ from benchmarks._peers import by_python_control as walls_by_python_control
 from benchmarks._stages import stage_times
 from benchmarks._timing import machine, print_table, seconds, verdict
 from zwidth.chart import Peak, largest_stiffness
+from zwidth.chart.point_chart import table_of_points
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop, OperatingPoint
-from zwidth.loop.point_loops import table_of_points
 from zwidth.model import Plant
 from zwidth.study import sweep
 

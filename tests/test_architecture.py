@@ -29,20 +29,18 @@ EVERYWHERE = {
     "compiled",
     "compile_events",
     "errors",
-    "processors",
     "progress",
     "questions",
     "machine_code",
-    "memory_limit",
     "result",
-    "threads",
+    "resources",
     "tuple_references",
     "unit_text",
     "_version",
 }
 MAY_IMPORT = {package: {*FLOW[: place + 1], *EVERYWHERE} for place, package in enumerate(FLOW)}
 MAY_IMPORT |= {module: set() for module in EVERYWHERE}
-MAY_IMPORT["argument"] = MAY_IMPORT["memory_limit"] = MAY_IMPORT["processors"] = {"errors"}
+MAY_IMPORT["argument"] = MAY_IMPORT["resources"] = {"errors"}
 MAY_IMPORT["questions"] = {"argument"}
 MAY_IMPORT["compiled"] = {"compile_events", "machine_code", "tuple_references"}
 MAY_IMPORT["device"] = {"device", "model", "loop", *EVERYWHERE}

@@ -5,10 +5,9 @@ compiled for other targets.
 
 A kernel is compiled in one of two ways, by who calls it. Called by another kernel it is only translated:
 optimising and emitting machine code are left to the kernel that Python calls, which does both once for all that it
-holds. Numba by itself does both at every level of calls, which takes twice the time (the kernels of
-`zwidth move`: 84 s against 31 s of processor time). Called by Python it becomes machine code, which `machine_code`
-keeps on disk; the interpreter's lock is released while it runs, so that `threads.in_chunks` can spread a loop over
-the cores.
+holds. Numba by itself does both at every level of calls, which takes twice the time (the kernels of `zwidth move`:
+84 s against 31 s of processor time). Called by Python it becomes machine code, which `machine_code` keeps on disk;
+the interpreter's lock is released while it runs, so that `resources.in_chunks` can spread a loop over the cores.
 
 With NUMBA_DISABLE_JIT=1 nothing is compiled: a kernel is then its Python function, for a debugger to step through.
 """

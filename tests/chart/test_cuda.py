@@ -13,7 +13,7 @@ import pytest
 
 from tests.cli.command_runner import refusal_lines
 from zwidth.errors import ProcessorError
-from zwidth.processors import check_processor
+from zwidth.resources import check_processor
 
 ROOT = Path(__file__).parents[2]
 
@@ -53,7 +53,7 @@ def test_a_command_says_what_is_missing_for_a_gpu(command, tmp_path, monkeypatch
     def missing():
         raise ProcessorError("needs the package numba-cuda, which is not installed", "install zwidth[cuda]")
 
-    monkeypatch.setattr("zwidth.processors._check_gpu", missing)
+    monkeypatch.setattr("zwidth.resources._check_gpu", missing)
     study = tmp_path / "study.toml"
     study.write_text(
         'device = "five-bar"\nmeasures = ["stiffness_max"]\n'
@@ -67,6 +67,6 @@ def test_a_command_says_what_is_missing_for_a_gpu(command, tmp_path, monkeypatch
 
 
 def test_a_package_that_is_missing_is_named(monkeypatch):
-    monkeypatch.setattr("zwidth.processors.find_spec", lambda name: None)
+    monkeypatch.setattr("zwidth.resources.find_spec", lambda name: None)
     with pytest.raises(ProcessorError, match="numba-cuda, which is not installed"):
         check_processor("cuda")

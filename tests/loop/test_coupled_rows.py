@@ -9,7 +9,7 @@ from tests.apart import ApartLoop, loop_of_every_kind
 from zwidth.chart import boundary_points
 from zwidth.errors import UnresolvedError
 from zwidth.loop import sections
-from zwidth.loop.coupled_hold import rows_error, sample_form, separate_rows
+from zwidth.loop.pole_zero_form import rows_error, sample_form, separate_rows
 from zwidth.model.first_order_form import first_order_form, without_hidden_poles
 
 # Seeds and numbers of loops: with a fast pole that the wall does not move, of which rounding leaves something

@@ -8,7 +8,7 @@ import pytest
 
 from zwidth.device import from_document
 from zwidth.errors import DeviceError, OperatorError
-from zwidth.loop.fixed_feedback import describe_feedback, feedback_name
+from zwidth.loop.controller import describe_feedback, feedback_name
 from zwidth.model import Operator
 from zwidth.show import computer_text, speaking_of_moments
 from zwidth.show.app.layers import _touch

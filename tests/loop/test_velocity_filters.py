@@ -6,7 +6,7 @@ import scipy.signal
 
 from tests.systems import velocity_filter
 from zwidth.loop import Butterworth, Controller, FirstOrder
-from zwidth.loop.filters import velocity_estimator
+from zwidth.loop.loop_table import velocity_estimator
 
 
 def response(controller, z):

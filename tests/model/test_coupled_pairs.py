@@ -12,9 +12,9 @@ from tests.systems import random_operator, random_plant
 from zwidth.chart import ALL_NUMBERS, numbers_of_points, stability_chart
 from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND
+from zwidth.chart.point_chart import pole_pairs_of_points
 from zwidth.device.load import load
 from zwidth.loop import Controller, Loop, OperatingPoint, rows_response, section_rows
-from zwidth.loop.point_loops import pole_pairs_of_points
 from zwidth.model import ModalDamping, Operator, Plant, attach, reduce_mechanism, solve_posture
 from zwidth.model.coupled_pairs import coupled_pairs
 from zwidth.model.plant_modes import plant_modes

@@ -32,7 +32,7 @@ from zwidth.model import (
     solve_posture,
     undamped_modes,
 )
-from zwidth.model.drive_side import drive_side
+from zwidth.model.effective_mass import drive_side
 
 AT = 2j * np.pi * np.array([3.0, 30.0, 300.0])
 

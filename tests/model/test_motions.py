@@ -20,7 +20,7 @@ from tests.model.model_cases import (
 from tests.model.model_engines import ask_mujoco, ask_pinocchio
 from tests.model.random_mechanisms import random_mechanism, random_mechanisms
 from zwidth.model import AXIS, BALL_X, PRISMATIC, REVOLUTE, Mechanism, Motions, RatioTable, pack, solve_posture
-from zwidth.model.drive_side import DriveMotion, counted_posture, drive_travel
+from zwidth.model.effective_mass import DriveMotion, counted_posture, drive_travel
 
 RELATIVE = 2e-9  # what differences leave near a singular posture; elsewhere it is 1e-11
 BUILDS = ((6, 0), (7, 1), (9, 2))  # joints and loops

@@ -11,7 +11,7 @@ from zwidth.errors import OutputError, TooLarge
 from zwidth.show import csv_text, dataset, json_text
 from zwidth.show.dataset import write_sweep_csv, write_sweep_zarr
 from zwidth.study import Sweep, run_study
-from zwidth.study.designs import sweep_data
+from zwidth.study.designs import sweep as sweep_of_designs
 from zwidth.study.jobs import executor
 
 MASS = axis("plant.mass_kg.0.0", range=[-0.05, 0.3], tie=["plant.mass_kg.1.1"])
@@ -74,7 +74,7 @@ def test_a_stored_study_is_the_one_in_memory(tmp_path, monkeypatch):
 
 def test_what_lists_all_designs_is_refused_where_it_would_not_fit(monkeypatch):
     found = of_pairs()
-    monkeypatch.setattr(sweep_data, "PER_AXIS", 10**12)
+    monkeypatch.setattr(sweep_of_designs, "PER_AXIS", 10**12)
     for listing in (found.dataset, found.table, found.document):
         with pytest.raises(
             TooLarge, match=r"^3 designs of 2 measures, listed all at once, would take .* \(\.zarr"

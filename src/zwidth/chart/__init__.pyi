@@ -30,6 +30,7 @@ from .edge_by_eigenvalues import closed_rings as closed_rings
 from .edge_crossings import EdgeChords as EdgeChords
 from .edge_crossings import exact_edge as exact_edge
 from .hurwitz import work_array as work_array
+from .loop_edge import TracedEdge as TracedEdge
 from .measured.loop import MeasuredLoop as MeasuredLoop
 from .nyquist import terms_along as terms_along
 from .point_chart import numbers_of_points as numbers_of_points
@@ -39,6 +40,5 @@ from .robust.instability import unstable as unstable
 from .several_directions.curve_set import trace_curves as trace_curves
 from .several_directions.wall_curves import WallBox as WallBox
 from .table_radii import spectral_radii as spectral_radii
-from .traced_edge import TracedEdge as TracedEdge
 from .tracer import Tracer as Tracer
 from .wall_samples import MOST_DEGREE as MOST_DEGREE

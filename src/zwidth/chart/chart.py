@@ -14,8 +14,7 @@ from zwidth.chart.area import Peak
 from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.chart.decay import fastest_decay, fastest_decay_in_first_quadrant
 from zwidth.chart.edge_by_eigenvalues import decided_trace
-from zwidth.chart.loop_edge import LoopEdge
-from zwidth.chart.traced_edge import peak_fields
+from zwidth.chart.loop_edge import LoopEdge, peak_fields
 from zwidth.chart.tracer import tracer_of
 from zwidth.chart.verdict import Verdicts, judge
 from zwidth.loop.loop import Loop

@@ -18,7 +18,7 @@ from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import COMPUTER
 from zwidth.loop.loop_table import LoopTable
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 _OWN: Final = local()  # each thread's working memory for single loops
 

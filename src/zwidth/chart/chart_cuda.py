@@ -45,7 +45,7 @@ SHARED: Final = ("memory.area.rule", "memory.search.least", "memory.search.sizes
 
 
 def numbers_on_gpu(loops: LoopTable, what: int) -> ChartNumbers:
-    """`chart_batch.chart_numbers` on a GPU, which `processors.check_processor` has found."""
+    """`chart_batch.chart_numbers` on a GPU, which `resources.check_processor` has found."""
     N = len(loops.rows)
     out = empty_numbers(N)
     if N == 0:

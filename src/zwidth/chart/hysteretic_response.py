@@ -53,17 +53,16 @@ from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.chart.arcs import MINUS, PAIR, PLUS, ArcPoints, Arcs
 from zwidth.chart.chart import stability_chart
 from zwidth.chart.edge_crossings import EdgeChords, EdgeCurve
+from zwidth.chart.loop_edge import TracedEdge
 from zwidth.chart.measured.chart import MeasuredChart, measured_chart
 from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.nyquist import terms_along
-from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.errors import HysteresisError, ResponseError
 from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.factor_response import factor_response
-from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import table_of_loops
+from zwidth.loop.loop_table import force_filter, table_of_loops
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant

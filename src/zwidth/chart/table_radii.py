@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats, Ints
+from zwidth.chart.point_chart import pieces_of_points, table_of_points
 from zwidth.chart.verdict import BATCH_SIZE
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.multi_loop import AT_ONE, set_aside
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import pieces_of_points, table_of_points
 from zwidth.loop.realisation import StateSpace, state_spaces
 from zwidth.model.coupled_pairs import AGREEMENT
 

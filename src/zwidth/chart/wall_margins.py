@@ -28,6 +28,7 @@ from zwidth.chart.chart_numbers import read_edge
 from zwidth.chart.edge_by_eigenvalues import closed_rings
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, MOST_SAMPLES, NO_WALL, EdgeMemory, edge_memory
 from zwidth.chart.edge_samples import degree_of, fill_loop
+from zwidth.chart.loop_edge import TracedEdge
 from zwidth.chart.margin_edges import (
     NO_PIECE,
     NODES_EACH,
@@ -43,14 +44,13 @@ from zwidth.chart.margin_edges import (
     fits,
     fits_about,
 )
-from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.circle_factors import COMPUTER, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable, table_of_loops
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 DELAY_STEP: Final = 0.25  # samples from one delay to the next at most
 STEPS: Final = 48  # of stiffness that are tried besides those at which an edge enters the strip or leaves it

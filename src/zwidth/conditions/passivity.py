@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.conditions.assumptions import COLLOCATED, PROMPT, RESISTIVE, RIGID, WHOLE_DELAY, Bound, ConditionCase
 from zwidth.loop.factor_response import factor_response, window_response
-from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import force_filter
 
 # Frequencies tried: enough for a relative error below 1e-6 (see the tests); low ones for low cutoffs.
 ANGLES = np.unique(np.concatenate([np.geomspace(1e-6, np.pi, 1500), np.linspace(0.0, np.pi, 3001)[1:]]))

@@ -201,7 +201,7 @@ def ground_friction(plant: Plant) -> float:
 
     Returns  0 without dry friction
 
-    >>> from zwidth.model.nonlinear import Friction, Nonlinear
+    >>> from zwidth.model.plant import Friction, Nonlinear
     >>> one = np.ones(1)
     >>> rubbing = Nonlinear(friction=(Friction(one, 0.2),))
     >>> ground_friction(Plant(np.array([[0.1]]), *np.zeros((2, 1, 1)), one, one, nonlinear=rubbing))

@@ -26,7 +26,7 @@ from zwidth.loop.estimator import Estimator
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.kernels import foaw_estimate, levant_estimate
 from zwidth.loop.estimators.levant import Levant
-from zwidth.loop.filters import force_filter, low_pass_factors, velocity_estimator
+from zwidth.loop.loop_table import force_filter, low_pass_factors, velocity_estimator
 
 LINEAR: Final = 0
 FOAW: Final = 1

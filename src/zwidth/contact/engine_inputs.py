@@ -25,13 +25,11 @@ from zwidth.contact.computer import LATER, NOTHING_LOCAL, SAMPLE, PlantArrays
 from zwidth.contact.hand import ARM, BRAKE, GRASP, Hand
 from zwidth.contact.plant_step import BRISTLES, COULOMB, NOTHING, SAMPLED, SPRING, VARYING
 from zwidth.loop.closed_plant import SAME_INSTANT, measured_force
-from zwidth.loop.controller import split_delay
-from zwidth.loop.fixed_feedback import acts
+from zwidth.loop.controller import acts, split_delay
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import least_deforming_motion, undamped_modes
-from zwidth.model.nonlinear import Counter, Spring
 from zwidth.model.operator import attach
-from zwidth.model.plant import Plant
+from zwidth.model.plant import Counter, Plant, Spring
 
 Element = tuple[int, tuple[float, ...], Floats]
 

@@ -14,10 +14,9 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_inline
 from zwidth.contact.computer import cascade, weigh_readings
-from zwidth.loop.controller import Controller, split_delay
+from zwidth.loop.controller import Controller, LowPass, split_delay
 from zwidth.loop.estimators import LinearMethod
-from zwidth.loop.filters import low_pass_factors
-from zwidth.loop.low_pass import LowPass
+from zwidth.loop.loop_table import low_pass_factors
 
 # Columns of `FeedbackArrays.gains`.
 GAIN, OF_ERROR, INERTIA, DAMPING, COULOMB, DEAD_BAND, LOCAL_STIFFNESS, LOCAL_DAMPING = range(8)

@@ -41,7 +41,7 @@ from zwidth.contact.quasi_linear import (
 )
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import check_kind
-from zwidth.model.nonlinear import Counter, Friction, Nonlinear
+from zwidth.model.plant import Counter, Friction, Nonlinear
 from zwidth.progress import Progress
 from zwidth.result import Documented, documented, entry
 

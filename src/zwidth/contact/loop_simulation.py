@@ -22,11 +22,10 @@ from zwidth.contact.passivity_controller import PassivityController
 from zwidth.contact.time_response import RunSettings, TimeResponse
 from zwidth.loop.estimators import Foaw, Levant
 from zwidth.loop.loop import Loop
-from zwidth.memory_limit import check_memory
 from zwidth.model.argument_checks import check_kind
 from zwidth.progress import Progress, watched
 from zwidth.questions import SIMULATE
-from zwidth.threads import in_chunks
+from zwidth.resources import check_memory, in_chunks
 
 SUBSTEPS = 20
 LARGEST_MOTION = 1.0  # m, from the wall to either side: a device farther away, of which no more is known, is lost

@@ -100,7 +100,7 @@ def simulate_contact(
                                   that need an operator
             ArgumentError   (one of these) for a start or a wall that the handle cannot be moved to
             NoAnswerError          where the environment returns no number
-            TooLarge              (memory_limit) for more samples than there is memory for
+            TooLarge              (resources) for more samples than there is memory for
             ValueError            for numbers that are out of range
             what `OperatingPoint.plant` raises
 

@@ -25,10 +25,10 @@ from zwidth.contact.vibration_kernel import (
     vibrations,
 )
 from zwidth.loop.controller import check_no_feedback, check_no_load
-from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import force_filter
 from zwidth.loop.realisation import FilterStates, filter_states
-from zwidth.model.nonlinear import Counter, Nonlinear
+from zwidth.model.plant import Counter, Nonlinear
 
 SAME = 1e-11  # relative change of all sizes at which the shape agrees with the gains
 

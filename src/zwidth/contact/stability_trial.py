@@ -31,8 +31,8 @@ from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.loop import Loop
 from zwidth.model.modes import least_deforming_motion, natural_frequencies
-from zwidth.model.nonlinear import Nonlinear
 from zwidth.model.operator import attach
+from zwidth.model.plant import Nonlinear
 
 FIRST_SAMPLES: Final = 1024  # samples at first
 LEAST_SAMPLES: Final = 64  # at first, however short the time

@@ -63,8 +63,8 @@ from zwidth.contact.hand import Hand
 from zwidth.contact.loop_simulation import SUBSTEPS
 from zwidth.contact.plant_step import PlantState, dot, read_sensor, step_with_frictions
 from zwidth.errors import UnmovedError
+from zwidth.loop.controller import acts
 from zwidth.loop.estimators import Foaw, Levant
-from zwidth.loop.fixed_feedback import acts
 from zwidth.loop.loop import Loop
 from zwidth.model.operator import Operator
 

@@ -84,7 +84,7 @@ def predict_limit_cycles(
 
     >>> from dataclasses import replace
     >>> from zwidth.loop.controller import Controller
-    >>> from zwidth.model.nonlinear import Friction, Nonlinear
+    >>> from zwidth.model.plant import Friction, Nonlinear
     >>> from zwidth.model.plant import Plant
     >>> one = np.ones(1)
     >>> mass = Plant(0.1 * one[:, None], 0.1 * one[:, None], np.zeros((1, 1)), one, one)

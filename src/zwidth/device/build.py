@@ -34,15 +34,21 @@ from zwidth.device.schema.velocity import (
     KalmanSection,
     VelocitySection,
 )
-from zwidth.loop.controller import NOT_KNOWN, Butterworth, Controller, FirstOrder
+from zwidth.loop.controller import (
+    NOT_KNOWN,
+    Butterworth,
+    Controller,
+    Feedforward,
+    FirstOrder,
+    ForceSensor,
+    LocalLoop,
+)
 from zwidth.loop.estimators import METHODS, BackwardDifference, Foaw, Kalman, LinearMethod, VelocityMethod
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop
 from zwidth.model.design_axes import stack_columns, stack_numbers
 from zwidth.model.mechanism import DriveNonlinearity
 from zwidth.model.modes import add_dampers
-from zwidth.model.nonlinear import Brake, Counter, Friction, Nonlinear, Spring
 from zwidth.model.operator import Operator
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.model.plant import Brake, Counter, Friction, LaggedDamper, Nonlinear, Plant, Spring
 from zwidth.model.response import Response
 
 if TYPE_CHECKING:

@@ -59,8 +59,8 @@ from zwidth.model.mechanism import (
     Drives,
     Links,
     Mechanism,
+    RatioTable,
 )
-from zwidth.model.ratio_table import RatioTable
 
 SINGLE: Final = {
     "revolute": (REVOLUTE,),

@@ -26,8 +26,8 @@ from scipy.special import gamma, roots_genlaguerre, zeta
 from zwidth.arrays import Complexes, Floats
 from zwidth.guarantees.port import Port, port_response
 from zwidth.loop.factor_response import factor_response, feedforward_response
-from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import low_pass_factors
 
 # Number of terms of the expansion in 1/w for the far aliases, and how far beyond the fastest pole it begins.
 TERMS, REACH = 9, 16

@@ -18,7 +18,7 @@ from zwidth.guarantees.port import without_idle_motions
 from zwidth.guarantees.region import Region, empty_region, stiffest_corner
 from zwidth.guarantees.spring_stable import nyquist_region, spring_stable_region
 from zwidth.guarantees.stable_alone import AS_BENT, Premise, bent_as_loaded, stable_alone
-from zwidth.loop.fixed_feedback import acts, feedback_name
+from zwidth.loop.controller import acts, feedback_name
 from zwidth.loop.loop import Loop
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.argument_checks import check_kind, check_number, wrong_type

@@ -30,7 +30,7 @@ from zwidth.guarantees.passive import passive_region_of
 from zwidth.guarantees.region import Region, empty_region
 from zwidth.guarantees.stable_alone import NOT_MEASURED
 from zwidth.loop.factor_response import factor_response
-from zwidth.loop.filters import force_filter
+from zwidth.loop.loop_table import force_filter
 from zwidth.loop.measured.measured_port import MeasuredPort
 from zwidth.loop.operating_point import OperatingPoint
 

@@ -19,7 +19,7 @@ from zwidth.arrays import Complexes, Flags, Floats
 from zwidth.guarantees.gauge import Gauge, gauge
 from zwidth.guarantees.region import Region, empty_region
 from zwidth.guarantees.stable_alone import stable_alone
-from zwidth.loop.fixed_feedback import Feedforward, feedback_name
+from zwidth.loop.controller import Feedforward, feedback_name
 from zwidth.loop.loop import Loop
 from zwidth.model.argument_checks import check_kind
 

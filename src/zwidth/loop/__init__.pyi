@@ -18,6 +18,9 @@ from .wall_matrices import WallMatrices as WallMatrices
 
 # Inner names, for tests and neighbouring packages: they may change with any release.
 # isort: split
+from .controller import Feedforward as Feedforward
+from .controller import ForceSensor as ForceSensor
+from .controller import LocalLoop as LocalLoop
 from .estimator import quantisation_noise as quantisation_noise
 from .estimators import LINEAR_METHODS as LINEAR_METHODS
 from .estimators import METHODS as METHODS
@@ -25,9 +28,6 @@ from .estimators.frequency_response import phase_delay as phase_delay
 from .estimators.frequency_response import relative_response as relative_response
 from .factor_response import feedforward_response as feedforward_response
 from .factor_response import rows_response as rows_response
-from .fixed_feedback import Feedforward as Feedforward
-from .fixed_feedback import ForceSensor as ForceSensor
-from .fixed_feedback import LocalLoop as LocalLoop
 from .loop import SidewaysMotion as SidewaysMotion
 from .loop_table import table_of_loops as table_of_loops
 from .realisation import CHAINED as CHAINED

@@ -26,19 +26,15 @@ import numpy as np
 
 from zwidth.arrays import Complexes, Floats
 from zwidth.errors import ModelError, UnmovedError, UnresolvedError
-from zwidth.loop.controller import Controller, split_delay
-from zwidth.loop.coupled_hold import SampledForm
+from zwidth.loop.controller import Controller, Feedforward, ForceSensor, LocalLoop, LowPass, acts, split_delay
 from zwidth.loop.estimators import LinearMethod
-from zwidth.loop.filters import Filter, factor_roots, low_pass_factors
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor, LocalLoop, acts
 from zwidth.loop.hold import lag_share
-from zwidth.loop.loop_table import LoopTable, loop_table
-from zwidth.loop.low_pass import LowPass
+from zwidth.loop.loop_table import Filter, LoopTable, factor_roots, loop_table, low_pass_factors
 from zwidth.loop.plant_states import PlantStates, SampledInput, plant_states
-from zwidth.loop.pole_zero_form import PoleZeroForm, pole_zero_form
+from zwidth.loop.pole_zero_form import PoleZeroForm, SampledForm, pole_zero_form
 from zwidth.loop.realisation import FilterStates, filter_states
-from zwidth.loop.sections import Sections, check_no_loss_factor
-from zwidth.model.plant import Plant
+from zwidth.loop.sections import Sections
+from zwidth.model.plant import Plant, check_no_loss_factor
 
 SAMPLE, SLOW, FAST, END = range(4)  # what happens in a period, in this order at one instant
 SAME_INSTANT = 1e-12  # shares of the period within which two instants are one

@@ -15,7 +15,8 @@ is a weighted mean of backward differences,
 Written so it keeps its digits at low frequencies, where the c_k cancel. The estimate is late by half a sample and
 the weights' mean age, and the white noise of the position is multiplied by the norm of the c_k over T.
 
-Checks of the parameters of velocity estimators.
+Of such estimates the plain differences of two positions stand here, the others in `estimators`; all check their
+parameters in the same way.
 """
 
 from __future__ import annotations
@@ -94,3 +95,84 @@ def quantisation_noise(resolution: float) -> float:
     """
     check_positive("the encoder's resolution", resolution, "m")
     return resolution / sqrt(12.0)
+
+
+@dataclass(frozen=True)
+class BackwardDifference:
+    """v_j = (x_j - x_{j-1}) / T.
+
+        w(z) = (z - 1)/(T z),      w(e^{s T}) = s e^{-s T/2} sinh(s T/2)/(s T/2)
+
+    The least delay that a difference can have, and the most noise.
+
+    >>> BackwardDifference().delay(0.001), round(BackwardDifference().noise_gain(0.001), 1)
+    (0.0005, 1414.2)
+    """
+
+    def estimator(self, period: float) -> Estimator:
+        """w(z) at a sampling period [s]."""
+        return mean_difference(np.ones(1), period)
+
+    def delay(self, period: float) -> float:
+        """Delay of the estimate [s]: T/2, at every frequency."""
+        return 0.5 * period
+
+    def noise_gain(self, period: float) -> float:
+        """Standard deviation of the estimate per that of white noise in the position [1/s]: sqrt(2)/T."""
+        return sqrt(2.0) / period
+
+
+@dataclass(frozen=True)
+class WindowedDifference:
+    """v_j = (x_j - x_{j-n}) / (n T), the plain mean of the last n backward differences.
+
+        w(z) = (1 - z^-n)/(n T)
+
+    samples  n, from 1 (the backward difference) to 1000; an encoder's step appears in the velocity over n T
+    Raises   ValueError  otherwise
+
+    >>> WindowedDifference(4).estimator(0.001).window
+    array([0.25, 0.25, 0.25, 0.25])
+    """
+
+    samples: int
+
+    def __post_init__(self) -> None:
+        check_whole("samples", self.samples, 1, LONGEST, "the estimate is late by half the window")
+
+    def estimator(self, period: float) -> Estimator:
+        """w(z) at a sampling period [s]."""
+        return mean_difference(np.full(self.samples, 1.0 / self.samples), period)
+
+    def delay(self, period: float) -> float:
+        """Delay of the estimate [s]: n T/2, at every frequency."""
+        return 0.5 * self.samples * period
+
+    def noise_gain(self, period: float) -> float:
+        """Standard deviation of the estimate per that of white noise in the position [1/s]: sqrt(2)/(n T)."""
+        return sqrt(2.0) / (self.samples * period)
+
+
+@dataclass(frozen=True)
+class CentralDifference:
+    """v_j = (x_j - x_{j-2}) / (2 T): the central difference, known one sample late because it needs the next one.
+
+        w(z) = (1 - z^-2)/(2 T)
+
+    The same as the windowed difference over two samples. At half the sampling rate it gives 0, w(-1) = 0.
+
+    >>> CentralDifference().delay(0.001)
+    0.001
+    """
+
+    def estimator(self, period: float) -> Estimator:
+        """w(z) at a sampling period [s]."""
+        return mean_difference(np.full(2, 0.5), period)
+
+    def delay(self, period: float) -> float:
+        """Delay of the estimate [s]: T, at every frequency."""
+        return period
+
+    def noise_gain(self, period: float) -> float:
+        """Standard deviation of the estimate per that of white noise in the position [1/s]: 1/(sqrt(2) T)."""
+        return sqrt(0.5) / period

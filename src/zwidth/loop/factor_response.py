@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.arrays import Complexes, Floats
-from zwidth.loop.filters import low_pass_factors
-from zwidth.loop.fixed_feedback import Feedforward, ForceSensor
-from zwidth.loop.low_pass import LowPass
+from zwidth.loop.controller import Feedforward, ForceSensor, LowPass
+from zwidth.loop.loop_table import low_pass_factors
 
 
 def factor_response(numerator: Floats, denominator: Floats, d: Complexes) -> Complexes:

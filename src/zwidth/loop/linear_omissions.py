@@ -9,10 +9,8 @@ import numpy as np
 
 from zwidth.loop.controller import Controller
 from zwidth.model.load import Load
-from zwidth.model.mechanism import Mechanism, nonlinear_of_drives
-from zwidth.model.nonlinear import Nonlinear
-from zwidth.model.plant import Plant
-from zwidth.model.ratio_table import with_any_ratio
+from zwidth.model.mechanism import Mechanism, nonlinear_of_drives, with_any_ratio
+from zwidth.model.plant import Nonlinear, Plant
 
 STRAIGHT: Final = (
     "linearised at the straight shape, first order missing: links that bend are under load, and what their "

@@ -30,18 +30,16 @@ from zwidth.loop.closed_plant import ClosedSections, close_plant, closed_section
 from zwidth.loop.controller import Controller, NotKnown
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.factor_response import factor_response, rows_response, window_response
-from zwidth.loop.filters import NO_FILTER, Filter, force_path, velocity_estimator
 from zwidth.loop.hold import denominator
 from zwidth.loop.linear_omissions import with_computer
-from zwidth.loop.loop_table import LoopTable, loop_table
+from zwidth.loop.loop_table import NO_FILTER, Filter, LoopTable, force_path, loop_table, velocity_estimator
 from zwidth.loop.motion_names import motion_name
 from zwidth.loop.realisation import StateSpace, realise
 from zwidth.loop.sections import Sections, plant_rows, sampled_sections
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.first_order_form import first_order_form
 from zwidth.model.modes import real_modes, undamped_modes
-from zwidth.model.nonlinear import Nonlinear
-from zwidth.model.plant import Plant
+from zwidth.model.plant import Nonlinear, Plant
 from zwidth.result import Documented, documented, entry, finite
 
 if TYPE_CHECKING:

@@ -42,8 +42,8 @@ from zwidth import _verbs
 from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.errors import SeveralDirectionsError, UnmovedError
 from zwidth.loop.controller import Controller
-from zwidth.loop.filters import force_filter, velocity_estimator
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import force_filter, velocity_estimator
 from zwidth.loop.motion_names import motion_name, pole_name
 from zwidth.loop.realisation import FilterStates, filter_states
 from zwidth.loop.wall_matrices import PrincipalDirections, WallMatrices

@@ -21,7 +21,7 @@ from zwidth.loop.loop import Loop, has_inertia_share, with_inertia_of
 from zwidth.loop.multi_loop import MultiLoop
 from zwidth.loop.posed_device import NO_MODEL, PosedDevice, check_several_directions, point_text
 from zwidth.model.arm import attach_arm
-from zwidth.model.loaded_plant import LoadedPlants, counting_all, linearise, set_apart
+from zwidth.model.loaded_posture import LoadedPlants, counting_all, linearise, set_apart
 from zwidth.model.multi_plant import MultiPlant, reduce_directions
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant

@@ -1,7 +1,7 @@
 """A plant on states whose growth over any part of a sampling period is known to all digits.
 
-Modes that damping does not couple have closed forms (`loop.hold`), the others an exponential (`coupled_hold`). Two
-readings belong to the states: the encoder's y, and the force f that a sensor at the handle measures,
+Modes that damping does not couple have closed forms (`loop.hold`), the others an exponential (`pole_zero_form`).
+Two readings belong to the states: the encoder's y, and the force f that a sensor at the handle measures,
 
     f = force_by_states . X + force_direct a,        a the force at the actuator at that instant
 
@@ -19,10 +19,10 @@ from functools import cached_property
 import numpy as np
 
 from zwidth.arrays import Floats
-from zwidth.loop.coupled_hold import step_growth, steps_growth
+from zwidth.loop.controller import LowPass
 from zwidth.loop.hold import modal_row, mode_growth
-from zwidth.loop.low_pass import LowPass
 from zwidth.loop.motion_names import motion_name, pole_name
+from zwidth.loop.pole_zero_form import step_growth, steps_growth
 from zwidth.loop.sections import equal_modes
 from zwidth.model.first_order_form import (
     SECOND_UNREAD,

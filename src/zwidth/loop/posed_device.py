@@ -27,19 +27,24 @@ from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.model.argument_checks import check_choice
 from zwidth.model.arm import Arm
 from zwidth.model.design_axes import Change, at_index, change_fields, design_shape, differing_fields, in_one_axis
-from zwidth.model.drive_side import DriveSide, drive_side
-from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
+from zwidth.model.effective_mass import (
+    DriveSide,
+    EffectiveParameters,
+    drive_side,
+    effective_parameters,
+    lever_arms,
+    screw,
+)
 from zwidth.model.equilibrium import Equilibrium, solve_equilibrium
 from zwidth.model.load import Load, unit_of_push
 from zwidth.model.loaded_posture import loaded_postures
-from zwidth.model.mechanism import Drives, Mechanism
+from zwidth.model.mechanism import Drives, Mechanism, drives_at
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.modes import Damping, GivenDamping
 from zwidth.model.motions import Motions
 from zwidth.model.operator import ABOUT_AN_AXIS, Operator
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture, handle_motions, handle_range, solve_posture
-from zwidth.model.ratio_table import drives_at
 from zwidth.model.reduction import Encoders, Model, plant_effective_parameters
 from zwidth.model.response import Response
 

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Complexes, Floats, Ints
-from zwidth.loop.coupled_hold import SampledForm
 from zwidth.loop.estimator import Estimator
-from zwidth.loop.filters import Filter
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import Filter, LoopTable
+from zwidth.loop.pole_zero_form import SampledForm
 from zwidth.loop.sections import Sections
 
 

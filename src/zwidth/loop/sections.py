@@ -12,17 +12,17 @@ import numpy as np
 
 from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled
-from zwidth.errors import HysteresisError, UnmovedError, UnresolvedError
+from zwidth.errors import UnmovedError, UnresolvedError
 from zwidth.loop.controller import Controller, whole_samples
-from zwidth.loop.coupled_hold import SampledForm, exact_rows, form_rows, rows_error, sample_form, separate_rows
 from zwidth.loop.hold import held_row, lagged_row, modal_row
 from zwidth.loop.motion_names import motion_name, pole_name
+from zwidth.loop.pole_zero_form import SampledForm, exact_rows, form_rows, rows_error, sample_form, separate_rows
 from zwidth.model.first_order_form import FirstOrderForm, first_order_form, without_hidden_poles
 from zwidth.model.modes import REPEATED, UNOBSERVED, UNOBSERVED_UNDAMPED, RealModes, real_modes, repeat_tolerance
-from zwidth.model.plant import Plant
+from zwidth.model.plant import Plant, check_no_loss_factor
 from zwidth.model.plant_modes import fill_modes
 from zwidth.model.rendered_modes import PolePairs
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 # Two pairs of poles of a chain within this relative distance are equal poles that rounding has set apart.
 SAME_POLES = 1e-6
@@ -65,15 +65,6 @@ def sampled_sections(plant: Plant, period: float, fraction: float = 0.0, lag: fl
     if not len(sections.rows):
         raise UnmovedError("the wall force moves nothing that the sensor reads; check actuator and sensor")
     return sections
-
-
-def check_no_loss_factor(plant: Plant) -> None:
-    """Raise HysteresisError for a plant with a loss factor."""
-    if plant.hysteresis is not None:
-        raise HysteresisError(
-            "a loss factor describes steady vibration, not motion in time: only the chart and verdicts on walls "
-            "can be computed with it; describe the damping by damping_Ns_per_m instead"
-        )
 
 
 def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float) -> Sections:

@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from zwidth.arrays import Complexes, Floats
+from zwidth.chart.point_chart import modes_of_points
 from zwidth.conditions.assumptions import SPRUNG, UNDELAYED
 from zwidth.errors import MeasureError
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import modes_of_points
 from zwidth.measures.definition import OK, MeasureValues, WantedWall
 from zwidth.measures.evaluation import evaluate_pointwise, with_status
 from zwidth.measures.handle_impedance import handle_of

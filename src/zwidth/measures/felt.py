@@ -25,7 +25,7 @@ from zwidth.chart.chart_base import BoundaryArc, Chart
 from zwidth.chart.verdict import judge
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response, window_response
-from zwidth.loop.filters import force_filter, velocity_estimator
+from zwidth.loop.loop_table import force_filter, velocity_estimator
 from zwidth.loop.measured.measured_port import MeasuredPort
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.handle_impedance import (

@@ -59,8 +59,8 @@ from zwidth.errors import HandleError
 from zwidth.loop.closed_plant import path_responses
 from zwidth.loop.controller import Controller, check_no_feedback, check_no_load
 from zwidth.loop.factor_response import factor_response, feedforward_response, sensor_response
-from zwidth.loop.filters import low_pass_factors
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import low_pass_factors
 from zwidth.model.argument_checks import broadcast_walls, check_kind
 from zwidth.model.modes import undamped_modes
 from zwidth.model.plant import Plant

@@ -23,7 +23,7 @@ from zwidth.arrays import Complexes, Flags, Floats, Ints
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_batch import STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
-from zwidth.chart.point_chart import numbers_of_points
+from zwidth.chart.point_chart import modes_of_points, numbers_of_points, table_of_points
 from zwidth.chart.table_radii import radii_at_points, slowest_roots
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, eigenvalues, judge
 from zwidth.compiled import compiled
@@ -39,11 +39,9 @@ from zwidth.loop.circle_factors import (
     velocity_on_circle,
 )
 from zwidth.loop.controller import Controller
-from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import LoopTable, force_filter
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import modes_of_points, table_of_points
 from zwidth.measures.definition import OK, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_charts, complete_pointwise
 from zwidth.measures.handle_impedance import check_no_local_loop, felt_impedance, free_impedance

@@ -33,7 +33,7 @@ from zwidth.arrays import Flags, Floats
 from zwidth.chart.chart import largest_stiffness, stability_chart
 from zwidth.chart.chart_batch import ALL_NUMBERS, DECAY, STIFFEST
 from zwidth.chart.edge_memory import DOUBTFUL
-from zwidth.chart.point_chart import numbers_of_points
+from zwidth.chart.point_chart import numbers_of_points, pieces_of_points, tables_of_points
 from zwidth.chart.wall_margins import delays_within, stiffness_with_margins, stiffness_with_margins_alone
 from zwidth.conditions import thesis_flexible, thesis_whole_delay
 from zwidth.conditions.assumptions import RIGID, SPRUNG, UNDELAYED, WHOLE_DELAY
@@ -41,7 +41,6 @@ from zwidth.errors import MeasureError, NoValueError
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import joined_tables
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import pieces_of_points, tables_of_points
 from zwidth.measures.definition import MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_charts, complete_pointwise, evaluate_pointwise, with_status
 from zwidth.measures.preconditions import check_assumptions, check_motor_encoders, loop_case, numbers_of

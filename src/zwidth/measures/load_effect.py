@@ -19,7 +19,7 @@ from zwidth.chart.chart import largest_stiffness
 from zwidth.errors import MeasureError, NoAnswerError, NoValueError
 from zwidth.loop.loop import SidewaysMotion
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.model.loaded_plant import moved_motions
+from zwidth.model.loaded_posture import moved_motions
 
 NONE_STABLE: Final = "no wall with K > 0 and B >= 0 is stable"
 

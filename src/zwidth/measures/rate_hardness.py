@@ -35,7 +35,7 @@ from zwidth.arrays import Floats, Ints
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
 from zwidth.loop.loop_table import LoopTable
 from zwidth.model.rendered_modes import RenderedModes
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 LEAST_SAMPLES, MOST_SAMPLES = 64, 4096  # after the contact
 PERIODS: Final = 2.0  # of the slowest flexible mode, that are simulated

@@ -6,15 +6,15 @@ from .modes import ProportionalDamping as ProportionalDamping
 from .modes import natural_frequencies as natural_frequencies
 from .multi_plant import MultiPlant as MultiPlant
 from .multi_plant import reduce_directions as reduce_directions
-from .nonlinear import Brake as Brake
-from .nonlinear import Counter as Counter
-from .nonlinear import Friction as Friction
-from .nonlinear import Nonlinear as Nonlinear
-from .nonlinear import Spring as Spring
 from .operator import Operator as Operator
 from .operator import attach as attach
+from .plant import Brake as Brake
+from .plant import Counter as Counter
+from .plant import Friction as Friction
 from .plant import LaggedDamper as LaggedDamper
+from .plant import Nonlinear as Nonlinear
 from .plant import Plant as Plant
+from .plant import Spring as Spring
 from .posture import Posture as Posture
 from .posture import joint_position as joint_position
 from .posture import reachable_positions as reachable_positions
@@ -52,6 +52,7 @@ from .mechanism import REVOLUTE as REVOLUTE
 from .mechanism import Closures as Closures
 from .mechanism import DriveNonlinearity as DriveNonlinearity
 from .mechanism import Links as Links
+from .mechanism import RatioTable as RatioTable
 from .mechanism_arrays import pack as pack
 from .modes import modal_matrix as modal_matrix
 from .modes import undamped_modes as undamped_modes
@@ -60,7 +61,6 @@ from .multi_plant import decompose as decompose
 from .plant_modes import modes_in_general as modes_in_general
 from .posture import inertia_terms as inertia_terms
 from .posture import link_points as link_points
-from .ratio_table import RatioTable as RatioTable
 from .raw_sweep import sweep_response_of_blocks as sweep_response_of_blocks
 from .reduction import MODELS as MODELS
 from .reduction import plant_effective_parameters as plant_effective_parameters

@@ -26,7 +26,7 @@ from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.modes import UNOBSERVED_UNDAMPED
 from zwidth.model.operator import Operator
 from zwidth.model.rendered_modes import PolePairs, RenderedModes
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 ITERATIONS: Final = 3
 # Two poles nearer than this share of their size, or a pole whose left and right vectors are this near to

@@ -25,7 +25,7 @@ import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.errors import EquilibriumError, LoadError, SidewaysForceError
-from zwidth.model.drive_side import CountedPosture, DriveMotion, counted_posture
+from zwidth.model.effective_mass import CountedPosture, DriveMotion, counted_posture
 from zwidth.model.load import ALONG, Load, unit_of_push, vector_text
 from zwidth.model.mechanism import ORIENTATION, POSITION, PRISMATIC, Compensation, Drives, Mechanism, kinks
 from zwidth.model.mechanism_arrays import pack

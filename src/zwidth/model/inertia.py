@@ -13,9 +13,8 @@ from zwidth.arrays import Floats
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.closure import equations, passive_rates
 from zwidth.model.forward_kinematics import WorkingMemory, link_point, place_links, working_memory
-from zwidth.model.mechanism import PRISMATIC, Mechanism
+from zwidth.model.mechanism import PRISMATIC, Mechanism, with_any_ratio
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
-from zwidth.model.ratio_table import with_any_ratio
 
 NO_TURN: Final = 1e-12  # share of the fastest link's angular velocity that is rounding
 

@@ -23,8 +23,7 @@ from zwidth.arrays import Floats
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.design_axes import Number
 from zwidth.model.mechanism import Drives
-from zwidth.model.nonlinear import project_onto_motions
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.model.plant import LaggedDamper, Plant, project_onto_motions
 
 # Squared frequencies below this share of the largest are rounding of a rigid mode's exact zero.
 RIGID = 1e-13

@@ -16,17 +16,15 @@ import numpy as np
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled
 from zwidth.model.design_axes import design_shape
-from zwidth.model.drive_side import DriveSide, drive_side
-from zwidth.model.effective_mass import lever_arms, screw
-from zwidth.model.mechanism import Mechanism
+from zwidth.model.effective_mass import DriveSide, drive_side, lever_arms, screw
+from zwidth.model.mechanism import Mechanism, at_postures
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.modes import REPEATED, RIGID, Damping, ModalDamping, ProportionalDamping
 from zwidth.model.plant import Plant
 from zwidth.model.posture import OK, Posture
-from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders
 from zwidth.model.rendered_modes import RenderedModes, jacobi
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 STILL = 1e-14  # share of the largest damping below which a mode's own is rounding
 

@@ -40,7 +40,7 @@ from zwidth.model.handle_position import (
     goal_of_angles,
     positions_about_reference,
 )
-from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Mechanism
+from zwidth.model.mechanism import ORIENTATION, POSE, POSITION, PRISMATIC, Mechanism, RatioTable
 from zwidth.model.mechanism_arrays import MechanismArrays, design_of_each, pack, per_design
 from zwidth.model.posture_batch import (
     PostureBatch,
@@ -51,7 +51,6 @@ from zwidth.model.posture_batch import (
     solve_batch,
     solve_from_starts,
 )
-from zwidth.model.ratio_table import RatioTable
 from zwidth.model.roadmap import roadmap
 from zwidth.model.rotations import roll_pitch_yaw_of, rotation_matrix, rotation_vector
 

@@ -34,7 +34,7 @@ from zwidth.model.inertia import handle_jacobian, mass_matrix, unit_motions
 from zwidth.model.mechanism import ORIENTATION, PRISMATIC, REVOLUTE
 from zwidth.model.mechanism_arrays import MechanismArrays
 from zwidth.model.roadmap import roadmap
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 SERIAL_MOST: Final = 8  # postures up to which threads cost more than they bring
 # Postures of one design from which on its roadmap, which takes as long as some ten thousand straight ways, pays

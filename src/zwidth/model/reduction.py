@@ -22,9 +22,17 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats, Ints
 from zwidth.errors import DirectionError, ModelError
 from zwidth.model.argument_checks import check_kind
-from zwidth.model.drive_side import DriveSide, drive_side, drive_side_of_motions, is_plain
-from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, lever_arms, screw
-from zwidth.model.mechanism import Drives, Mechanism, nonlinear_of_drives
+from zwidth.model.effective_mass import (
+    DriveSide,
+    EffectiveParameters,
+    drive_side,
+    drive_side_of_motions,
+    effective_parameters,
+    is_plain,
+    lever_arms,
+    screw,
+)
+from zwidth.model.mechanism import Drives, Mechanism, at_postures, nonlinear_of_drives
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.modes import (
     Damping,
@@ -38,10 +46,8 @@ from zwidth.model.modes import (
     winding_dampers,
 )
 from zwidth.model.motions import Motions
-from zwidth.model.nonlinear import Friction, Nonlinear, project_onto_motions
-from zwidth.model.plant import LaggedDamper, Plant
+from zwidth.model.plant import Friction, LaggedDamper, Nonlinear, Plant, project_onto_motions
 from zwidth.model.posture import OK, Posture
-from zwidth.model.ratio_table import at_postures
 
 Model = Literal["full", "two-mass", "motor-mass", "rigid"]
 Encoders = Literal["motor", "link"]

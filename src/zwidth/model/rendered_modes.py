@@ -22,13 +22,12 @@ import numpy as np
 from zwidth.arrays import Flags, Floats, Ints
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.model.effective_mass import EffectiveParameters, effective_parameters, inverse_form, lever_arms, screw
-from zwidth.model.mechanism import Mechanism
+from zwidth.model.mechanism import Mechanism, at_postures
 from zwidth.model.mechanism_arrays import design_of_each, per_design
 from zwidth.model.modes import Damping, ModalDamping, ProportionalDamping
 from zwidth.model.posture import Posture
-from zwidth.model.ratio_table import at_postures
 from zwidth.model.reduction import Encoders, Model
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ def rendered_modes(
     encoders: Encoders = "motor",
 ) -> RenderedModes | None:
     """The modes of each posture's model along its direction, of one design or of many, of a plain mechanism
-    (`drive_side.is_plain`); None for readings behind the drives in a reduced model.
+    (`effective_mass.is_plain`); None for readings behind the drives in a reduced model.
 
     posture    (...), flattened to N; the designs of the mechanism broadcast with it
     direction  (..., 3)  unit vectors, or (..., 6) screws (`effective_parameters.screw`)

@@ -18,7 +18,7 @@ import numpy as np
 
 from zwidth.errors import OutputError
 from zwidth.show.output import csv_text, replacing
-from zwidth.study.designs.sweep_data import (
+from zwidth.study.designs.sweep import (
     DESIGN,
     column_attributes,
     coordinates,

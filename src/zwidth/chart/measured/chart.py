@@ -24,6 +24,7 @@ from zwidth.chart.arcs import Arcs, Window, cut_at_holes, window_of
 from zwidth.chart.area import quadrant_area
 from zwidth.chart.chart import largest_stiffness
 from zwidth.chart.chart_base import BoundaryArc, Chart, DrawnChart
+from zwidth.chart.loop_edge import TracedEdge
 from zwidth.chart.measured.boundary import (
     Boundary,
     coarse_angles,
@@ -50,7 +51,6 @@ from zwidth.chart.measured.stable_regions import (
     regions_within,
     window_of_regions,
 )
-from zwidth.chart.traced_edge import TracedEdge
 from zwidth.errors import ResponseError
 from zwidth.loop.controller import Controller
 from zwidth.loop.operating_point import OperatingPoint

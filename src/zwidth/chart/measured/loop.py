@@ -23,7 +23,7 @@ from zwidth.chart.measured.response_interpolation import (
 from zwidth.errors import ResponseError
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response, window_response
-from zwidth.loop.filters import force_filter, velocity_estimator
+from zwidth.loop.loop_table import force_filter, velocity_estimator
 from zwidth.model.response import (
     CONFIDENCE,
     LEAST_COHERENCE,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import ArcPoints
+from zwidth.chart.loop_edge import TracedEdge
 from zwidth.chart.robust.common_chart import CommonChart, lost_share
 from zwidth.chart.robust.common_edge import common_edge
 from zwidth.chart.robust.instability import perhaps_unstable
@@ -25,7 +26,6 @@ from zwidth.chart.robust.members import (
     intersect_members,
     member_polygons,
 )
-from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.tracer import CHORD
 from zwidth.chart.verdict import STABLE, UNDECIDED, Verdicts, judge, sides_of_circle
 from zwidth.errors import ChartError

@@ -10,7 +10,7 @@ from zwidth.chart.loop_polynomials import LoopPolynomials, fill_loop_polynomials
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
 from zwidth.loop.loop_table import LoopTable
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 
 @compiled

@@ -13,6 +13,7 @@ from shapely.geometry.polygon import orient
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import Arcs
 from zwidth.chart.chart_base import DrawnChart
+from zwidth.chart.loop_edge import TracedEdge
 from zwidth.chart.several_directions.completeness import (
     BESIDE,
     ROOM,
@@ -29,7 +30,6 @@ from zwidth.chart.several_directions.completeness import (
 from zwidth.chart.several_directions.curve_set import CurveSet, trace_curves
 from zwidth.chart.several_directions.polygon_arcs import Branch, ring_arcs
 from zwidth.chart.several_directions.wall_curves import WallBox, WallCurve
-from zwidth.chart.traced_edge import TracedEdge
 from zwidth.chart.verdict import Verdicts, sides_of_circle, verdicts
 from zwidth.loop.loop import Loop
 from zwidth.loop.multi_loop import MultiLoop

@@ -29,7 +29,6 @@ from zwidth.contact.mechanism.system import System, system_of
 from zwidth.errors import ArgumentError, NoMechanismError
 from zwidth.loop.controller import Controller, check_no_feedback
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.memory_limit import check_memory
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import MechanismArrays, pack
@@ -38,6 +37,7 @@ from zwidth.model.reduction import reduce_mechanism
 from zwidth.model.roadmap import roadmap
 from zwidth.progress import Progress, watched
 from zwidth.questions import MOVE
+from zwidth.resources import check_memory
 
 REASONS: Final = {
     kernel.DONE: ("done", ""),

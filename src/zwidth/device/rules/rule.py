@@ -18,7 +18,7 @@ from zwidth.arrays import Floats
 from zwidth.device.address import is_number, table
 from zwidth.device.faults import KeyMessages, KeyPath
 from zwidth.device.legs import written
-from zwidth.loop.fixed_feedback import MOST_FAST_SAMPLES
+from zwidth.loop.controller import MOST_FAST_SAMPLES
 from zwidth.model.design_axes import join_designs
 
 Document = dict[str, Any]

@@ -22,7 +22,7 @@ from zwidth.device.schema.value_types import (
     documented_key,
 )
 from zwidth.device.schema.velocity import BackwardDifferenceSection, LowPass, VelocitySection
-from zwidth.loop.fixed_feedback import MOST_FAST_SAMPLES
+from zwidth.loop.controller import MOST_FAST_SAMPLES
 
 SHORTEST_PERIOD: Final = 1e-7  # s; 10 MHz, far beyond any loop round a motor
 LONGEST_PERIOD: Final = 1.0  # s

@@ -43,7 +43,7 @@ from zwidth.device.schema.value_types import (
     WholeNumber,
     documented_key,
 )
-from zwidth.model.nonlinear import FrictionModel
+from zwidth.model.plant import FrictionModel
 
 _MODEL: Final = (
     'how it grips: "coulomb" (one level, and at rest what keeps it there), "dahl" (by bristles that give way) or '

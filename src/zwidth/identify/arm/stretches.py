@@ -13,7 +13,7 @@ from zwidth.identify.arm.checks import DriveChannels
 from zwidth.identify.arm.smoothing import TorqueBand, convolved
 from zwidth.identify.records.record import Record
 from zwidth.identify.records.sampling import SampleTimes
-from zwidth.memory_limit import check_memory
+from zwidth.resources import check_memory
 
 Table = tuple[bool, Floats]  # whether a stretch begins with it; time, coordinates and forces (n, 1 + 2 d)
 

@@ -14,8 +14,8 @@ from zwidth.device.device import Device
 from zwidth.device.faults import dotted, fail, quote
 from zwidth.loop.controller import Controller
 from zwidth.loop.factor_response import factor_response
-from zwidth.loop.filters import force_filter
 from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import force_filter
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.model.operator import attach
 from zwidth.model.plant import Plant

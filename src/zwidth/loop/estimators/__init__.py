@@ -9,15 +9,13 @@ Two methods are not linear, `Foaw` and `Levant`: they have no w(z), `estimator` 
 with them is simulated instead. `zwidth.loop.estimators.kernels` runs any method over recorded positions.
 """
 
+from zwidth.loop.estimator import BackwardDifference, CentralDifference, WindowedDifference
 from zwidth.loop.estimators.alpha_beta import AlphaBeta
-from zwidth.loop.estimators.backward_difference import BackwardDifference
-from zwidth.loop.estimators.central_difference import CentralDifference
 from zwidth.loop.estimators.foaw import Foaw
 from zwidth.loop.estimators.kalman import Kalman
 from zwidth.loop.estimators.least_squares_slope import LeastSquaresSlope
 from zwidth.loop.estimators.levant import Levant
 from zwidth.loop.estimators.savitzky_golay import SavitzkyGolay
-from zwidth.loop.estimators.windowed_difference import WindowedDifference
 
 LinearMethod = (
     BackwardDifference

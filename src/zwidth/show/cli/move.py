@@ -289,7 +289,7 @@ class MoveCommand(Command):
 
 def _check_memory(case: CommandLine) -> None:
     """Raise TooLarge for more samples than there is memory for, all that is shown as text included."""
-    from zwidth.memory_limit import check_memory
+    from zwidth.resources import check_memory
 
     samples = case["duration"] / case.device.controller.sampling_period
     numbers = NUMBERS_PER_SAMPLE[0] + NUMBERS_PER_SAMPLE[1] * len(case.point.drives.names)

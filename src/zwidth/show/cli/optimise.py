@@ -163,7 +163,7 @@ def _check_designs(folder: Path, study: Study) -> None:
 def front_table(found: Optimisation) -> tuple[list[str], list[list[str]]]:
     """Headings, and a row for the device as it is and for each design of the front."""
     from zwidth.show.report.optimisation import short_names
-    from zwidth.study.designs.sweep_data import axis_value_text
+    from zwidth.study.designs.sweep import axis_value_text
     from zwidth.study.optimisation.optimise import own_values
 
     problem = found.problem

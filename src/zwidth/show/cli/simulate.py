@@ -159,7 +159,7 @@ class SimulateCommand(Command):
 
 def _check_memory(case: CommandLine) -> None:
     """Raise TooLarge for more samples than there is memory for, with their text and a sound of a given pitch."""
-    from zwidth.memory_limit import check_memory
+    from zwidth.resources import check_memory
 
     if case["duration"] is None:
         return

@@ -131,8 +131,7 @@ class SweepCommand(Command):
 
     def compute(self, case: CommandLine) -> Sweep:
         from zwidth.errors import MeasureError, TooLarge
-        from zwidth.study.designs.sweep import compute_designs
-        from zwidth.study.designs.sweep_data import check_listing
+        from zwidth.study.designs.sweep import check_listing, compute_designs
         from zwidth.study.designs.sweep_job import sweep_job
 
         question = case.question
@@ -169,7 +168,7 @@ class SweepCommand(Command):
         return ""  # the pages begin with how many designs there are
 
     def pages(self, case: CommandLine, result: Sweep, document: Mapping[str, Any]) -> Iterator[Any]:
-        from zwidth.study.designs.sweep_data import axis_value_text
+        from zwidth.study.designs.sweep import axis_value_text
 
         count, sampling, columns = result.job.count, result.job.sampling, result.job.columns
         shape = str(count) if sampling.kind != "grid" else " x ".join(map(str, sampling.shape))
@@ -250,7 +249,7 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
     """The extremes of one column, with their designs; and how many designs there are of each status."""
     from zwidth.measures.definition import STATUS
     from zwidth.show.units import quantity
-    from zwidth.study.designs.sweep_data import axis_value_text
+    from zwidth.study.designs.sweep import axis_value_text
 
     one, sampling, summary = sweep.job.columns[column], sweep.job.sampling, sweep.summaries[column]
     for name, extreme in (("lowest", summary.lowest), ("highest", summary.highest)):
@@ -266,7 +265,7 @@ def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
 
 def _reasons(sweep: Sweep) -> Iterator[str]:
     """Why designs have no value, once for all columns that say the same."""
-    from zwidth.study.designs.sweep_data import note_sentences
+    from zwidth.study.designs.sweep import note_sentences
 
     names_by_sentence: dict[str, list[str]] = {}
     for name, sentence in note_sentences(sweep):

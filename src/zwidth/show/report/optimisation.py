@@ -24,7 +24,7 @@ from zwidth.show.figures.style import context, figure
 from zwidth.show.report.figures import both_drawings
 from zwidth.show.report.report import page_template
 from zwidth.show.units import percent, quantity, speaking_of_moments
-from zwidth.study.designs.sweep_data import axis_value_text
+from zwidth.study.designs.sweep import axis_value_text
 from zwidth.study.optimisation.evaluation import margins
 from zwidth.study.optimisation.optimisation import Optimisation, worst_point
 from zwidth.study.optimisation.optimise import own_values

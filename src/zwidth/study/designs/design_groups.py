@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
+from zwidth.chart.point_chart import table_of_points
 from zwidth.device import address
 from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
 from zwidth.device.faults import KeyPath
@@ -23,7 +24,6 @@ from zwidth.device.operator_choice import with_operator
 from zwidth.errors import DeviceError, PostureError
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import table_of_points
 from zwidth.model.posture import OK
 from zwidth.study.designs.sampling import CIRCUMSTANCES, WANTED
 

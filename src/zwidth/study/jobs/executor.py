@@ -29,10 +29,9 @@ import numpy as np
 from zwidth.argument import check_arguments
 from zwidth.arrays import Flags
 from zwidth.measures.definition import MISSING
-from zwidth.memory_limit import check_memory
-from zwidth.processors import Processor, check_processor, computing_on
 from zwidth.progress import Progress
 from zwidth.questions import RUN
+from zwidth.resources import Processor, check_memory, check_processor, computing_on
 from zwidth.study.jobs.job import Cells, CellValues, Job, Notes, merge_notes
 from zwidth.study.jobs.workers import (
     GRACE,
@@ -98,7 +97,7 @@ def run_job(
               CannotStart   where no process can be started;  WorkerLost  where every cell ends its process
               ClusterError  where the cluster cannot be used, or its scheduler ends; batches done are kept
               ValueError    for arguments that do not go together
-              what `processors.check_processor` raises
+              what `resources.check_processor` raises
               MeasureError, DeviceError as the job does
 
     >>> class Squares:

@@ -42,7 +42,7 @@ from zwidth.arrays import Flags, Floats
 from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.errors import StoreError
 from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS, Note
-from zwidth.memory_limit import check_memory
+from zwidth.resources import check_memory
 from zwidth.study.jobs.job import CellValues, Job, Notes, NoteSummary
 from zwidth.study.jobs.journal import checked_line, fingerprint, read_checked_line
 

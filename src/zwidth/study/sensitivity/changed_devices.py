@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from zwidth.chart.point_chart import table_of_points
 from zwidth.device import address
 from zwidth.device.design_batch import takes_arrays
 from zwidth.device.device import Device
@@ -23,7 +24,6 @@ from zwidth.device.load import from_document
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import table_of_points
 from zwidth.study.designs.design_groups import DesignColumn, DesignGrouping, build_at_point
 from zwidth.study.sensitivity.optimum import Optimum
 

@@ -32,7 +32,7 @@ from zwidth.errors import NoAnswerError
 from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
 from zwidth.loop.loop_table import LoopTable
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]
 

@@ -25,14 +25,14 @@ from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import Measure, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_pointwise
 from zwidth.measures.preconditions import walls_of
-from zwidth.memory_limit import check_memory
 from zwidth.model.argument_checks import check_kind, wrong_type
+from zwidth.resources import check_memory
 from zwidth.study.designs.axis_tables import TableFaults
 from zwidth.study.designs.column import Column, column_named
 from zwidth.study.designs.sampling import Axis, Sampling
 from zwidth.study.designs.study import Study, check_study
 from zwidth.study.designs.study_file import measures_in_file, plain_value, read_document, study_of
-from zwidth.study.designs.sweep_data import PER_VALUE
+from zwidth.study.designs.sweep import PER_VALUE
 from zwidth.study.tolerances.distribution import Tolerance
 from zwidth.study.tolerances.intervals import draws_needed
 from zwidth.study.tolerances.tolerance_tables import tolerances_of

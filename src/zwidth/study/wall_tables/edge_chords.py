@@ -22,15 +22,14 @@ from zwidth.chart.chart import stability_chart
 from zwidth.chart.chart_numbers import fill_nodes, read_edge
 from zwidth.chart.edge_memory import ARCS, DOUBTFUL, MOST_SAMPLES, EdgeMemory, edge_memory
 from zwidth.chart.edge_samples import degree_of, fill_loop
-from zwidth.chart.point_chart import chart_at
+from zwidth.chart.point_chart import chart_at, table_of_points
 from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.errors import ChartError, UnmovedError
 from zwidth.loop.circle_factors import COMPUTER, wall_on_circle
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint
-from zwidth.loop.point_loops import table_of_points
-from zwidth.threads import in_chunks
+from zwidth.resources import in_chunks
 
 PIECES: Final = 8  # chords between two neighbouring samples of a curve
 MOST_CHORDS: Final = 3072  # of one loop; one with more is charted alone

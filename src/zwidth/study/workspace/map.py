@@ -42,9 +42,9 @@ from zwidth.model.argument_checks import check_kind
 from zwidth.model.mechanism import Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.posture_batch import shells
-from zwidth.processors import Processor
 from zwidth.progress import Progress
 from zwidth.questions import WANTED
+from zwidth.resources import Processor
 from zwidth.study.designs.column import measure_list, over_the_workspace, plane_positions, unit_attributes
 from zwidth.study.jobs.executor import Executor, run_job
 from zwidth.study.jobs.job import Cells, CellValues
@@ -198,7 +198,7 @@ def workspace_map(
     cluster        address of a scheduler of dask.distributed, or "local"; left out: processes of this computer
     executor       what computes, opened before for many calls (`study.open_executor`), in place of workers,
                    time_limit and cluster
-    processor      where charts are computed; "cuda": on an NVIDIA GPU, by one process (`processors`); else "cpu"
+    processor      where charts are computed; "cuda": on an NVIDIA GPU, by one process (`resources`); else "cpu"
     Returns        a dataset over (y_m, x_m): for each measure NAME its values, nan where there is none,
                    NAME_status, and with an extreme direction NAME_direction (y_m, x_m, component). Why cells have
                    no value stands in the attribute `notes`, a line for each reason
