@@ -108,7 +108,8 @@ class Argument:
             wanted, hint = f"from {-LARGEST:g} to {LARGEST:g}{unit}", "is the unit right?"
         else:
             wanted = f"a finite number{', ' if self.allowed else ''}{self.allowed}{unit}"
-        raise ArgumentError(self.name, f"must be {wanted}, got {_quoted(value)}{hint and '; '}{hint}")
+        got = "but it is missing" if value == "" else f"got {_quoted(value)}"
+        raise ArgumentError(self.name, f"must be {wanted}, {got}{hint and '; '}{hint}")
 
 
 def _quoted(value: Any) -> str:

@@ -175,10 +175,10 @@ def test_the_data_as_columns(tmp_path):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--damping", "abc"), "must be a finite number, got 'abc'"),
-        (("--damping", "nan"), "must be a finite number, got 'nan'"),
-        (("--damping", "inf"), "must be a finite number, got 'inf'"),
-        (("--damping", ""), "must be a finite number, but it is missing"),
+        (("--damping", "abc"), "must be a finite number [N s/m], got 'abc'"),
+        (("--damping", "nan"), "must be a finite number [N s/m], got nan"),
+        (("--damping", "inf"), "must be a finite number [N s/m], got inf"),
+        (("--damping", ""), "must be a finite number [N s/m], but it is missing"),
         (("--damping",), "requires an argument"),
         (("--output", "bounds.txt"), "must end in"),
         (("--output", "no/such/folder.csv"), "there is no folder"),
