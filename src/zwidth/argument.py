@@ -104,7 +104,7 @@ class Argument:
             wanted = " or ".join(map(repr, self.choices))
         elif self.kind == "whole":
             wanted = f"a whole number from {self.least:g} {f'to {int(self.most)}' if self.most < inf else 'on'}"
-        elif isinstance(value, Real) and LARGEST < abs(value) < inf:
+        elif isinstance(value, int | float) and LARGEST < abs(value) < inf:
             wanted, hint = f"from {-LARGEST:g} to {LARGEST:g}{unit}", "is the unit right?"
         else:
             wanted = f"a finite number{', ' if self.allowed else ''}{self.allowed}{unit}"
