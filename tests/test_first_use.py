@@ -20,8 +20,7 @@ from zwidth import compile_events, machine_code
 from zwidth import compiled as compiled_module
 from zwidth.compile_events import compiling, listening
 from zwidth.compiled import can_be_taken_apart
-from zwidth.resources import in_chunks
-from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling
+from zwidth.show.cli.first_use import KernelTimes
 from zwidth.show.cli.progress import time_text
 
 KERNELS = '''
@@ -203,26 +202,6 @@ def test_a_script_is_told_once_and_a_listener_instead_of_the_log(caplog):
 
 def _note(names: list[tuple[str, bool]], name: str, ended: bool) -> None:
     names.append((name, ended))
-
-
-def test_a_command_says_what_it_waits_for(monkeypatch, capsys):
-    times = KernelTimes({"zwidth.a": 20.0, "zwidth.b": 40.0}, {"chart": ["zwidth.a", "zwidth.b"]})
-    monkeypatch.setattr(KernelTimes, "read", lambda: times)
-    with announce_compiling("chart"):
-        for name in ("users.law", "zwidth.a", "zwidth.b"):
-            with compiling(name):
-                pass
-    assert capsys.readouterr().err == "zwidth: first use: compiling 2 kernels for this processor, about 60 s\n"
-
-
-def test_what_remains_is_told_as_it_goes(monkeypatch, capsys):
-    clock = iter([0.0, 6.0, 6.0, 6.0, 7.0])
-    monkeypatch.setattr("zwidth.show.cli.first_use.monotonic", lambda: next(clock))
-    progress = Progress({"a": 3.0, "b": 30.0, "c": 3.0}, 1)
-    progress.finish("a")
-    assert capsys.readouterr().err == "zwidth: 1 compiled, 2 to go, about 35 s left\n"
-    progress.finish("b")
-    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0.2, "5 s"), (12.4, "10 s"), (58.0, "60 s"), (100.0, "2 min")])

@@ -7,7 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from app.page_driver import Page
+
+from tests.app.page_driver import Page
 
 NODE = Path(__file__).parent / "node"
 PAGE = Path(__file__).parents[2] / "src/zwidth/show/app/page"

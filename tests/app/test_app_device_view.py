@@ -6,7 +6,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from app.page_driver import Page
+
+from tests.app.page_driver import Page
 
 BAND = 11  # css px, width of a drawn link
 # Every path that a drawing strokes or fills, with its points and the width of its line.

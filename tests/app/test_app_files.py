@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from app.page_driver import Page
-from app.test_app_socket import PLANT
+
+from tests.app.page_driver import Page
+from tests.app.test_app_socket import PLANT
 
 FIRST_CHOICE = "document.getElementById('device-choice').options[0].value"
 
@@ -39,9 +40,9 @@ def test_a_faulty_device_file_leaves_the_page_as_it_was(page) -> None:
 @pytest.mark.parametrize(
     ("content", "part"),
     [
-        ("'1'.repeat(5000001)", "has 5,000,001 characters; at most 5,000,000 are read"),
+        ("'1'.repeat(5000001)", "5,000,001"),
         ("'1'.repeat(30e6)", "has 30 MB"),
-        ("'\\0'.repeat(4e6)", "is no text"),
+        ("'\\0'.repeat(4e6)", "no text"),
     ],
 )
 def test_a_file_that_is_too_large_is_refused_and_the_connection_stays(page, content, part) -> None:

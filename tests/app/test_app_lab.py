@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from app.stated_numbers import left_over, stated_numbers
-from app.tour_steps import STEPS
 
 import zwidth
+from tests.app.stated_numbers import left_over, stated_numbers
+from tests.app.tour_steps import STEPS
 from zwidth.device import OPERATORS, bundled_names
 from zwidth.loop import OperatingPoint
 

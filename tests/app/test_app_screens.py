@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from app.page_driver import Page
 from PIL import Image
+
+from tests.app.page_driver import Page
 
 SCREENS = Path(__file__).parent / "screens"
 WIDTH = 70  # pixels of a thumbnail

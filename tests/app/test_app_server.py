@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import http.client
 import re
-import signal
 import subprocess
 import sys
 
 import pytest
-from app.socket_client import SocketClient
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from tests.app.socket_client import SocketClient
 from tests.cli.command_runner import refusal_lines
 from zwidth.show import page_files
 from zwidth.show.app.server import LARGEST_REPORT, MOST_REPORTS, TYPES, Settings
@@ -157,19 +156,6 @@ def test_a_report_is_handed_out_so_that_nothing_in_it_runs(workbench) -> None:
     assert policy.endswith("; sandbox")
     assert "default-src 'none'" in policy
     assert "script" not in policy
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="ctrl-C is no signal there that a test can send")
-def test_ctrl_c_ends_it_as_it_said() -> None:
-    command = [sys.executable, "-m", "zwidth", "app", "--no-browser", "--port", "0"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        assert "ctrl-C ends it" in process.stderr.readline()
-        process.send_signal(signal.SIGINT)
-        try:
-            assert process.communicate(timeout=30)[1] == "zwidth: the workbench has ended\n"
-        finally:
-            process.kill()  # one that goes on would be waited for
-        assert process.returncode == 0
 
 
 def test_bad_command_lines_are_refused_on_one_line() -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from app.page_driver import Page
-from app.tour_steps import STEPS, answer
+
+from tests.app.page_driver import Page
+from tests.app.tour_steps import STEPS, answer
 
 
 def test_the_tour_has_the_six_causes() -> None:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from app.stated_numbers import left_over, stated_numbers
-from app.tour_steps import STEPS, answer
 
 import zwidth
+from tests.app.stated_numbers import left_over, stated_numbers
+from tests.app.tour_steps import STEPS, answer
 from zwidth.device import Device, device_numbers
 
 TITLES = [step["title"] for step in STEPS]

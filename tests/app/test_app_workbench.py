@@ -5,10 +5,10 @@ from __future__ import annotations
 import urllib.request
 
 import pytest
-from app.page_driver import Page
-from app.socket_client import SocketClient
 
 import zwidth
+from tests.app.page_driver import Page
+from tests.app.socket_client import SocketClient
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_a_device_that_was_not_moved_comes_back_itself() -> None:
 
 def test_a_server_that_does_not_start_is_said(monkeypatch) -> None:
     monkeypatch.setattr("uvicorn.Server.run", lambda *_: None)
-    with pytest.raises(RuntimeError, match="did not start"):
+    with pytest.raises(RuntimeError, match="not start"):
         zwidth.Workbench(zwidth.load("hapkit-course"))
 
 

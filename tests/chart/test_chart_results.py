@@ -9,7 +9,7 @@ import pytest
 from tests.measured_cases import measured_response
 from tests.multi_loops import random_multi, side_by_side
 from tests.systems import mass, published, two_mass
-from zwidth.chart import BoundaryArc, judge, measured_chart, multi_chart, robust_chart, stability_chart
+from zwidth.chart import judge, measured_chart, multi_chart, robust_chart, stability_chart
 from zwidth.chart.chart_base import Chart
 from zwidth.chart.verdict import STABLE, UNSTABLE
 from zwidth.loop import Controller, Loop, MultiLoop
@@ -91,29 +91,6 @@ def test_the_table_holds_every_wall_of_the_edge(kind):
             low = [table["stiffness_low_N_per_m"][k] for k in rows]
             straight = arc.stiffness_low is None
             assert low == ([None] * len(rows) if straight else arc.stiffness_low.tolist())
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_chart_shows_itself_in_five_lines_with_units(kind):
-    chart = chart_of_kind(kind)
-    text = repr(chart)
-    lines = text.splitlines()
-    assert len(lines) <= 5
-    assert lines[0].startswith(f"{type(chart).__name__}: ")
-    assert "array" not in text
-    assert max(map(len, lines)) < 115
-    if kind == "nothing":
-        assert "none: no stable wall has K > 0 and B >= 0" in text
-    else:
-        assert f"{chart.stiffness_max:.6g} N/m at {chart.damping_at_stiffness_max:.6g} N s/m" in text
-        assert f"{chart.frequencies_at_stiffness_max[0]:.6g} Hz" in text.replace(" and", " Hz")
-        assert f"{chart.damping_max:.6g} N s/m" in text
-        assert f"{chart.stable_area:.6g} N² s/m²" in text
-
-
-def test_an_arc_shows_how_long_it_is_and_where():
-    arc = BoundaryArc(np.arange(3.0), np.zeros(3), np.array([1.0, 2.5, 20.0]))
-    assert repr(arc) == "BoundaryArc(3 walls, 1 to 20 Hz)"
 
 
 def test_a_robust_verdict_is_the_worst_of_all_members():

@@ -11,10 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cli.command_runner import refusal_lines
-from zwidth.errors import ProcessorError
-from zwidth.resources import check_processor
-
 ROOT = Path(__file__).parents[2]
 
 
@@ -41,32 +37,3 @@ def test_numbers_are_those_of_the_processor(simulated):
 def test_the_numbers_compared_are_some(simulated):
     for name in ("stiffness 1", "area 7", "fastest 7", "map"):
         assert np.isfinite(simulated[name][1]).sum() >= 2
-
-
-def test_an_unknown_processor_is_refused():
-    with pytest.raises(ValueError, match="processor must be 'cpu' or 'cuda', got 'gpu'"):
-        check_processor("gpu")
-
-
-@pytest.mark.parametrize("command", ["map", "sweep"])
-def test_a_command_says_what_is_missing_for_a_gpu(command, tmp_path, monkeypatch):
-    def missing():
-        raise ProcessorError("needs the package numba-cuda, which is not installed", "install zwidth[cuda]")
-
-    monkeypatch.setattr("zwidth.resources._check_gpu", missing)
-    study = tmp_path / "study.toml"
-    study.write_text(
-        'device = "five-bar"\nmeasures = ["stiffness_max"]\n'
-        '[[axis]]\nkey = "loop.sampling_period_s"\nvalues = [0.001]\n'
-    )
-    words = {"map": ("five-bar", "--measure", "stiffness_max"), "sweep": (study,)}[command]
-    assert refusal_lines(command, *words, "--processor", "cuda") == [
-        "--processor cuda needs the package numba-cuda, which is not installed; install zwidth[cuda], or leave "
-        "--processor out to compute without one"
-    ]
-
-
-def test_a_package_that_is_missing_is_named(monkeypatch):
-    monkeypatch.setattr("zwidth.resources.find_spec", lambda name: None)
-    with pytest.raises(ProcessorError, match="numba-cuda, which is not installed"):
-        check_processor("cuda")

@@ -119,5 +119,5 @@ def test_a_loss_factor_too_small_to_chart_is_named(eta):
     one = np.ones(1)
     spring = np.array([[4000.0]])
     plant = Plant(one[None], 0.0 * spring, spring, one, one, hysteresis=eta * spring)
-    with pytest.raises(HysteresisError, match="the loss factor is below 1e-05, too small"):
+    with pytest.raises(HysteresisError, match=r"loss factor .*1e-05"):
         hysteretic_chart(Loop(plant, Controller(0.001)))

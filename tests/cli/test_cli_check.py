@@ -123,15 +123,6 @@ def test_of_very_many_faults_the_first_are_listed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "says"), [("nowhere.csv", "no such file"), (".", "is a directory"), ("a\0b", "cannot be read")]
-)
-def test_a_file_of_walls_that_cannot_be_read(tmp_path, monkeypatch, name, says):
-    monkeypatch.chdir(tmp_path)
-    (line,) = refusal_lines("check", TWO_MASS, "--points", name)
-    assert says in line
-
-
-@pytest.mark.parametrize(
     "words",
     [
         (),
@@ -152,19 +143,6 @@ def test_a_posture_out_of_reach_has_no_verdicts():
     assert ran.code == 1
     assert ran.document["points"] is None
     assert "cannot reach" in ran.document["reason"]
-
-
-def test_walls_that_no_device_renders_are_refused(tmp_path):
-    file = tmp_path / "walls.csv"
-    file.write_text(HEAD + "1e308,1e308\n1e15,-1e15\n")
-    lines = refusal_lines("check", TWO_MASS, "--points", file)
-    assert len(lines) == 2
-    assert "line 2: stiffness_N_per_m: must be from -1e+15 to 1e+15, got '1e308'" in lines[0]
-    for command in ("check", "felt"):
-        (line,) = refusal_lines(command, TWO_MASS, "--stiffness", "1e308", "--damping", "5")
-        assert "'--stiffness': must be from -1e+15 to 1e+15 [N/m], got 1e+308" in line
-    (point,) = document_of("check", TWO_MASS, "--stiffness", "1e15", "--damping", "1e15")["points"]
-    assert point["verdict"] == "unstable"
 
 
 def test_a_wall_whose_transition_matrix_overflows_is_undecided():

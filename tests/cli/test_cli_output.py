@@ -63,12 +63,6 @@ def test_what_interrupts_writing_leaves_the_old_file(tmp_path, error):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_full_disk_is_an_error_with_the_files_name(tmp_path):
-    path = tmp_path / "a.csv"
-    with pytest.raises(OutputError, match=r"a\.csv: cannot be written: no space left"), replacing(path):
-        raise OSError(28, "No space left on device")
-
-
 def test_a_new_file_has_the_rights_that_the_user_gives_new_files(tmp_path):
     path = tmp_path / "a.csv"
     old = os.umask(0o027)

@@ -110,15 +110,6 @@ def test_a_reader_that_has_seen_enough_is_no_error():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("words", ["schema", "--help", "--version", f"chart {TWO_MASS} --output chart.csv"])
-def test_a_closed_standard_output_is_said_before_anything_is_computed(tmp_path, words):
-    line = f'exec "{ZWIDTH}" {words} >&-'
-    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr == "zwidth: standard output is closed; send it to a file, or to /dev/null\n"
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_closed_standard_error_leaves_standard_output_to_the_answer(tmp_path):
     lines = [
         f'exec "{ZWIDTH}" chart {TWO_MASS} --output chart.csv --json 2>&-',
@@ -134,36 +125,7 @@ def test_a_closed_standard_error_leaves_standard_output_to_the_answer(tmp_path):
     assert (bad.returncode, bad.stdout, bad.stderr) == (2, "", "")
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-@pytest.mark.parametrize(
-    "words", [("devices",), ("schema",), ("chart", TWO_MASS, "--json"), ("--help",), ("--version",)]
-)
-def test_a_full_disk_is_said_on_one_line(words):
-    with open("/dev/full", "w") as full:
-        done = subprocess.run([ZWIDTH, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert "standard output cannot be written" in done.stderr
-
-
 def test_a_terminal_that_knows_only_ascii(tmp_path):
     done = run_process("chart", TWO_MASS, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0
     assert "largest stiffness" in done.stdout
-
-
-def test_a_warning_is_one_line():
-    program = """
-import warnings
-from zwidth.show.cli import main
-
-def warn(arguments):
-    warnings.warn("odd", UserWarning)
-    warnings.warn("arithmetic", RuntimeWarning)
-    return 0
-
-main.run = warn
-main.main()
-"""
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "zwidth: warning: odd\n")

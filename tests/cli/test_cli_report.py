@@ -43,7 +43,7 @@ def test_a_device_without_stable_walls_has_a_report_and_exit_code_1(tmp_path, mo
     unstable = ("--set", "plant.damping_Ns_per_m=unset", "--set", "loop.delay_samples=1")
     ran = run_command("report", TWO_MASS, *unstable, "--output", file, "--json")
     assert ran.code == 1
-    assert ran.document["reason"] == "no wall with positive stiffness and without negative damping is stable"
+    assert ran.document["reason"].endswith(" is stable")
     assert ran.document["stiffness_max_N_per_m"] is None
     assert ran.document["decided"] is True
     assert ran.document["file"] == str(file)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conditions.conditions_cases import devices, one_mass
 
+from tests.conditions.conditions_cases import devices, one_mass
 from tests.systems import FEATURES, random_loop
 from zwidth.chart import judge, stability_chart
 from zwidth.conditions import assumptions, compare

@@ -84,15 +84,15 @@ def test_the_conditions_are_those_of_the_loop_with_friction_and_step():
 
 def test_a_chart_that_is_undecided_leaves_the_conditions(monkeypatch):
     def undecided(*_, **__):
-        raise ChartError("the edge cannot be closed")
+        raise ChartError("open edge")
 
     monkeypatch.setattr("zwidth.conditions.comparison.stability_chart", undecided)
     found = compare_bounds(point())
-    assert (found.chart, found.undecided, found.damping) == (None, "the edge cannot be closed", 0.0)
+    assert (found.chart, found.undecided, found.damping) == (None, "open edge", 0.0)
     assert isnan(found.exact)
     assert isnan(found.largest)
     assert found.document()["decided"] is False
-    assert found.document()["undecided"] == "the edge cannot be closed"
+    assert found.document()["undecided"] == "open edge"
     assert "undecided" in repr(found)
 
 
@@ -125,11 +125,11 @@ def test_the_repr_has_the_main_numbers_in_few_lines(bounds_comparison):
 
 @pytest.mark.parametrize("damping", [float("nan"), float("inf"), "2"])
 def test_a_damping_that_is_none_is_refused(damping):
-    with pytest.raises(ValueError, match="damping must be a finite number"):
+    with pytest.raises(ValueError, match=r"^damping must"):
         compare_bounds(point(), damping)
 
 
 def test_a_device_is_no_operating_point():
     device = from_document({"name": "m", "plant": {"mass_kg": 0.1}, "loop": {"sampling_period_s": 0.001}})
-    with pytest.raises(TypeError, match=r"point must be an OperatingPoint, got a Device; write device\.at\(\)"):
+    with pytest.raises(TypeError, match=r"^point must .*OperatingPoint"):
         compare_bounds(device)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conditions.conditions_cases import one_mass
 
+from tests.conditions.conditions_cases import one_mass
 from zwidth.chart import stability_chart
 from zwidth.conditions import assumptions, compare, exact_stiffness_limit, gil, thesis_whole_delay
 from zwidth.loop import Controller, Feedforward

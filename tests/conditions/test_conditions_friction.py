@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conditions.conditions_cases import one_mass
 
+from tests.conditions.conditions_cases import one_mass
 from zwidth.conditions import abbott_okamura, colgate_schenkel, compare, diolaiti, mehling
 
 ENCODER, PLANE = "passive spring under an encoder", "passive spring with its delay, under an encoder"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conditions.conditions_cases import devices, one_mass
 
+from tests.conditions.conditions_cases import devices, one_mass
 from zwidth.chart import judge, spectral_radius, stability_chart
 from zwidth.chart.verdict import STABLE
 from zwidth.conditions import colgate_schenkel, spring_stable, thesis_damped, thesis_flexible

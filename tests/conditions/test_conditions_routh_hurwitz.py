@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
-from conditions.conditions_cases import devices, one_mass
 
+from tests.conditions.conditions_cases import devices, one_mass
 from zwidth.conditions import routh_hurwitz as rh
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from model.model_cases import (
+
+from tests.model.model_cases import (
     NO_CLOSURES,
     Z,
     drives_on,
@@ -13,7 +14,6 @@ from model.model_cases import (
     links_of,
     planar_inertia,
 )
-
 from zwidth.loop import Controller, OperatingPoint
 from zwidth.model import DriveNonlinearity, GivenDamping, Mechanism, solve_posture
 

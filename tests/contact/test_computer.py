@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.engine_cases import two_mass_loop
-from contact.mechanism_cases import (
+from scipy.signal import lfilter
+
+from tests.contact.engine_cases import two_mass_loop
+from tests.contact.mechanism_cases import (
     motion_of,
     paddle,
     planar_chain,
@@ -13,8 +15,6 @@ from contact.mechanism_cases import (
     with_drives,
     with_friction,
 )
-from scipy.signal import lfilter
-
 from zwidth.contact import normal_number, simulate, wall
 from zwidth.contact.computer import (
     arrived_command,

@@ -90,16 +90,3 @@ def test_a_bent_spring_by_integral():
 
     expected = first_harmonic(bent, 0.6, 0.0, [0.0])
     assert float(describing_functions.bent_spring_gain(0.6, 7.0, 2.0, 0.0)) == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: describing_functions.quantiser(0.0, 1.0), "amplitude must be positive"),
-        (lambda: describing_functions.quantiser(1.0, -1.0), "step must not be negative"),
-        (lambda: describing_functions.saturation(1.0, 0.0), "limit must be positive"),
-    ],
-)
-def test_what_cannot_be_is_refused(call, said):
-    with pytest.raises(ValueError, match=said):
-        call()

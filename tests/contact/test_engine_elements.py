@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from contact.engine_cases import (
+
+from tests.contact.engine_cases import (
     EventSolver,
     documented_accuracy,
     friction_of,
@@ -12,7 +13,6 @@ from contact.engine_cases import (
     two_mass_loop,
     two_sided,
 )
-
 from zwidth.contact import SOURCES, Hand, dominant_frequency
 from zwidth.model import Brake, Counter, Nonlinear, Spring
 

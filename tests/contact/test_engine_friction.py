@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.engine_cases import (
+
+from tests.contact.engine_cases import (
     EventSolver,
     documented_accuracy,
     friction_of,
@@ -14,7 +15,6 @@ from contact.engine_cases import (
     two_mass_loop,
     two_sided,
 )
-
 from tests.systems import random_loop
 from zwidth.contact import SOURCES, Hand, Run, simulate, simulate_batch, wall
 from zwidth.loop import Loop

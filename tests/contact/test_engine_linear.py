@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from contact.engine_cases import random_stable_wall, run, spectral_radius, two_mass_loop
-from contact.matrix_power_reference import fine_readings
 
+from tests.contact.engine_cases import random_stable_wall, run, spectral_radius, two_mass_loop
+from tests.contact.matrix_power_reference import fine_readings
 from tests.systems import FEATURES, random_loop
 from zwidth.contact import Run, judge_response, simulate, simulate_batch, wall
 from zwidth.loop import (

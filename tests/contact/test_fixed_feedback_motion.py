@@ -259,7 +259,7 @@ def test_what_is_not_known_with_feedback_is_refused():
     point = OperatingPoint(
         Controller(T, force_limit=3.0, **FEEDBACK["force sensor"]), given_plant=two_mass(0.3, 0.03, 1e4)
     )
-    with pytest.raises(FeedbackError, match=r"limit cycles are not predicted with force feedback \(gain 0.6\)"):
+    with pytest.raises(FeedbackError, match=r"cycles .*\(gain 0.6\)"):
         predict_limit_cycles(point, 500.0, 1.0)
 
 

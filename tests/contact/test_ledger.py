@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.engine_cases import EventSolver, friction_of, one_mass, run, two_mass_loop, two_sided
-from contact.test_engine_friction import random_friction
 
+from tests.contact.engine_cases import EventSolver, friction_of, one_mass, run, two_mass_loop, two_sided
+from tests.contact.test_engine_friction import random_friction
 from tests.systems import FEATURES, random_loop
 from zwidth.contact import (
     SOURCES,

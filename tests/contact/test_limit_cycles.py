@@ -232,25 +232,3 @@ def test_the_plane():
     np.testing.assert_allclose(found.beta, [1.0, 0.25])
     np.testing.assert_allclose(found.sigma, [0.02 / (100.0 * 2e-5), 0.02 / (400.0 * 2e-5)])
     assert found.regions == (PASSIVE, LARGE)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: limit_cycles(ONE_MASS, np.nan, 0.0), "wall must be finite"),
-        (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, coulomb_friction=-1.0), "must not be negative"),
-        (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, coulomb_friction=[1.0, 1.0]), "one number or 1"),
-        (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, resolution=-1.0), "resolution must not be negative"),
-        (lambda: limit_cycles(ONE_MASS, 1.0, 0.0, force_limit=0.0), "force_limit must be positive"),
-        (lambda: harmonic_balance(ONE_MASS, 1.0, 0.0, force_limit=1.0, amplitudes=(2.0, 1.0)), "lower first"),
-        (lambda: device_plane(ONE_MASS, [0.0], 1.0, 1.0), "positive and finite"),
-        (lambda: device_plane(ONE_MASS, [1.0], 1.0), "encoder with steps"),
-        (
-            lambda: device_plane(Loop(mass(0.1, 0.1, 5.0), Controller(0.001)), [1.0], 1.0, 1.0),
-            "tied to the ground",
-        ),
-    ],
-)
-def test_bad_input_is_named(call, said):
-    with pytest.raises(ValueError, match=said):
-        call()

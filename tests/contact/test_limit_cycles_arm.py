@@ -123,7 +123,8 @@ def test_a_search_says_how_far_it_is(arm):
         arm, *WALL, resolution=0.0, amplitudes=(1e-4, 1e-3), progress=lambda *so_far: told.append(so_far)
     )
     stages, done, of = zip(*told, strict=True)
-    assert set(stages) == {"vibrations by amplitude"}
+    (stage,) = set(stages)
+    assert stage.endswith(" amplitude")
     assert list(done) == sorted(done)
     assert done[0] == 0
     assert done[-1] == of[-1] == of[0] > 20

@@ -62,5 +62,5 @@ def test_the_limit_may_be_given_and_scales():
     full, unit = (with_harmonics(loop, 400.0, 0.05, c, force_limit=s) for c, s in ((first, 3.0), (one, 1.0)))
     assert full.amplitude == pytest.approx(3.0 * unit.amplitude, rel=1e-6)
     assert full.frequency_Hz == pytest.approx(unit.frequency_Hz, rel=1e-7)
-    with pytest.raises(ValueError, match="limit is inf N"):
+    with pytest.raises(ValueError, match=r"limit .*inf N"):
         with_harmonics(loop, 400.0, 0.05, first)

@@ -8,8 +8,7 @@ import pytest
 
 from tests.contact.mechanism_cases import with_friction
 from tests.model.model_cases import five_bar
-from zwidth.contact import ENVIRONMENTS, pressed_wall, simulate, wall
-from zwidth.errors import ArgumentError, FeedbackError
+from zwidth.contact import pressed_wall, simulate, wall
 from zwidth.loop import Butterworth, Controller, OperatingPoint
 from zwidth.model import Load, ModalDamping, solve_posture
 
@@ -102,16 +101,3 @@ def test_a_bent_spring_is_straight_for_small_motions_and_stiffens_by_its_law():
     powers = roots ** np.arange(len(tiny.reading))[:, None]
     shares = np.linalg.lstsq(powers, tiny.reading.astype(complex), rcond=None)[0]
     assert np.max(np.abs(powers @ shares - tiny.reading)) <= 1e-4 * np.max(np.abs(tiny.reading))
-
-
-def test_what_no_load_goes_with_is_refused():
-    one = point(Load(push=3.0))
-    with pytest.raises(ArgumentError, match="does not go with a load"):
-        one.simulate(900.0, 4.0, environment="slot")
-    with pytest.raises(ArgumentError, match="no hand leans on it"):
-        point(Load(gravity=(0.0, -9.81))).simulate(900.0, 4.0, wall="one-sided")
-    with pytest.raises(FeedbackError, match="under load"):
-        one.limit_cycles(900.0, 4.0)
-    with pytest.raises(FeedbackError, match="under load"):
-        one.felt(900.0, 4.0)
-    assert "pressed_wall" in ENVIRONMENTS

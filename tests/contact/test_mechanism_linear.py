@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from contact.mechanism_cases import motion_of, sampled_controller, uncoupled_five_bar, with_drives
-from model.model_cases import KINDS
 from scipy.linalg import expm
 
+from tests.contact.mechanism_cases import motion_of, sampled_controller, uncoupled_five_bar, with_drives
+from tests.model.model_cases import KINDS
 from zwidth.contact import Plane, SurfaceWall
 from zwidth.loop import Butterworth, FirstOrder, Loop
 from zwidth.model import GivenDamping, ModalDamping, ProportionalDamping, reduce_mechanism, solve_posture

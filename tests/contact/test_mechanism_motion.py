@@ -5,8 +5,9 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from contact.five_bar_reference import FiveBarByMultipliers, reference_motion
-from contact.mechanism_cases import (
+
+from tests.contact.five_bar_reference import FiveBarByMultipliers, reference_motion
+from tests.contact.mechanism_cases import (
     UNDAMPED,
     motion_of,
     paddle,
@@ -16,9 +17,8 @@ from contact.mechanism_cases import (
     with_drives,
     with_friction,
 )
-from model.model_cases import KINDS, five_bar, random_five_bar, some_postures, spatial_arm
-from model.model_engines import mjcf
-
+from tests.model.model_cases import KINDS, five_bar, random_five_bar, some_postures, spatial_arm
+from tests.model.model_engines import mjcf
 from zwidth.contact import Plane, Sphere, SurfaceWall
 from zwidth.model import ModalDamping, bias_batch, link_points, pack, solve_posture
 

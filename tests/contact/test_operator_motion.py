@@ -5,8 +5,16 @@ from math import pi, sin
 
 import numpy as np
 import pytest
-from contact.engine_cases import EventSolver, ReflexSpring, friction_of, one_mass, one_sided, run, two_mass_loop
 
+from tests.contact.engine_cases import (
+    EventSolver,
+    ReflexSpring,
+    friction_of,
+    one_mass,
+    one_sided,
+    run,
+    two_mass_loop,
+)
 from zwidth.contact import Hand, Reach, Reflex, Tremor, simulate, wall
 from zwidth.loop import Loop
 from zwidth.model import Nonlinear, Operator, attach

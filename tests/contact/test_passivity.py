@@ -172,19 +172,3 @@ def test_rendered_stiffness_is_the_slope_through_the_surface():
     assert np.isnan(rendered_stiffness([1.0, nan], [0.0, 0.0]))
     with pytest.raises(ValueError, match="one length"):
         rendered_stiffness([1.0], [1.0, 2.0])
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"largest_damping": 0.0}, "largest_damping of the passivity controller must be positive"),
-        ({"largest_damping": nan}, "largest_damping"),
-        ({"largest_damping": 1.0, "largest_force": -1.0}, "largest_force"),
-        ({"largest_damping": 1.0, "reference_energy": 0.1}, "zero or negative"),
-        ({"largest_damping": 1.0, "device_damping": -0.1}, "device_damping"),
-        ({"largest_damping": 1.0, "counting": "both"}, '"held" or "sampled"'),
-    ],
-)
-def test_options_that_cannot_be_meant_are_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        PassivityController(**options)

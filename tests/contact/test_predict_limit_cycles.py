@@ -13,7 +13,6 @@ from tests.paddle import LENGTH, paddle
 from tests.systems import mass
 from zwidth.contact import SOURCES, TimeResponse, judge_response, predict_limit_cycles, quiet_limit, resting_limit
 from zwidth.contact.wall_limit_cycles import answered_cycles, behaviour_at_the_end, largest_motion
-from zwidth.errors import ArgumentError, HysteresisError, NoAnswerError
 from zwidth.loop import Controller, OperatingPoint
 from zwidth.model import Brake, Counter, Friction, Nonlinear
 from zwidth.show import json_value
@@ -198,32 +197,3 @@ def test_the_table_has_a_row_for_each_cycle():
     assert table["amplitude_m"] == [cycle.amplitude for cycle in predicted.cycles]
     assert table["simulated_amplitude_m"] == [None, predicted.simulated[1].amplitude]
     assert {len(column) for column in table.values()} == {2}
-
-
-def test_it_shows_itself_in_five_lines():
-    predicted = predict_limit_cycles(rough(), 2600.0, 0.0, simulate=False)
-    many = replace(predicted, answers=5 * predicted.answers)
-    none = replace(predicted, answers=())
-    for shown in (predicted, many, none):
-        assert len(repr(shown).splitlines()) <= 5
-        assert max(map(len, repr(shown).splitlines())) <= 115
-    assert "and 7 more limit cycles" in repr(many)
-    assert "no limit cycle is predicted" in repr(none)
-
-
-def test_what_cannot_be_asked_is_an_error_of_its_own():
-    with pytest.raises(NoAnswerError, match="dry friction, encoder steps or a largest force"):
-        predict_limit_cycles(one_mass(), 1000.0, 1.0)
-    with pytest.raises(ArgumentError, match="leave it at 0"):
-        predict_limit_cycles(one_mass(force_limit=1.0), 1000.0, 1.0, offset=0.5)
-    with pytest.raises(ValueError, match=r"offset must be a finite number, at least -0\.5"):
-        predict_limit_cycles(rough(), 1000.0, 1.0, offset=0.6)
-    with pytest.raises(ValueError, match="stiffness must be a finite number"):
-        predict_limit_cycles(rough(), np.nan, 1.0)
-    with pytest.raises(ValueError, match="damping must be a finite number"):
-        predict_limit_cycles(rough(), 1000.0, np.inf)
-    with pytest.raises(TypeError, match=r"point must be an OperatingPoint, got a Device; write device\.at\(\)"):
-        predict_limit_cycles(package.load(ONE_MASS), 1000.0, 1.0)
-    hysteretic = package.load(TWO_MASS, ["plant.loss_factor=0.1", LIMITED]).at()
-    with pytest.raises(HysteresisError):
-        predict_limit_cycles(hysteretic, 1000.0, 1.0)

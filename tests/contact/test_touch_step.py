@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact.touch_cases import in_python, random_loop, random_touch, same_bits
 
+from tests.contact.touch_cases import in_python, random_loop, random_touch, same_bits
 from zwidth.contact import OUTPUTS, Hand, normal_number, one_sided_wall, simulate, touch, touch_obstacle, wall
 from zwidth.contact.touch_step import FREE, ONE_SIDED, touch_numbers
 from zwidth.loop import Controller, FirstOrder, Loop

@@ -10,9 +10,9 @@ import llvmlite
 import numba
 import numpy as np
 import pytest
-from contact.touch_cases import in_python, random_touch, same_bits
 
 from benchmarks._touch_node import WASM, run_in_node
+from tests.contact.touch_cases import in_python, random_touch, same_bits
 
 ROOT = Path(__file__).parents[2]
 BUILT_WITH = re.compile(rb"zwidth: (numba \S+, llvmlite \S+, Python \S+)")

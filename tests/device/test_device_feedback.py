@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import zwidth
-from zwidth.errors import DeviceError, OperatingPointError
+from zwidth.errors import OperatingPointError
 from zwidth.loop import (
     BackwardDifference,
     Butterworth,
@@ -21,7 +21,6 @@ from zwidth.loop import (
     Loop,
     WindowedDifference,
 )
-from zwidth.show import computer_text
 
 LOW_PASS = {"type": "butterworth", "order": 2, "cutoff_Hz": 50.0}
 SLOW = {"type": "first-order", "time_constant_s": 0.002}
@@ -43,13 +42,6 @@ def document(plant=PLANT, **loop):
 
 def controller(**loop):
     return zwidth.from_document(document(**loop)).controller
-
-
-def faults(**loop):
-    """Path and sentence of each fault."""
-    with pytest.raises(DeviceError) as error:
-        zwidth.from_document(document(**loop))
-    return {fault.key: fault.message for fault in error.value.faults}
 
 
 def test_keys_become_the_parts_of_the_controller():
@@ -106,88 +98,6 @@ def test_a_kalman_filter_of_the_feedback_takes_the_encoders_step_and_its_own_rat
     assert own.local_loop.velocity.position_noise == pytest.approx(1e-5 / np.sqrt(12.0))
 
 
-REFUSED = [
-    ({"force_sensor": {"gain": -1.0}}, "loop.force_sensor.gain", "must be greater than -1, got -1"),
-    ({"force_sensor": {}}, "loop.force_sensor.gain", "is missing"),
-    ({"force_sensor": {"gain": 1.0, "law": "pid"}}, "loop.force_sensor.law", "force-error"),
-    ({"force_sensor": {"gain": 1.0, "delay_samples": 1.5}}, "loop.force_sensor.delay_samples", "whole number"),
-    (
-        {"force_sensor": {"gain": 1.0, "filter": LOW_PASS | {"cutoff_Hz": 500.0}}},
-        "loop.force_sensor.filter.cutoff_Hz",
-        "below half the sampling frequency, 500 Hz, got 500",
-    ),
-    ({"feedforward": {}}, "loop.feedforward", "cancels nothing; give inertia_kg"),
-    (
-        {"feedforward": {"inertia_kg": 0.1}},
-        "loop.feedforward.acceleration_filter",
-        "is missing; inertia_kg needs one",
-    ),
-    (
-        {"feedforward": {"inertia_kg": 0.1, "inertia_share": 0.4, "acceleration_filter": LOW_PASS}},
-        "loop.feedforward.inertia_share",
-        "stands beside inertia_kg",
-    ),
-    (
-        {"feedforward": {"damping_Ns_per_m": 1.0, "acceleration_filter": LOW_PASS}},
-        "loop.feedforward.acceleration_filter",
-        "is used only with an inertia",
-    ),
-    (
-        {"feedforward": {"damping_Ns_per_m": 1.0, "deadband_m_per_s": 0.01}},
-        "loop.feedforward.deadband_m_per_s",
-        "is used only with coulomb_N",
-    ),
-    (
-        {
-            "feedforward": {
-                "damping_Ns_per_m": 1.0,
-                "velocity": {"method": "levant", "acceleration_max_m_per_s2": 9.0},
-            }
-        },
-        "loop.feedforward.velocity.method",
-        "must be linear, got the text 'levant'",
-    ),
-    ({"local": {"rate_multiple": 2.5}}, "loop.local.rate_multiple", "must be a whole number, got 2.5"),
-    ({"local": {"rate_multiple": 0}}, "loop.local.rate_multiple", "must be at least 1"),
-    ({"local": {}}, "loop.local.rate_multiple", "is missing"),
-    (
-        {"local": {"rate_multiple": 4, "velocity": {"filter": LOW_PASS | {"cutoff_Hz": 2500.0}}}},
-        "loop.local.velocity.filter.cutoff_Hz",
-        "below half the sampling frequency, 2000 Hz, got 2500",
-    ),
-    (
-        {"local": {"rate_multiple": 4, "velocity": {"method": "kalman", "acceleration_noise_m_per_s2": 2.0}}},
-        "loop.local.velocity.position_noise_m",
-        "is missing",
-    ),
-    ({"local": {"rate_multiple": 4, "gain": 1.0}}, "loop.local.gain", "is not a key"),
-]
-
-
-@pytest.mark.parametrize(("loop", "path", "sentence"), REFUSED)
-def test_what_makes_no_sense_is_refused_in_one_line(loop, path, sentence):
-    found = faults(**loop)
-    assert list(found) == [path]
-    assert sentence in found[path]
-    assert "\n" not in found[path]
-
-
-def test_a_sensor_needs_a_handle_and_feedback_a_model_with_motion_in_time():
-    bare = {key: value for key, value in PLANT.items() if key != "handle"}
-    with pytest.raises(DeviceError, match=r"needs a handle, where the sensor sits; give plant.handle, 2 numbers"):
-        zwidth.from_document(document(bare, force_sensor={"gain": 0.5}))
-    lossy = PLANT | {"loss_factor": 0.02}
-    with pytest.raises(DeviceError, match=r"cannot stand beside plant.loss_factor"):
-        zwidth.from_document(document(lossy, local={"rate_multiple": 4, "damping_Ns_per_m": 1.0}))
-    given = {
-        "name": "m",
-        "response": {"file": "s.csv"},
-        "loop": document(feedforward={"damping_Ns_per_m": 1.0})["loop"],
-    }
-    with pytest.raises(DeviceError, match="needs a model of the device, and a"):
-        zwidth.from_document(given)
-
-
 def test_setting_one_of_two_exclusive_keys_drops_the_other():
     device = zwidth.from_document(document(feedforward={"inertia_kg": 0.1, "acceleration_filter": LOW_PASS}))
     shared = device.with_({"loop.feedforward.inertia_share": 0.3})
@@ -220,7 +130,7 @@ def test_a_share_needs_a_rigid_mass():
     device = zwidth.from_document(
         document(grounded, feedforward={"inertia_share": 0.5, "acceleration_filter": LOW_PASS})
     )
-    with pytest.raises(OperatingPointError, match=r"a spring ties it to the ground; give feedforward.inertia_kg"):
+    with pytest.raises(OperatingPointError, match=r"spring .*feedforward.inertia_kg"):
         device.at().chart()
 
 
@@ -259,20 +169,6 @@ def test_a_map_has_the_feedback_in_every_cell():
         assert one == pytest.approx(point[k].chart(decay=False).stiffness_max, rel=1e-9)
     plain = zwidth.load("five-bar").at(np.array([[0.0, 0.25], [0.04, 0.22], [-0.05, 0.2]]))
     assert not np.allclose(plain.measure("stiffness_max").values, values, rtol=1e-3)
-
-
-def test_headings_name_what_is_in_the_loop():
-    text = computer_text(
-        controller(
-            force_sensor={"gain": 0.5},
-            feedforward={"inertia_share": 0.4, "acceleration_filter": LOW_PASS},
-            local={"rate_multiple": 10, "damping_Ns_per_m": 2.0},
-        )
-    )
-    assert text.endswith(
-        "with force feedback (gain 0.5), with feedforward of 0.4 of the rigid mass, with a local loop at 10 times "
-        "the rate (2 N s/m)"
-    )
 
 
 def test_coulomb_feedforward_is_said_to_be_left_out():

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.device.device_cases import ARM_FILE, PLANT_FILE, faults, with_changes
+from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
 from zwidth.conditions.traits import ground_friction, reading_step
 from zwidth.device import address, from_document
 from zwidth.device.load import load
@@ -175,152 +175,6 @@ def test_a_level_is_addressed_like_any_number():
     assert "friction" not in address.apply(document, ["friction=unset"])
 
 
-LUGRE = {"coulomb_N": [0.0, 0.1], "model": "lugre", "bristle_stiffness_N_per_m": 1e4}
-FAULTS = [
-    (
-        with_changes(PLANT_FILE, friction={"coulomb_N": [0.0, -0.1]}),
-        "friction.coulomb_N.1",
-        "must be at least 0, got -0.1",
-    ),
-    (
-        with_changes(PLANT_FILE, friction={"coulomb_N": 0.1}),
-        "friction.coulomb_N",
-        "has 1 number, but mass_kg has 2 rows",
-    ),
-    (
-        with_changes(PLANT_FILE, friction={"coulomb_N": "0.1"}),
-        "friction.coulomb_N",
-        "must be a number or a list of numbers",
-    ),
-    (with_changes(PLANT_FILE, friction={"coulomb_N": [0, 1e-14]}), "friction.coulomb_N.1", "is the unit right?"),
-    (with_changes(PLANT_FILE, friction={}), "friction.coulomb_N", "is missing"),
-    (
-        with_changes(PLANT_FILE, friction=LUGRE | {"model": "stick"}),
-        "friction.model",
-        "must be 'coulomb', 'dahl' or 'lugre'",
-    ),
-    (
-        with_changes(PLANT_FILE, friction=LUGRE | {"model": "coulomb"}),
-        "friction.bristle_stiffness_N_per_m",
-        "is not read with",
-    ),
-    (
-        with_changes(PLANT_FILE, friction={"coulomb_N": [0, 1], "model": "dahl"}),
-        "friction.bristle_stiffness_N_per_m",
-        'is missing; model = "dahl" needs it',
-    ),
-    (
-        with_changes(PLANT_FILE, friction=LUGRE | {"breakaway_N": [0.0, 0.05]}),
-        "friction.breakaway_N.1",
-        "at least coulomb_N = 0",
-    ),
-    (
-        with_changes(PLANT_FILE, friction=LUGRE | {"breakaway_N": [0.2, 0.1]}),
-        "friction.breakaway_N.0",
-        "must be 0 where coulomb_N is 0",
-    ),
-    (
-        with_changes(PLANT_FILE, friction=LUGRE | {"breakaway_N": [0.0, 0.2]}),
-        "friction.stribeck_velocity_m_per_s",
-        "a breakaway above the level of sliding needs it",
-    ),
-    (
-        with_changes(PLANT_FILE, friction=LUGRE | {"stribeck_velocity_m_per_s": 0.1}),
-        "friction.stribeck_velocity_m_per_s",
-        "is read only with a breakaway",
-    ),
-    (
-        with_changes(ARM_FILE, friction={"coulomb_N": [0, 1]}),
-        "friction",
-        "the drives of a mechanism give coulomb_Nm",
-    ),
-    (
-        with_changes(PLANT_FILE, loop__saturation={"force_N": 0.0}),
-        "loop.saturation.force_N",
-        "must be greater than 0",
-    ),
-    (with_changes(PLANT_FILE, loop__saturation={}), "loop.saturation.force_N", "is missing"),
-    (
-        with_changes(PLANT_FILE, loop__encoder={"resolution_m": -1e-6}),
-        "loop.encoder.resolution_m",
-        "must be at least 0",
-    ),
-    (with_changes(ARM_FILE, loop__encoder={"noise_m": 1e-6}), "loop.encoder.noise_m", "give encoder_noise_rad"),
-    (
-        with_changes(PLANT_FILE, plant__spring=[{"hardening_N_per_m3": 1.0}]),
-        "plant.spring.0.along",
-        "is missing; with 2",
-    ),
-    (with_changes(PLANT_FILE, plant__spring=[{"along": [1, -1]}]), "plant.spring.0", "is an ordinary spring"),
-    (
-        with_changes(PLANT_FILE, plant__spring=[{"along": [1], "hardening_N_per_m3": 1.0}]),
-        "plant.spring.0.along",
-        "has 1 number",
-    ),
-    (with_changes(PLANT_FILE, plant__brake=[{}]), "plant.brake.0.damping_max_Ns_per_m", "is missing"),
-    (
-        with_changes(PLANT_FILE, plant__brake=[{"damping_max_Ns_per_m": 1.0, "time_constant_s": 1e-12}]),
-        "plant.brake.0.time_constant_s",
-        "must be 0 (no lag) or from 1e-06",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(coulomb_Nm=-0.1)),
-        "mechanism.drives.shoulder.coulomb_Nm",
-        "must be at least 0, got -0.1",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(breakaway_Nm=0.1)),
-        "mechanism.drives.shoulder.breakaway_Nm",
-        "is not read with",
-    ),
-    (
-        with_changes(ARM_FILE, mechanism__friction={"model": "dahl"}),
-        "mechanism.friction",
-        "no drive has coulomb_Nm",
-    ),
-    (
-        with_changes(ARM_FILE, mechanism__drives__1__hardening_Nm_per_rad3=1.0),
-        "mechanism.drives.elbow.hardening_Nm_per_rad3",
-        "needs a flexible transmission",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(backward_stiffness_Nm_per_rad=0.0)),
-        "mechanism.drives.shoulder.backward_stiffness_Nm_per_rad",
-        "must be greater than 0",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(brake_time_constant_s=0.1)),
-        "mechanism.drives.shoulder.brake_time_constant_s",
-        "give brake_damping_max_Nms_per_rad",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.0)),
-        "mechanism.drives.shoulder.continuous_torque_Nm",
-        "must be greater than 0",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(continuous_torque_Nm=float("inf"))),
-        "mechanism.drives.shoulder.continuous_torque_Nm",
-        "must be finite, got inf",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(continuous_torque_Nm=1e-13)),
-        "mechanism.drives.shoulder.continuous_torque_Nm",
-        "is the unit right?",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.2, torque_limit_Nm=0.1)),
-        "mechanism.drives.shoulder.continuous_torque_Nm",
-        "must be at most torque_limit_Nm = 0.1, got 0.2",
-    ),
-    (
-        with_changes(ARM_FILE, **arm(encoder_counts_per_rev=0)),
-        "mechanism.drives.shoulder.encoder_counts_per_rev",
-        "must be greater than 0",
-    ),
-]
-
-
 @pytest.mark.parametrize("limit", [0.1, 0.2, INF])
 def test_a_motor_bears_for_a_moment_what_it_bears_without_end(limit):
     device = from_document(with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.1, torque_limit_Nm=limit)))
@@ -328,14 +182,6 @@ def test_a_motor_bears_for_a_moment_what_it_bears_without_end(limit):
     assert (
         from_document(with_changes(ARM_FILE, **arm(continuous_torque_Nm=0.1))).linear_omissions == ()
     )  # it limits nothing
-
-
-@pytest.mark.parametrize(("document", "key", "words"), FAULTS, ids=[f"{i}-{f[1]}" for i, f in enumerate(FAULTS)])
-def test_a_fault_is_one_line_at_its_key(document, key, words):
-    (fault,) = faults(document)
-    assert fault.key == key
-    assert words in fault.message
-    assert "\n" not in str(fault)
 
 
 def test_friction_against_the_ground_is_what_a_metre_of_free_motion_costs():

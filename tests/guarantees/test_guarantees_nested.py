@@ -199,8 +199,8 @@ def test_a_device_damped_only_inside_has_no_coupling(lowest_angle, monkeypatch):
     found = couplings(loop, loop.plant.handle)
     for region in found.regions.values():
         assert not region.rings
-        assert "dissipates too little" in region.reason
-    assert repr(found) == "Couplings: llewellyn none, raisbeck none, sampled none"
+        assert "dissipates too" in region.reason
+    assert repr(found).count(" none") == 3
 
 
 @pytest.mark.parametrize(("ground_damping", "stiffest"), [(0.01, 98.94973), (1.0, 1753.93879)])

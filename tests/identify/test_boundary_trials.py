@@ -82,7 +82,7 @@ def test_the_last_look_takes_the_time_that_was_watched():
     loop = rough().at().contact_loop
     trial = StabilityTrial(loop, watch_time=8.0)
     assert trial.first_samples * LONGER ** (LEVELS - 1) * loop.period == pytest.approx(8.0, rel=0.01)
-    with pytest.raises(ArgumentError, match="watch_time must be positive"):
+    with pytest.raises(ArgumentError, match=r"^watch_time must"):
         StabilityTrial(loop, watch_time=0.0)
 
 
@@ -99,7 +99,7 @@ def test_tried_walls_are_judged_by_trials_and_points_without_an_edge_are_named()
     columns = dict(zip(names, zip(*rows, strict=True), strict=True))
     result = identify_boundary(rough().with_({DELAY: 0.2}), [record(columns)], paths=[DELAY])
     lost = next(check for check in result.checks if check.what == "trials")
-    assert "left out of the fit: " in lost.reason
-    assert f"row {len(rows) - 1} of points" in lost.reason
+    assert "left out" in lost.reason
+    assert f"row {len(rows) - 1} of" in lost.reason
     assert "wrong side" not in next(check.reason for check in result.checks if check.what == "explained")
     assert result[DELAY].value == pytest.approx(0.3, abs=0.02)

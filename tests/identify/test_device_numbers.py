@@ -33,21 +33,7 @@ def test_a_delay_that_the_file_leaves_out_begins_at_none(device):
     assert changed.document["plant"]["mass_kg"][0][0] == pytest.approx(2.0 * 0.2616)
 
 
-@pytest.mark.parametrize(
-    ("paths", "words"),
-    [
-        (["loop.delay_sample"], "did you mean"),
-        (["plant.mass_kg"], "must be a number"),
-        (["name"], "must be a number"),
-        (["plant.mass_kg.0.0", "plant.mass_kg.0.0"], "named twice"),
-    ],
-)
-def test_what_is_no_number_is_refused(device, paths, words):
-    with pytest.raises(DeviceError, match=words):
-        DeviceNumbers.of(device, paths)
-
-
 def test_a_number_that_cannot_be_zero_must_be_given():
     five_bar = zwidth.load("five-bar", {"drives.motor-right.stiffness_Nm_per_rad": "unset"})
-    with pytest.raises(DeviceError, match="give it a value first"):
+    with pytest.raises(DeviceError, match="value first"):
         DeviceNumbers.of(five_bar, ["drives.motor-right.stiffness_Nm_per_rad"])

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from identify.virtual_joint import random_joint, records_of
 
 import zwidth
+from tests.identify.virtual_joint import random_joint, records_of
 from zwidth.identify import identify_friction, record_of
 from zwidth.identify.joint import identification as joint_identification
 from zwidth.identify.joint.fit import fit_joint
@@ -75,7 +75,7 @@ def test_a_search_that_does_not_end_refuses_the_data(monkeypatch):
     record = record_of(records_of([joint])[0], COLUMNS)
     result = identify_friction(zwidth.load("hapkit-course"), [record], spring=joint.stiffness > 0.0)
     assert result.estimates == ()
-    assert "were not found" in result.reason
+    assert "not found" in result.reason
 
 
 @pytest.mark.slow

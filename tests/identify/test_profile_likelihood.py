@@ -59,5 +59,5 @@ def test_fewer_independent_residuals_widen_the_interval():
 
 
 def test_fewer_residuals_than_parameters_are_refused():
-    with pytest.raises(ValueError, match="1 residuals for 2 parameters"):
+    with pytest.raises(ValueError, match="1 residuals"):
         fit_least_squares(lambda p: p[:1], [0.0, 0.0])

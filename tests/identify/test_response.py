@@ -34,7 +34,7 @@ def test_a_resonance_too_sharp_for_the_record_is_named_as_the_reason():
     found = identify(device, "response", shaken(device))
     (chart,) = (check for check in found.checks if check.what == "chart")
     assert not chart.passed
-    assert "leave no wall certain" in chart.reason
+    assert "wall certain" in chart.reason
     nominal, at = (float(chart.reason.split(word)[1].split()[0]) for word in ("walls up to", "most of all at"))
     exact = device.chart(decay=False).stiffness_max
     assert abs(nominal / exact - 1.0) < 0.05
@@ -75,7 +75,7 @@ def test_a_single_sweep_is_fitted_as_a_whole_and_is_said_not_to_predict_itself(u
     assert np.isnan(found.validation)
     (said,) = (check for check in found.checks if check.what == "validation")
     assert said.warning
-    assert "record the sweep twice" in said.reason
+    assert "sweep twice" in said.reason
 
 
 def test_sweeps_in_files_of_their_own_are_predicted_from_each_other():
@@ -104,7 +104,7 @@ def test_a_copy_of_a_sweep_is_no_repetition():
     record = shaken(device, 4000)
     found = identify(device, "response", [record, record])
     assert not found.estimates
-    assert "is sweep 1 again" in found.reason
+    assert "sweep 1 again" in found.reason
 
 
 def test_modes_of_a_mass_without_any_resonance_are_its_own_numbers():
@@ -130,7 +130,7 @@ def test_a_sweep_that_passes_low_frequencies_in_no_time_is_said_to_and_repeated_
 
     (chart,) = (check for check in swept(1).checks if check.what == "chart")
     assert not chart.passed
-    assert "where a free device differs from a held one, it is not known" in chart.reason
+    assert "held one" in chart.reason
     assert "shifted" not in chart.reason
     (stiffness,) = swept(4).estimates
     assert stiffness.low < device.chart(decay=False).stiffness_max < stiffness.high

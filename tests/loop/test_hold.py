@@ -85,7 +85,8 @@ def test_two_equal_modes_are_one_pair_of_poles_and_one_named_mode():
     sections = sampled_sections(plant, 0.001, 0.0)
     single = sampled_sections(mass(1.0, 2.0, 1e4), 0.001, 0.0)
     assert sections.rows == pytest.approx(single.rows, rel=1e-12)
-    assert sections.unobserved == ("mode at 15.92 Hz (damping ratio 0.01)",)
+    (mode,) = sections.unobserved
+    assert mode.startswith("mode at 15.92 Hz ")
 
 
 def test_rigid_frequencies_are_exactly_zero():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, log
+from math import inf
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from tests.loop.loaded_cases import MADE, random_load, random_points, random_scr
 from tests.model.model_cases import KINDS, drives_on, five_bar, some_postures, with_fixed_foot
 from zwidth.device.load import load as load_device
 from zwidth.errors import EquilibriumError, PostureError
-from zwidth.loop import Controller, LocalLoop, OperatingPoint, SidewaysMotion
+from zwidth.loop import Controller, LocalLoop, OperatingPoint
 from zwidth.model import PRISMATIC, Load, Operator, solve_posture
 
 ROOTS = 1e-6  # share of a root's size; most are alike to 1e-10
@@ -394,21 +394,6 @@ def test_a_slide_that_the_load_does_not_turn_stays_neutral():
     grows, still = other.loop.sideways_motions
     assert grows.growth_rate == pytest.approx(motion.growth_rate, rel=1e-9)
     assert (still.growth_rate, still.frequency) == (0.0, 0.0)
-
-
-def test_a_sideways_motion_in_words():
-    grows, decays, still = SidewaysMotion(0.5, 0.0), SidewaysMotion(-2.0, 0.25), SidewaysMotion(0.0, 0.0)
-    assert grows.time_to_double == pytest.approx(log(2.0) / 0.5)
-    assert decays.time_to_double == still.time_to_double == inf
-    assert grows.name == "sideways motion that grows by 0.5 1/s (doubles in 1.386 s)"
-    assert decays.name == "sideways vibration at 0.25 Hz that decays by 2 1/s"
-    assert still.name == "sideways motion (neutral)"
-    assert grows.document() == {
-        "growth_rate_1_per_s": 0.5,
-        "time_to_double_s": grows.time_to_double,
-        "frequency_Hz": 0.0,
-    }
-    assert decays.document()["time_to_double_s"] is None
 
 
 def test_a_chart_counts_what_the_wall_moves_and_names_the_rest():

@@ -43,7 +43,7 @@ def test_a_force_that_a_flexible_device_settles_under_may_have_no_balance_in_the
     settled = five_bar.at(load=load)
     assert settled.equilibrium.hand_force == pytest.approx(load.force, abs=1e-9)
     for ask in (lambda: five_bar.at(load=load, model="rigid"), lambda: settled.in_model("rigid")):
-        with pytest.raises(EquilibriumError, match="in which the load alone is in balance"):
+        with pytest.raises(EquilibriumError, match="in balance"):
             ask()
 
 
@@ -65,7 +65,7 @@ def test_what_changes_with_the_model_goes_on_where_the_rigid_one_has_no_balance(
     point = load_device("five-bar").at(load=Load(force=[-0.00106, -3.0], settle=True))
     rigid = find_variant(what_if(load_device("five-bar"), point), "rigid-drives")
     assert rigid.chart is None
-    assert "in which the load alone is in balance" in rigid.reason
+    assert "in balance" in rigid.reason
 
 
 # --- a posture that is handed on --------------------------------------------------------------------
@@ -97,7 +97,7 @@ def test_postures_of_a_batch_keep_what_was_asked_for():
 
 def test_a_search_that_does_not_end_is_an_error(monkeypatch):
     monkeypatch.setattr(loaded_posture, "ROUNDS", 1)
-    with pytest.raises(EquilibriumError, match="under a push of -3 N along the direction: after 1 rounds"):
+    with pytest.raises(EquilibriumError, match="after 1 rounds"):
         load_device("five-bar").at(load=MOTORS)
 
 
@@ -112,7 +112,7 @@ def test_in_a_batch_a_load_across_the_direction_is_a_status():
         assert np.isnan(getattr(mixed.posture, name)[0]).all()
         assert np.isfinite(getattr(mixed.posture, name)[1]).all()
     assert mixed.posture.position[0] == pytest.approx([0.0, 0.25, 0.0])
-    with pytest.raises(LoadError, match=r"the load \(3, 0, 0\) N does not push along the rendered direction"):
+    with pytest.raises(LoadError, match=r"\(3, 0, 0\) N does not"):
         loaded.at([[0.0, 0.25], [0.02, 0.24]])
 
 

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from tests.systems import mass, two_mass
-from zwidth.device.load import load
-from zwidth.errors import MeasureError
 from zwidth.loop import Controller, OperatingPoint
 from zwidth.measures.buzz import detection_threshold
 from zwidth.model import Counter, Friction, Nonlinear
@@ -70,10 +68,3 @@ def test_a_wall_on_which_nothing_limits_the_growth_has_an_infinite_buzz():
 
 def test_an_unstable_wall_without_a_limit_cycle_has_an_infinite_buzz():
     assert buzz(limited(two_mass(0.5, 0.02, 3000.0, 1.0)), 8000.0, 0.0) == np.inf
-
-
-def test_a_linear_device_has_nothing_to_measure():
-    with pytest.raises(MeasureError, match="give it dry friction, encoder steps or a largest force"):
-        load("five-bar").at().measure("buzz", stiffness=100.0, damping=1.0)
-    with pytest.raises(MeasureError, match="needs a wanted wall; give stiffness and damping"):
-        limited(mass(0.1)).measure("buzz")

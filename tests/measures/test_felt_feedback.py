@@ -101,20 +101,20 @@ def test_a_wall_feels_softer_where_the_motors_help_and_as_commanded_under_force_
 
 def test_two_rates_are_refused():
     controller = Controller(T, local_loop=LocalLoop(10, damping=1.0))
-    with pytest.raises(FeedbackError, match=r"at the handle is not known with a local loop at 10 times"):
+    with pytest.raises(FeedbackError, match=r"loop .*10 times"):
         felt_impedance(Loop(DEVICE, controller), 900.0, 5.0, 5.0)
     point = OperatingPoint(controller, given_plant=DEVICE)
     with pytest.raises(FeedbackError, match="leave local_loop out"):
         point.felt(900.0, 5.0)
-    with pytest.raises(MeasureError, match="is not known here"):
+    with pytest.raises(MeasureError, match="not known"):
         point.measure("free_motion_force", frequency=3.0)
 
 
 def test_closed_forms_are_refused_with_feedback():
     point = OperatingPoint(Controller(T, feedforward=AHEAD), given_plant=DEVICE)
-    with pytest.raises(MeasureError, match="commands the wall's force and nothing else"):
+    with pytest.raises(MeasureError, match="nothing else"):
         point.measure("optimal_spectral_radius", stiffness=900.0, damping=5.0)
     bounds = point.bounds().bounds
-    assert all("The computer commands the wall's force and nothing else." in each.violated for each in bounds)
+    assert all(any("nothing else" in sentence for sentence in each.violated) for each in bounds)
     plain = OperatingPoint(Controller(T), given_plant=DEVICE).bounds().bounds
     assert not any("nothing else" in sentence for each in plain for sentence in each.assumptions)

@@ -77,7 +77,7 @@ def test_no_wall_is_no_value(device):
     unstable = device.with_({"loop.delay_samples": 3.0, "mechanism.damping.mode_ratio": 0.0})
     found = unstable.at(load=PUSH).measure("load_change")
     assert found.status == NO_VALUE
-    assert "is stable without load" in found.notes[0].reason
+    assert "without load" in found.notes[0].reason
 
 
 def test_a_cell_without_equilibrium_has_a_status(device):
@@ -90,16 +90,16 @@ def test_a_cell_without_equilibrium_has_a_status(device):
         assert (np.isfinite(dataset[name].values) == (status == OK)).all()
     row, column = np.argwhere(status == NO_EQUILIBRIUM)[0]
     place = (float(dataset["x_m"][column]), float(dataset["y_m"][row]))
-    with pytest.raises(ValueError, match="more than its limit"):
+    with pytest.raises(ValueError, match="its limit"):
         weak.at(place)
-    assert dataset.attrs["load"] == "a push of -9 N along the direction"
+    assert dataset.attrs["load"].count("push of -9 N ") == 1
     assert np.array_equal(dataset["load_change_status"].attrs["flag_values"], list(STATUS))
 
 
 def test_a_map_whose_cells_have_no_equilibrium_says_so(device):
     weak = device.with_(LIMITS).under(Load(push=-500.0))
     dataset = zwidth.workspace_map(weak, "stiffness_max", plane_of(weak, cells=(4, 3)))
-    assert why_no_cell(dataset).endswith("under a push of -500 N along the direction")
+    assert " -500 N along the " in why_no_cell(dataset)
 
 
 def test_the_worst_direction_has_the_push_along_it(device):
@@ -118,7 +118,7 @@ def test_designs_of_a_sweep_are_those_of_single_devices(device, key):
     loaded = device.with_({**limits, "load.push_N": -11.0})
     swept = zwidth.sweep(loaded, {key: values}, [*NAMES, "stiffness_max"])
     assert swept["stiffness_max_status"].values.tolist() == [NO_EQUILIBRIUM, OK, OK]
-    assert "more than its limit" in swept["stiffness_max"].attrs["notes"]
+    assert "its limit" in swept["stiffness_max"].attrs["notes"]
     for name in (*NAMES, "stiffness_max"):
         for k in (1, 2):
             alone = loaded.with_({key: values[k]}).at().measure(name)

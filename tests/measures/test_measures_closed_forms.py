@@ -130,7 +130,7 @@ def test_where_no_wall_is_stable_they_say_why():
     place = point_of(mass(0.005, stiffness=15620.0))
     found = measure_value(CLOSED[0], place)
     assert found.status == NO_VALUE
-    assert "no wall of positive stiffness is stable" in found.notes[0].reason
+    assert "positive stiffness" in found.notes[0].reason
     assert [float(measure_value(name, place).values) for name in CLOSED[1:]] == [0.0, 0.0]
 
 
@@ -183,7 +183,7 @@ def test_the_radius_and_decay_of_any_loop():
     assert radius.status[1, 1] == decay.status[1, 1] == OUT_OF_REACH
     unstable = measure_value("decay_time", point_of(published().plant), WantedWall(20000.0, 10.0))
     assert unstable.status == NO_VALUE
-    assert unstable.notes[0].reason == "the wanted wall is unstable here, so that vibration does not decay"
+    assert " is unstable " in unstable.notes[0].reason
     assert (
         float(measure_value("spectral_radius", point_of(published().plant), WantedWall(20000.0, 10.0)).values)
         > 1.0

@@ -112,7 +112,7 @@ def test_a_stretched_arm_is_singular_in_whatever_direction_it_points():
         assert isotropy(turned, freedoms=3) > 1e14
         assert_allclose(isotropy(turned, freedoms=2), np.linalg.cond(J[:2]))
         assert_allclose(manipulability(turned, freedoms=3), 0.0, atol=1e-16)
-    with pytest.raises(ValueError, match="freedoms must be a whole number from 1 to 2, got 3"):
+    with pytest.raises(ValueError, match=r"^freedoms must .*got 3"):
         singular_values(stretched, 3)
 
 

@@ -124,20 +124,6 @@ def test_only_the_named_links_are_checked():
     assert float(found.values) == pytest.approx(least_distance(base, left, right, hand), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("written", "said"),
-    [
-        ("upper-left", "each written as 'A:B', got 'upper-left'"),
-        ("upper-left:upper-left", "each written as 'A:B'"),
-        ("upper-left:elbow", "has no link 'elbow' to check in colliding_links; there are upper-right, "),
-    ],
-)
-def test_links_that_there_are_not_are_refused(written, said):
-    with pytest.raises(MeasureError) as caught:
-        zwidth.load("five-bar").at().measure("link_clearance", link_radius=0.0, colliding_links=[written])
-    assert said in str(caught.value)
-
-
 WITHOUT_LENGTHS = ("openwrist", "rice-haptic-paddle")
 
 
@@ -152,12 +138,6 @@ def test_every_bundled_device_has_rods_that_join_its_joints_and_end_at_the_handl
         assert np.linalg.norm(ends - place, axis=1).min() < 1e-6
     assert all(i < j for i, j in neighbours(mechanism))
     assert link_distance(mechanism, point.posture, []) == np.inf
-
-
-@pytest.mark.parametrize("name", WITHOUT_LENGTHS)
-def test_links_without_length_have_no_clearance(name):
-    with pytest.raises(MeasureError, match="needs links with a length; give length_m"):
-        zwidth.load(name).at().measure("link_clearance", link_radius=0.001)
 
 
 def test_the_margin_to_limits_is_one_in_the_middle_and_zero_at_an_end():
@@ -271,14 +251,6 @@ def test_heat_is_that_of_the_torques_of_virtual_work():
     assert float(device.at(place, u).measure("motor_heat", force=6.0).values) == pytest.approx(
         4.0 * heat, rel=1e-6
     )
-
-
-def test_heat_needs_force_constant_and_resistance():
-    device = zwidth.load("five-bar")
-    with pytest.raises(MeasureError, match=r"winding_resistance_ohm of every drive; give mechanism"):
-        device.at().measure("motor_heat", force=1.0)
-    with pytest.raises(MeasureError, match="needs a force to be held; give force"):
-        device.with_(WINDINGS).at().measure("motor_heat")
 
 
 def test_a_winding_without_resistor_does_not_brake():

@@ -123,26 +123,3 @@ def test_shares_of_what_is_wanted_know_no_units():
     units, gears = np.array([1000.0, 1000.0, 1.0]), np.array([18.6, 1.0, 1000.0])
     in_others = J * units[:, None] / gears
     assert_allclose(scaled_jacobian(in_others, wanted * units, able * gears), shares)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda J: homogeneous_jacobian(J, 0.0, (2,)), "greater than 0 m, got 0"),
-        (lambda J: homogeneous_jacobian(J, 0.1, (3,)), "rotations must be from 0 to 2, got 3"),
-        (lambda J: homogeneous_jacobian(J, 0.1, (), (-1,)), "prismatic must be from 0 to 2, got -1"),
-        (lambda J: homogeneous_jacobian([1.0], 0.1), "a Jacobian is a matrix"),
-        (lambda J: characteristic_length(J), "no length makes a difference"),
-        (lambda J: characteristic_length(J, (0, 1, 2)), "no length makes a difference"),
-        (lambda J: characteristic_length(J[:, :2], (2,)), "of a Jacobian of 3 x 2 the rows have different units"),
-        (lambda J: characteristic_length(J[:2], (), (2,)), "2 x 3 the columns"),
-        (
-            lambda J: scaled_jacobian(J, [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]),
-            "largest_velocities must be greater than",
-        ),
-        (lambda J: scaled_jacobian(J, [1.0, 1.0, 1.0], [1.0, -1.0, 1.0]), "largest_rates must be greater than"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(call, words):
-    with pytest.raises(ValueError, match=words):
-        call(np.random.default_rng(14).normal(size=(3, 3)))

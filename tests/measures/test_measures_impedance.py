@@ -47,7 +47,7 @@ def test_a_model_that_does_not_apply_is_a_note_and_no_failure():
     device = load("five-bar", ["loop.encoder.at=link"])
     found = evaluate(find_measure("stiffness_max"), device.at(AT[0], model="motor-mass"))
     assert (found.status == NO_VALUE).all()
-    assert "the sensor reads nothing of what moves in this model" in found.notes[0].reason
+    assert "sensor reads" in found.notes[0].reason
 
 
 def test_places_without_a_stable_wall_say_so():
@@ -61,7 +61,7 @@ def test_places_without_a_stable_wall_say_so():
 def test_a_direction_in_which_the_handle_cannot_move_has_no_value_and_says_why():
     found = evaluate(find_measure("stiffness_max"), load("five-bar").at(AT, (0.0, 0.0, 1.0)))
     assert (found.status[found.status != OUT_OF_REACH] == NO_VALUE).all()
-    assert "cannot move along the direction" in found.notes[0].reason
+    assert "cannot move" in found.notes[0].reason
 
 
 def test_an_operator_counts():

@@ -106,22 +106,3 @@ def test_the_isotropy_index_is_no_better_than_the_worst_posture_and_knows_unifor
     uneven = np.array([np.eye(2), 4.0 * np.eye(2)])  # isotropic everywhere, and four times as fast there as here
     assert (global_conditioning_index(isotropy(uneven)), global_isotropy_index(uneven)) == (1.0, 0.25)
     assert global_isotropy_index(np.zeros((2, 3, 2))) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: overall([1.0, 2.0], [OK]), r"the status has the shape \(1,\), the values \(2,\)"),
-        (
-            lambda: overall([1.0, 2.0], weights=[1.0, 1.0, 1.0]),
-            r"shape \(3,\), which does not fit that of the values",
-        ),
-        (lambda: overall([1.0, 2.0], weights=[1.0, -1.0]), "at least 0 and finite, got -1"),
-        (lambda: overall([1.0, 2.0], weights=[1.0, np.inf]), "got inf"),
-        (lambda: global_conditioning_index([0.5]), "at least 1, got 0.5; is it a reciprocal?"),
-        (lambda: global_isotropy_index(np.ones((2, 3, 2)), [OK]), "the status has the shape"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(call, words):
-    with pytest.raises(ValueError, match=words):
-        call()

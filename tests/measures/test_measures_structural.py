@@ -135,7 +135,7 @@ def test_what_cannot_be_asked():
     with pytest.raises(HandleError, match="handle"):
         structural_distortion(replace(mass(1.0), handle=None), 10.0)
     for wrong in (0.0, -1.0, np.inf, np.nan):
-        with pytest.raises(ValueError, match="positive and finite"):
+        with pytest.raises(ValueError, match="positive and"):
             structural_distortion(mass(1.0), wrong)
-        with pytest.raises(ValueError, match="positive and finite"):
+        with pytest.raises(ValueError, match="positive and"):
             deformation_ratio(mass(1.0), wrong)

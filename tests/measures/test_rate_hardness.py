@@ -168,6 +168,6 @@ def test_what_has_no_rate_hardness_says_why():
     sprung = mass(0.2, 1.0, 50.0)
     found = at_point(sprung).measure("rate_hardness", stiffness=500.0, damping=5.0)
     assert found.status == NO_VALUE
-    assert "ties the device to the ground" in found.notes[0].reason
+    assert "the ground" in found.notes[0].reason
     unstable = zwidth.load("five-bar").at().measure("rate_hardness", stiffness=1e6, damping=1.0)
-    assert unstable.notes[0].reason.startswith("the wanted wall is unstable here")
+    assert unstable.notes[0].reason.count(" is unstable ") == 1

@@ -7,7 +7,6 @@ import pytest
 
 import zwidth
 from zwidth.device import from_document
-from zwidth.errors import DeviceError, OperatorError
 from zwidth.model import Load, Motions, natural_frequencies, pack
 from zwidth.model.arm import attach_arm
 
@@ -188,33 +187,6 @@ def test_an_operator_who_holds_all_directions_stops_the_sideways_motion():
     J = device().at().jacobian
     gained = device(operator=hand | {"directions": "all"}).at().plant.mass - device().at().plant.mass
     np.testing.assert_allclose(gained[:2, :2], 0.8 * J.T @ J, rtol=1e-12, atol=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("changes", "key", "text"),
-    [
-        ({"grasp_stiffness_N_per_m": 100.0}, "arm.grasp", "only one way"),
-        ({"grasp": None}, "arm", "does not say how"),
-        ({"hand": {"link": "leg"}}, "arm.hand.link", "no link of the arm"),
-        ({"posture": {"joints_rad": {"humerus": 2.0}}}, "arm.posture", "forearm"),
-    ],
-)
-def test_faults_of_an_arm_are_named(changes, key, text):
-    table = {k: v for k, v in (arm() | changes).items() if v is not None}
-    with pytest.raises(DeviceError) as caught:
-        device(arm=table)
-    assert any(key in str(fault) and text in str(fault) for fault in caught.value.faults), caught.value.faults
-
-
-def test_an_arm_that_cannot_hold_the_handle_says_so():
-    with pytest.raises(OperatorError, match="does not reach"):
-        device(arm=arm(shoulder_m=[2.0, 0.0, 0.0])).at().plant  # noqa: B018
-    stretched = arm(posture={"joints_rad": {"humerus": 0.3, "forearm": 0.0}})
-    del stretched["shoulder_m"]
-    with pytest.raises(OperatorError, match="stretched"):
-        device(arm=stretched).at().plant  # noqa: B018
-    with pytest.raises(DeviceError, match="only one of them"):
-        device(arm=arm(), operator={"arm_mass_kg": 1.0, "grasp": "rigid"})
 
 
 def test_a_file_of_an_arm_is_an_operator(tmp_path):

@@ -374,7 +374,7 @@ def test_a_bob_that_nothing_holds_has_no_place():
     document = tomllib.loads(HANGING)
     document["mechanism"]["links"][1] |= {"joint": "prismatic", "axis": [0, 1, 0]}
     document["mechanism"]["assemblies"]["only"] = {"joints_m": {"carriage": 0.0, "bob": 0.0}}
-    with pytest.raises(EquilibriumError, match="no place was found where the free joint 'bob' is in balance"):
+    with pytest.raises(EquilibriumError, match="joint 'bob'"):
         from_document(document).at(load=Load(gravity=[0.0, -9.81]))
 
 
@@ -390,7 +390,7 @@ def test_a_device_settles_where_the_load_alone_is_in_balance():
     assert settled.equilibrium.hand_force == pytest.approx([0.0, -5.0, 0.0], abs=1e-9)
     assert settled.posture.position[1] == pytest.approx(0.24, abs=1e-12)
     assert abs(settled.posture.position[0]) < 0.02
-    with pytest.raises(EquilibriumError, match=r"here the hand has to supply 1\.003 N more across"):
+    with pytest.raises(EquilibriumError, match=r"1\.003 N more across"):
         device.at((0.02, 0.24), load=Load(force=[1.0, -5.0], settle=True))
 
 
@@ -500,9 +500,7 @@ def test_a_batch_has_the_postures_of_each_and_marks_those_without_equilibrium():
     assert np.isfinite(values.values[:2]).all()
     assert np.isnan(values.values[2:]).all()
     assert values.values[0] == pytest.approx(device.at(places[0], load=load).chart(decay=False).stiffness_max)
-    with pytest.raises(
-        EquilibriumError, match=r"needs 0\.05473 N m at its motor, more than its limit of 0\.034 N m"
-    ):
+    with pytest.raises(EquilibriumError, match=r"needs 0\.05473 N m .* 0\.034 N m"):
         device.at(places[3], load=load)
 
 

@@ -295,35 +295,6 @@ def test_more_points_change_no_integral(boundary, monkeypatch):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-9 * np.max(np.abs(other))), field.name
 
 
-BEAM = BeamProperties(L, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: finite_elements(BEAM, [0.1, 0.5], 4), r"stations must lie on the beam, .* 0.4 \[m\], got 0.5"),
-        (lambda: assumed_modes(BEAM, [-0.1], 4), "stations must lie on the beam, .* got -0.1"),
-        (lambda: lumped_tip(BEAM, [float("nan")]), "stations must lie on the beam, .* got nan"),
-        (lambda: lumped_tip(BEAM, 0.4), r"stations must be a list of numbers \[m\], got the shape \(\)"),
-        (lambda: lumped_tip(BEAM, "tip"), r"stations must be numbers \[m\], got the text 'tip'"),
-        (lambda: finite_elements(BEAM, [L], 0), "elements must be a whole number, at least 1, got 0"),
-        (lambda: finite_elements(BEAM, [L], 2.5), "elements must be a whole number, at least 1, got 2.5"),
-        (lambda: finite_elements(BEAM, [L], 2, -1), "modes must be a whole number, at least 0, got -1"),
-        (lambda: finite_elements(BEAM, [L], 1, 3), "must be at most 2 modes, .* got 3; give more elements"),
-        (lambda: assumed_modes(BEAM, [L], True), "modes must be a whole number, at least 0, got True"),
-        (lambda: assumed_modes(BEAM, [L], 2, "free"), "boundary must be 'clamped' or .* got the text 'free'"),
-        (lambda: lumped_tip(BEAM, [L]).reduced(np.eye(3)), r"basis must have 4 rows, .* got the shape \(3, 3\)"),
-        (
-            lambda: lumped_tip(BEAM, [L]).scaled([1.0, 1.0, 0.0, 1.0]),
-            "scale must be 4 finite numbers greater than 0",
-        ),
-    ],
-)
-def test_what_no_body_can_be_made_of_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
 @pytest.mark.parametrize("softer", [1.0 - 3e-16, 1.0, 1.0 + 3e-16])
 def test_where_the_modes_end_between_two_planes_rounding_does_not_choose(softer):
     """Of the same modes of a round section in both planes the one in the x-y plane is kept."""

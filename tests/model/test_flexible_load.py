@@ -65,7 +65,7 @@ def test_eulers_loads(make, euler):
     calm = found.at(load=(-0.999 * euler, 0.0, 0.0)).equilibrium
     assert np.max(np.abs(calm.handle_place[1:])) < 1e-12
     for factor in (1.001, 1.5):
-        with pytest.raises(EquilibriumError, match="the links buckle under a push") as caught:
+        with pytest.raises(EquilibriumError, match="links buckle") as caught:
             _ = found.at(load=(-factor * euler, 0.0, 0.0)).equilibrium
         share = float(str(caught.value).partition("they bear ")[2].split()[0])
         assert share == pytest.approx(1.0 / factor, rel=2e-4)

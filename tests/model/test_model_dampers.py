@@ -60,9 +60,9 @@ def test_a_full_plant_reduces_as_its_mechanism_does(kind, encoders, model):
     mechanism, posture, u = with_winding_damping(kind, 3)
     full = reduce_mechanism(mechanism, posture, u, "full", GivenDamping(), encoders)
     if model == "motor-mass" and encoders == "link":
-        with pytest.raises(ModelError, match="the sensor reads nothing"):
+        with pytest.raises(ModelError, match="sensor reads"):
             reduce_plant(full, model)
-        with pytest.raises(ModelError, match="the sensor reads nothing"):
+        with pytest.raises(ModelError, match="sensor reads"):
             reduce_mechanism(mechanism, posture, u, model, GivenDamping(), encoders)
         return
     theirs = reduce_mechanism(mechanism, posture, u, model, GivenDamping(), encoders)

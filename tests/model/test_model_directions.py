@@ -153,7 +153,7 @@ def test_directions_that_depend_on_each_other_are_refused():
 def test_a_rigid_drive_leaves_no_2m_masses():
     mechanism = five_bar(stiffness=(np.inf, 0.75))
     posture = solve_posture(mechanism, (0.03, 0.22))
-    with pytest.raises(ModelError, match="flexible drive in each"):
+    with pytest.raises(ModelError, match="flexible drive"):
         reduce_directions(mechanism, posture, [X, Y], "two-mass", ModalDamping(0.05))
     full = reduce_directions(mechanism, posture, [X, Y], "full", ModalDamping(0.05))
     assert full.size == 3

@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.device.device_cases import faults
 from zwidth.device import from_document
 from zwidth.model import Plant
 
@@ -134,30 +133,5 @@ def test_a_platform_that_cannot_turn_renders_no_moment():
 
     device = paddle(0.08)
     assert solve_posture(device.mechanism).angular_jacobian[:, 0] == pytest.approx([0, 0, 1])
-    with pytest.raises(DirectionError, match="cannot turn about the axis"):
+    with pytest.raises(DirectionError, match="cannot turn"):
         device.at(axis=[1, 0, 0]).plant  # noqa: B018
-
-
-def test_what_cannot_be_meant_is_refused_in_a_sentence():
-    device, wrist = paddle(0.08), from_document(WRIST)
-    from zwidth.errors import DeviceError
-
-    for case, sentence in (
-        ({"axis": [0, 0, 0]}, "has zero length"),
-        ({"axis": [0, 0, 1], "characteristic_length": 0.1}, "leave it out"),
-        ({"direction": [0, 1], "axis": [0, 0, 1]}, "must be a positive length"),
-        ({"characteristic_length": 0.1}, "leave it out"),
-        ({"orientation": [0, 0, 1]}, "control the position of its handle alone"),
-        ({"directions": [[0, 1]], "axis": [0, 0, 1]}, "beside an axis"),
-    ):
-        with pytest.raises(DeviceError, match=sentence):
-            device.at(**case)
-    for orientation, sentence in (
-        ([0, 0, 90], "degrees"),
-        ("up", "roll, pitch, yaw"),
-        (np.ones((3, 3)), "right angles"),
-    ):
-        with pytest.raises(DeviceError, match=sentence):
-            wrist.at(orientation=orientation)
-    missing = {**WRIST, "mechanism": {**WRIST["mechanism"], "reference": {}}}
-    assert "an axis for moments" in faults(missing)[0].message

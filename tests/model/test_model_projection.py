@@ -32,10 +32,10 @@ def test_a_position_that_is_had_is_not_moved(device):
 
 
 def test_far_off_an_answered_position_is_named(device):
-    with pytest.raises(OutOfReach, match=r"an answered position is \(0.054, 0.072, 0\) m, 10 mm away") as caught:
+    with pytest.raises(OutOfReach, match=r"position .*\(0.054, 0.072, 0\) m, 10 mm away") as caught:
         device.at((0.06, 0.08))
     assert caught.value.nearest == pytest.approx([0.054, 0.072, 0.0], abs=1e-9)
-    with pytest.raises(OutOfReach, match="an answered position is"):
+    with pytest.raises(OutOfReach, match="answered position"):
         solve_posture(device.mechanism, (0.0, LENGTH + 1e-6))  # without a tolerance
 
 
@@ -51,7 +51,7 @@ def test_of_many_each_is_projected_or_marked(device):
 def test_beyond_the_edge_of_a_plane_nothing_is_projected_and_what_is_named_can_be_had():
     """At the edge the drives lose the handle: what is named is a little within."""
     arms = load("five-bar")
-    with pytest.raises(OutOfReach, match="an answered position is") as caught:
+    with pytest.raises(OutOfReach, match="answered position") as caught:
         arms.at((0.02, 0.35))
     named = str(caught.value).split("is (")[1].split(")")[0]
     nearest = caught.value.nearest

@@ -27,7 +27,7 @@ def test_a_sweep_gives_back_the_response(plant, integrators):
     assert np.quantile(apart, 0.9) < 0.01
     assert np.median(found.coherence) > 0.9999
     assert found.frequency[-1] == pytest.approx(0.5 / T)
-    assert found.note == "from 120000 samples by local polynomials"
+    assert found.note.startswith("from 120000 samples ")
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -55,9 +55,9 @@ def test_the_coherence_tells_noise_and_what_was_not_excited():
 
 def test_a_record_that_cannot_serve_is_refused():
     force = np.random.default_rng(0).normal(size=1000)
-    with pytest.raises(ResponseError, match="has 1000 samples, too few for two segments of 4096"):
+    with pytest.raises(ResponseError, match=r"1000 samples, .* 4096"):
         sweep_response(force, force, T, 0, segment=4096)
-    with pytest.raises(ResponseError, match="has 100 samples, too few"):
+    with pytest.raises(ResponseError, match="100 samples"):
         sweep_response(force[:100], force[:100], T)
-    with pytest.raises(ResponseError, match="is 2 N all the time"):
+    with pytest.raises(ResponseError, match="2 N all"):
         sweep_response(np.full(1000, 2.0), force, T)

@@ -116,9 +116,7 @@ def test_the_functions_of_the_model_look_the_ratio_up():
 
 
 def test_the_large_motion_refuses_a_table():
-    with pytest.raises(
-        ArgumentError, match="not simulated with a transmission whose ratio changes; simulate the plant"
-    ):
+    with pytest.raises(ArgumentError, match=r"simulated .* ratio"):
         two_links(CHANGING).at().move()
 
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from identify.test_friction_joint import JOINT, record
-from identify.virtual_joint import records_of
 
 import zwidth
+from tests.identify.test_friction_joint import JOINT, record
+from tests.identify.virtual_joint import records_of
 from zwidth.identify import identify_friction
 from zwidth.show import figure
 from zwidth.show.figures.identify import draw_friction

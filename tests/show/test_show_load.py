@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,13 +14,10 @@ from tests.model.beam_devices import slides
 from zwidth.device import new_device
 from zwidth.measures import MISSING, OK, OUT_OF_REACH, STATUS
 from zwidth.model import PRISMATIC, Load
-from zwidth.show import MARKS, gather, keys_of_moments, load_path_figure, load_text, percent, typed
+from zwidth.show import MARKS, keys_of_moments, load_path_figure, percent, typed
 from zwidth.show.figures.load_path import COLOURS, draw_close_up
 from zwidth.show.figures.study import SYMBOLS
-from zwidth.show.load_text import balance_text, drive_rows, pushes_text
-from zwidth.show.report import load as section
-from zwidth.study import LoadPath
-from zwidth.study.loaded_charts import PushedChart
+from zwidth.show.load_text import drive_rows
 
 BENT = {f"drives.motor-{side}.backward_stiffness_Nm_per_rad": 0.3 for side in ("right", "left")}
 WEAK = {f"drives.motor-{side}.torque_limit_Nm": 0.05 for side in ("right", "left")}
@@ -39,108 +35,6 @@ def path(device):
 
 def template(kind):
     return zwidth.from_document(tomllib.loads(new_device("a template", kind)))
-
-
-def changed(path, **columns):
-    """The path with other numbers of some steps: name=[...], None to keep one."""
-    steps = list(path.steps)
-    for name, values in columns.items():
-        for k, value in enumerate(values):
-            if value is not None:
-                steps[k] = replace(steps[k], **{name: value})
-    return replace(path, steps=tuple(steps))
-
-
-def path_sentences(path):
-    """The sentences, with blanks and signs that can be typed."""
-    return [typed(sentence) for sentence in load_text.path_sentences(path)]
-
-
-def said(path, begin):
-    (sentence,) = [sentence for sentence in path_sentences(path) if sentence.startswith(begin)]
-    return sentence
-
-
-# --- sentences --------------------------------------------------------------------------------------
-
-
-def test_the_stiffness_is_told_with_both_ends(path):
-    low, high = path.stiffness_max.min(), path.stiffness_max.max()
-    free = path.unpushed.stiffness_max
-    expected = f"{low / 1e3:.3f} kN/m under 4 N to {high / 1e3:.3f} kN/m under -4 N"
-    assert expected in said(path, "The largest stiffness")
-    assert f"{100 * (low - free) / free:.3g}"[:5] in said(path, "The largest stiffness")
-
-
-def test_a_stiffness_that_does_not_change_is_told_once():
-    flat = zwidth.load("phantom-premium-1.5").load_path(2.0, 3)
-    assert said(flat, "The largest stiffness") == "The largest stiffness is 25.20 kN/m under every push."
-
-
-def test_a_chart_without_a_push_may_be_missing(path):
-    none = PushedChart(0.0, "no wall with K > 0 and B >= 0 is stable")
-    steps = (*path.steps[:2], none, *path.steps[3:])
-    assert said(LoadPath(steps), "The largest").endswith("; without a push no wall is stable.")
-    alone = LoadPath((none, path.steps[1], none))
-    assert "A wall is stable under -2 N alone, up to 7.850 kN/m." in path_sentences(alone)
-
-
-def test_what_is_neglected_is_told_with_where_it_is_worth_most(path):
-    share = np.abs(path.hand_neglected / path.stiffness_max - 1.0)
-    worst = path.pushes[share.argmax()]
-    assert said(path, "Neglecting").endswith(f"% at most, under {worst:g} N.")
-    same = changed(path, hand_neglected=path.stiffness_max.tolist())
-    assert "makes no difference" in said(same, "Whether the change of the hand's force is neglected")
-    own = replace(path, hand="neglected")
-    assert not [one for one in path_sentences(own) if "eglect" in one]
-
-
-def test_a_fixed_surface_is_told_with_its_largest_difference_or_why_there_is_none(path):
-    doubled = changed(path, fixed_surface=[2.0 * path.steps[0].stiffness_max])
-    assert "by 100.0 % at most, under -4 N" in said(doubled, "On a fixed surface")
-    same = changed(path, fixed_surface=path.stiffness_max.tolist())
-    assert said(same, "On a fixed surface").endswith("the largest stiffness is the same.")
-    none = changed(path, fixed_surface=[np.nan] * 5, fixed_surface_status=["none: too far"] * 5)
-    assert said(none, "On a fixed surface").endswith("there is no answer: none: too far.")
-
-
-def test_growth_is_told_of_the_pushes_under_which_there_is_any(device, path):
-    fastest = path.steps[0].sideways
-    doubles = f"fastest under -4 N, where it doubles in {fastest.time_to_double:.3f} s."
-    assert said(path, "Along the surface").endswith(f"under -4 N to -2 N and 2 N to 4 N: {doubles}")
-    rigid = device.load_path(4.0, 5, point=device.at(model="rigid"))
-    assert "a motion grows under -4 N to -2 N: fastest" in said(rigid, "Along the surface")
-    quiet = zwidth.load("stamper-delta").load_path(2.0, 3)
-    assert "No motion along the surface grows." in path_sentences(quiet)
-    paddle = template("paddle").load_path(1.0, 3)
-    assert "No free motion stands apart from the walls: the charts count every one." in path_sentences(paddle)
-
-
-def test_a_growing_vibration_has_its_frequency():
-    swings = template("five-bar").load_path(2.0, 3)
-    frequency = swings.steps[0].sideways.frequency
-    assert frequency > 0.0
-    assert said(swings, "Along the surface").endswith(f"as a vibration of {1e3 * frequency:.2f} mHz.")
-
-
-def test_pushes_without_an_answer_are_told_with_the_reason_of_the_weakest(device):
-    weak = device.with_(WEAK).load_path(24.0, 7)
-    told = said(weak, "Without an answer")
-    assert told.startswith("Without an answer, -24 N to -16 N and 16 N to 24 N: no equilibrium: under this load")
-    needed = weak.steps[1].status.split(" needs ")[1].split()[0]
-    assert f"needs {needed} N m" in told
-
-
-def test_neighbouring_pushes_are_named_together():
-    pushes = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    named = typed(pushes_text(pushes, np.array([True, True, False, True, False])))
-    assert named == "-2 N to -1 N and 1 N"
-
-
-def test_the_balance_names_a_force_across_only_where_there_is_one(device):
-    assert "across the direction" in balance_text(device.at(load=(0.0, -5.0)).equilibrium)
-    straight = balance_text(zwidth.load("stamper-delta").at(load=Load(push=-5.0)).equilibrium)
-    assert straight == "wall 5.000 N, hand (0, 0, -5) N"
 
 
 # --- figures ----------------------------------------------------------------------------------------
@@ -235,60 +129,6 @@ def test_every_status_of_a_map_or_a_study_has_its_mark():
 
 
 # --- the report's section ---------------------------------------------------------------------------
-
-GRAVITY = {"load.gravity_m_per_s2": [0.0, -9.81]}
-
-
-def facts(name, settings):
-    return gather(zwidth.load(name, settings))
-
-
-def told(of):
-    return typed(" ".join(section.sentences(of)))
-
-
-def test_the_section_says_who_carries_what_and_what_it_changes():
-    text = told(facts("five-bar", {"load.push_N": -5.0}))
-    assert "in balance under a push of -5 N along the direction: the hand gives (-0.002916, -5) N" in text
-    assert (
-        "the wall 5.005 N along the direction, and the motors motor-right 0.02440 N m, motor-left -0.02444 N m"
-        in text
-    )
-    assert "Of the hand's force (-0.002916, 0) N is across the direction" in text
-    assert "changes the largest stiffness by +0.02079 %, from 7.849 kN/m without it" in text
-    assert "below F/K, which at the largest stiffness is 637.5 µm" in text
-    assert "a motion stands apart from the chart: it grows by 0.2759 1/s and doubles in 2.512 s" in text
-
-
-def test_gravity_alone_has_no_one_sided_wall():
-    text = told(facts("five-bar", GRAVITY))
-    assert "under gravity (0, -9.81, 0) m/s²: the hand gives" in text
-    assert "the wall 0 N" in text
-    assert "F/K" not in text
-
-
-def test_several_motions_are_told_each():
-    text = told(facts("stamper-delta", {"load.push_N": -5.0, "load.gravity_m_per_s2": [0.0, 0.0, -9.81]}))
-    assert "2 motions stand apart from the chart: one vibrates at 611.1 mHz, decays by" in text
-    assert "across the direction" not in text
-
-
-def test_springs_with_two_stiffnesses_have_both():
-    text = told(facts("five-bar", {**BENT, **GRAVITY}))
-    assert ("The stiffness of motor-" in text) == bool(
-        zwidth.load("five-bar", {**BENT, **GRAVITY}).at().other_branch
-    )
-
-
-def test_a_load_that_leaves_no_wall_has_no_number():
-    of = facts("five-bar", {"load.push_N": -5.0, "loop.delay_samples": 3.0, "mechanism.damping.mode_ratio": 0.0})
-    assert "has no number: no wall with K > 0 and B >= 0 is stable without load." in told(of)
-
-
-def test_nothing_is_said_without_a_load():
-    of = facts("five-bar", {})
-    assert section.sentences(of) == section.path(of) == []
-    assert of.load_path is None
 
 
 def test_a_load_keeps_the_keys_of_its_file_about_an_axis():

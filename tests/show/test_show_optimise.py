@@ -62,7 +62,7 @@ def test_a_plant_has_no_grid():
 def test_values_change_where_the_worst_lies_between_the_points():
     measure = {"rigid_mass": "min"}
     (line,) = said(RATIO, objectives=measure, task={**TASK, "count": 2, "directions": 1})
-    assert line.startswith("on a grid twice as fine worst(rigid_mass) changes by at most ")
+    assert "worst(rigid_mass) changes" in line
     assert said(RATIO, objectives={"isotropy": "min"}, task=TASK) == [SAME]
 
 
@@ -75,7 +75,7 @@ def test_designs_lose_a_demand_between_the_points(most, expected):
         constraints={"rigid_mass": f"<= {most}"},
         task={**TASK, "count": 2, "directions": 1},
     )
-    assert (f"on a grid twice as fine 1 design breaks {demand}" in lines) is expected, lines
+    assert (any(line.endswith(f" 1 design breaks {demand}") for line in lines)) is expected, lines
 
 
 @pytest.mark.parametrize(("left", "expected"), [(-0.1, True), (0.05, False)])
@@ -89,4 +89,4 @@ def test_designs_have_no_value_where_a_finer_grid_is_out_of_reach(tmp_path, left
         objectives={"rigid_mass": "min"},
         task={"box_m": [[left, left + 0.2], [-0.1, 0.1]], "count": 2},
     )
-    assert ("on a grid twice as fine worst(rigid_mass) has no value in 1 design" in lines) is expected, lines
+    assert (any("worst(rigid_mass) has no" in line for line in lines)) is expected, lines

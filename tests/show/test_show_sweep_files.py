@@ -7,11 +7,9 @@ import pytest
 import xarray as xr
 
 from tests.study.study_cases import TWO_MASS, axis, study
-from zwidth.errors import OutputError, TooLarge
 from zwidth.show import csv_text, dataset, json_text
 from zwidth.show.dataset import write_sweep_csv, write_sweep_zarr
 from zwidth.study import Sweep, run_study
-from zwidth.study.designs import sweep as sweep_of_designs
 from zwidth.study.jobs import executor
 
 MASS = axis("plant.mass_kg.0.0", range=[-0.05, 0.3], tie=["plant.mass_kg.1.1"])
@@ -70,19 +68,3 @@ def test_a_stored_study_is_the_one_in_memory(tmp_path, monkeypatch):
         assert one.lowest == (np.nanmin(values), int(np.nanargmin(values)))
         assert one.highest == (np.nanmax(values), int(np.nanargmax(values)))
         assert dict(one.by_status) == {int(k): int((status == k).sum()) for k in np.unique(status)}
-
-
-def test_what_lists_all_designs_is_refused_where_it_would_not_fit(monkeypatch):
-    found = of_pairs()
-    monkeypatch.setattr(sweep_of_designs, "PER_AXIS", 10**12)
-    for listing in (found.dataset, found.table, found.document):
-        with pytest.raises(
-            TooLarge, match=r"^3 designs of 2 measures, listed all at once, would take .* \(\.zarr"
-        ):
-            listing()
-
-
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"designs\.zarr: cannot be written: not a directory; name another"):
-        write_sweep_zarr(tmp_path / "file" / "designs.zarr", of_pairs())

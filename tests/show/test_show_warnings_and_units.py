@@ -25,11 +25,6 @@ def test_manipulabilities_have_units():
     assert "1/(kg m)²" in text
 
 
-@pytest.mark.parametrize(("delay", "said"), [(1, "1 sample of delay"), (2, "2 samples of delay")])
-def test_samples_are_counted(delay, said):
-    assert f" {said}," in run_command("chart", ONE_MASS, "--set", f"loop.delay_samples={delay}").out
-
-
 def test_why_no_damping_is_stable_at_small_stiffness():
     words = "because walls of small stiffness are unstable"
     assert words in run_command("chart", ONE_MASS, "--set", "plant.stiffness_N_per_m=-50").out

@@ -166,7 +166,7 @@ def test_what_may_turn_an_axis_is_checked_one_by_one():
     device = device.with_({"links.lower.orientation_rad": [0.0, 0.0, 0.0]})
     family = Family(device, (Range("links.lower.orientation_rad.0", 0.0, np.pi),), (), device.at())
     assert build_together(family, [FamilyMember(0, (0.0,)), FamilyMember(0, (0.5,))]) == []
-    with pytest.raises(ValueError, match="is one number"):
+    with pytest.raises(ValueError, match="one number"):
         family.loop(FamilyMember(0, (0.5,)))
 
 

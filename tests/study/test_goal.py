@@ -223,13 +223,13 @@ def test_limits_of_the_schema_are_kept_and_whole_numbers_not_varied():
     found = by_path(numbers_for_goal(device, None, 100.0 * largest(device)))
     cutoff, order = found["loop.velocity.filter.cutoff_Hz"], found["loop.velocity.filter.order"]
     assert cutoff.status == "out of range"
-    assert "beyond, must be below half the sampling frequency" in cutoff.reason
+    assert "sampling frequency" in cutoff.reason
     assert (order.status, order.reason[:11]) == ("out of range", "not varied:")
 
 
 @pytest.mark.parametrize("goal", [0.0, -1.0, inf, nan])
 def test_a_goal_that_is_no_stiffness_is_refused(goal):
-    with pytest.raises(ValueError, match="must be a positive, finite stiffness"):
+    with pytest.raises(ValueError, match="positive, finite"):
         numbers_for_goal(one_mass(), None, goal)
 
 
@@ -241,4 +241,4 @@ def test_the_result_knows_its_keys_and_its_lines():
     assert [one["path"] for one in document["goal"]] == goal.table()["path"]
     assert "plant.mass_kg = 0.2" in repr(goal)
     hopeless = numbers_for_goal(device, device.at(), 1e6 * largest(device))
-    assert "no number reaches it alone" in repr(hopeless)
+    assert "no number" in repr(hopeless)

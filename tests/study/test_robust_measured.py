@@ -98,13 +98,13 @@ def test_members_left_out_are_seen_by_those_tried_afterwards(tmp_path):
 
 def test_numbers_of_the_measurement_itself_are_refused(tmp_path):
     path = write(tmp_path, "free", "")
-    with pytest.raises(RangeError, match="hardware_delay_samples: is no number that can vary beside a measured"):
+    with pytest.raises(RangeError, match="hardware_delay_samples: is no"):
         study(path, (Range("response.hardware_delay_samples", 0.0, 1.0),))
-    with pytest.raises(RangeError, match="with -1 the device is not valid"):
+    with pytest.raises(RangeError, match="not valid"):
         study(path, (Range("loop.delay_samples", -1.0, 1.0),))
 
 
 def test_an_operator_needs_the_handle(tmp_path):
     (tmp_path / "hand.toml").write_text(HAND)
-    with pytest.raises(DeviceError, match=r"hand\.toml cannot be attached to this \[response\]: it has no path"):
+    with pytest.raises(DeviceError, match=r"hand\.toml cannot .*\[response\]"):
         study(write(tmp_path, "bare", "", stated=""), operators=("none", str(tmp_path / "hand.toml")))

@@ -62,11 +62,11 @@ def test_sensitivities_are_those_of_the_plant(pair):
     # the file's delay is what software adds, which is none
     delay, period = "loop.delay_samples", "loop.sampling_period_s"
     assert own[delay].derivative == pytest.approx(exact[delay].derivative, rel=2e-3)
-    assert "0 has no logarithm" in own[delay].reason
+    assert "no logarithm" in own[delay].reason
     # the device's own delay stays in seconds, the plant's in samples
     assert own[period].logarithmic == pytest.approx(exact[period].logarithmic - exact[delay].logarithmic, rel=2e-3)
     assert "whole number" in own["loop.velocity.filter.order"].reason
-    assert "a [plant] or [mechanism] has them" in measured.left_out["[response]"]
+    assert "[plant] or" in measured.left_out["[response]"]
 
 
 @pytest.mark.slow

@@ -25,18 +25,10 @@ def test_a_folder_is_kept_for_one_question(tmp_path):
     assert computed(folder) == []
     before = sorted(path.name for path in folder.iterdir())
     # the job is the same: only the question tells that others follow from it
-    with pytest.raises(StoreError, match=rf"^{folder}: keeps finished work of another study or other options"):
+    with pytest.raises(StoreError, match=rf"^{folder}: keeps finished"):
         computed(folder, "second")
     assert sorted(path.name for path in folder.iterdir()) == before
     assert computed(folder) == []
-
-
-def test_another_release_is_refused_by_its_number(tmp_path, monkeypatch):
-    computed(tmp_path / "kept")
-    for module in ("series", "store"):
-        monkeypatch.setattr(f"zwidth.study.jobs.{module}.__version__", "9.8")
-    with pytest.raises(StoreError, match=r"kept: keeps this study as computed by zwidth \d\S+, and this is 9\.8;"):
-        computed(tmp_path / "kept")
 
 
 @pytest.mark.parametrize("left", ["nothing", "folder", "draft", "header"])
@@ -61,16 +53,16 @@ def test_a_folder_of_an_older_layout_is_told_by_its_stores(tmp_path):
     (folder / "series.json").unlink()
     assert computed(folder) == []
     assert not (folder / "series.json").exists()
-    with pytest.raises(StoreError, match=rf"^{folder}: keeps finished work of another study or other options"):
+    with pytest.raises(StoreError, match=rf"^{folder}: keeps finished"):
         computed(folder, cells=34)
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda header: header[:20], "its series.json is damaged; remove the folder, or name another"),
-        (lambda header: json.dumps(json.loads(header) | {"version": 3}), "its version is 3, and zwidth "),
-        (lambda header: json.dumps(json.loads(header) | {"version": 1}), "its version is 1, whose cells "),
+        (lambda header: header[:20], "series.json is damaged"),
+        (lambda header: json.dumps(json.loads(header) | {"version": 3}), "version is 3, "),
+        (lambda header: json.dumps(json.loads(header) | {"version": 1}), "version is 1, "),
     ],
 )
 def test_a_fingerprint_that_cannot_be_read_is_refused(tmp_path, change, said):
@@ -79,14 +71,15 @@ def test_a_fingerprint_that_cannot_be_read_is_refused(tmp_path, change, said):
     header.write_text(change(header.read_text()))
     with pytest.raises(StoreError) as caught:
         computed(tmp_path / "kept")
-    assert str(caught.value).startswith(f"{tmp_path / 'kept'}: {said}")
+    assert str(caught.value).startswith(f"{tmp_path / 'kept'}: ")
+    assert said in str(caught.value)
 
 
 def test_a_folder_in_use_is_refused_and_stays_locked(tmp_path):
     with JobSeries(tmp_path / "kept", workers=1) as first:
         first.begin("first")
         for _ in range(2):  # the one that is refused does not take the lock away
-            with pytest.raises(StoreError, match="is computing into it; wait, or name another folder"):
+            with pytest.raises(StoreError, match="computing into"):
                 computed(tmp_path / "kept")
     assert computed(tmp_path / "kept")
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-from collections import namedtuple
-
 import numpy as np
 import pytest
 import zarr
 
 from tests.study.executor_cases import NotedJob, RootsJob, same_cells
-from zwidth.errors import StoreError
 from zwidth.measures import MISSING, STATUS
 from zwidth.study import Store, run_job
 
@@ -36,30 +32,6 @@ def test_only_what_is_missing_is_computed(tmp_path, kind):
     again = kind(33)
     assert same_cells(run_job(again, Store(path, again)), found)
     assert again.computed_ranges == []
-
-
-def test_another_question_is_refused_and_nothing_is_lost(tmp_path):
-    path = tmp_path / "cells"
-    partial_store(path, RootsJob(33), [0])
-    for other in (RootsJob(34), RootsJob(33, question="else"), RootsJob(33, measures=("root", "other"))):
-        with pytest.raises(
-            StoreError, match=r"^cells: keeps finished work of another study or other options; name"
-        ):
-            Store(path, other)
-        assert [first for first, _ in Store(path, RootsJob(33)).stored_batches()] == [0]
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["cells"]
-
-
-def test_another_release_is_refused_by_its_number(tmp_path, monkeypatch):
-    path = tmp_path / "cells"
-    partial_store(path, RootsJob(33), [0])
-    monkeypatch.setattr("zwidth.study.jobs.store.__version__", "9.8")
-    with pytest.raises(
-        StoreError, match=r"^cells: keeps this study as computed by zwidth \d\S+, and this is 9\.8;"
-    ):
-        Store(path, RootsJob(33))
-    with pytest.raises(StoreError, match=r"^cells: keeps a study as computed by zwidth \d\S+, and this is 9\.8;"):
-        Store(path, RootsJob(34))
 
 
 def test_others_can_read_it(tmp_path):
@@ -93,21 +65,6 @@ def test_a_damaged_batch_is_computed_again(tmp_path, array, damage):
     assert again.computed_ranges == [(10, 20)]
 
 
-@pytest.mark.parametrize("what", ["file", "folder", "group"])
-def test_what_is_no_store_is_left_alone(tmp_path, what):
-    path = tmp_path / "precious"
-    if what == "file":
-        path.write_text("text")
-    elif what == "folder":
-        (path / "inside").mkdir(parents=True)
-    else:
-        zarr.open_group(str(path), mode="w").attrs["mine"] = 1
-    before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(StoreError, match="precious: is not the store of a study; name another folder"):
-        Store(path, RootsJob(3))
-    assert sorted(tmp_path.rglob("*")) == before
-
-
 def test_an_empty_folder_is_begun(tmp_path):
     (tmp_path / "cells").mkdir()
     job = RootsJob(12)
@@ -122,13 +79,3 @@ def test_a_store_can_be_removed_again(tmp_path):
     store.begin(1)
     store.remove()
     assert not path.exists()
-
-
-def test_what_does_not_fit_on_the_disk_is_refused_with_its_size(tmp_path, monkeypatch):
-    usage = namedtuple("usage", "total used free")
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10**9, 0, 10**6))
-    with pytest.raises(
-        StoreError, match=r"cells: 1000000 cells of 2 measures would take 0\.018 GB of disk, of 0\.001"
-    ):
-        Store(tmp_path / "cells", RootsJob(10**6))
-    assert list(tmp_path.iterdir()) == []

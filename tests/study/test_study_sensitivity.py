@@ -231,7 +231,7 @@ def test_a_delay_that_is_not_given_is_reported_as_none():
     late = largest(one_mass(delay_samples=1e-4))
     assert (number.value, number.side) == (0.0, "above")
     assert np.isnan(number.logarithmic)
-    assert "0 has no logarithm" in number.reason
+    assert "no logarithm" in number.reason
     assert number.derivative == pytest.approx((late - largest(one_mass())) / 1e-4, rel=1e-3)
 
 
@@ -257,7 +257,7 @@ def test_points_of_a_loop_are_no_symmetric_matrix():
 def test_numbers_that_say_where_are_left_out_and_named():
     found = sensitivities_of("five-bar")
     assert not any("reference" in n.path or "assemblies" in n.path for n in found.numbers)
-    assert "the operating point" in found.left_out["mechanism.reference.position_m.1"]
+    assert "operating point" in found.left_out["mechanism.reference.position_m.1"]
     paths = {n.path for n in found.numbers} | found.left_out.keys() | {"loop.delay_samples"}
     assert paths == address.numeric_addresses(load("five-bar").document).keys() | {"loop.delay_samples"}
 

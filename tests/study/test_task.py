@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.study.study_cases import faults, study_document
+from tests.study.study_cases import study_document
 from zwidth.device.load import load
 from zwidth.measures import OK, OUT_OF_REACH
 from zwidth.study import run_study, study_of
@@ -102,25 +102,3 @@ def test_a_ball_and_directions_in_space():
     r = np.linalg.norm(found.positions - found.positions[0], axis=1)
     np.testing.assert_allclose(r[1:], 0.01)
     assert found.grid.shape == (19, 1, 3)
-
-
-def test_faults_of_a_task_have_their_lines():
-    measures = ["worst(isotropy)"]
-    cases = [
-        ({"box_m": [[0, 1], [0, 1]], "points_m": [[0, 0]]}, "task.points_m: and box_m exclude each other"),
-        ({"center_m": [0, 0]}, "task.center_m: goes with radius_m; give both"),
-        ({"count": 3}, "task.count: is read with box_m or radius_m only"),
-        ({"box_m": [[1, 0], [0, 1]]}, "task.box_m.0: must be [lower, upper] with lower <= upper, got [1, 0]"),
-        ({"box_m": [[0, 1], [0, 1]], "count": [1, 2, 3]}, "task.count: must be one number, or 2 for the axes"),
-        ({"box_m": [[0, 1], [0, 1]], "count": 400, "directions": 4}, "task.count: makes 640000 points"),
-        ({"directions": [[0, 0]]}, "task.directions"),
-        ({"bux_m": 1}, "task.bux_m: is not a key of [task]; did you mean 'box_m'?"),
-        ({"operators": ["none"]}, "task.operators: is for an optimiser"),
-    ]
-    for given, line in cases:
-        lines = faults(study_document(PERIOD, measures=measures, task=given))
-        assert any(one.startswith(line) for one in lines), (lines, line)
-    both = study_document(PERIOD, measures=measures, task={}, workspace={})
-    assert any(one.startswith("workspace: and [task] exclude each other") for one in faults(both))
-    unused = study_document(PERIOD, measures=["isotropy"], task={})
-    assert any("is used only by measures over it, such as worst(isotropy)" in one for one in faults(unused))

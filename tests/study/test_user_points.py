@@ -84,22 +84,3 @@ def test_keys_and_columns():
     assert list(table) == list(lower)
     assert table["agrees"] == [one.agrees for one in comparison().points]
     assert compare_points(chart(), ()).table() == {}
-
-
-def test_the_repr_has_the_counts_on_one_line():
-    assert repr(comparison()) == (
-        "PointsComparison: 3 edge points, 2 compared; 3 walls, 2 with their exact verdict; 1 unnamed"
-    )
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ({"edge": "left"}, "edge must be 'lower' or 'upper' or 'tip' or ''"),
-        ({"verdict": "steady"}, "verdict must be 'stable' or 'unstable' or ''"),
-        ({"edge": "tip", "verdict": "stable"}, "give edge or verdict, not both"),
-    ],
-)
-def test_a_point_that_cannot_be_meant_is_refused(words, says):
-    with pytest.raises(ValueError, match=says):
-        UserPoint(4000.0, 10.0, **words)

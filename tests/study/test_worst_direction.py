@@ -73,7 +73,7 @@ def test_worst_and_best_follow_what_a_designer_wants():
     assert (worst < best).all()
     worst, best = (extreme_over_directions(lower, place, e).extreme.values[ok] for e in ("worst", "best"))
     assert (worst > best).all()
-    with pytest.raises(MeasureError, match="has no better side"):
+    with pytest.raises(MeasureError, match="better side"):
         extreme_over_directions(MEASURES["rigid_mass"], place, "worst")
 
 
@@ -126,11 +126,11 @@ def test_a_direction_without_a_value_spoils_the_worst_and_is_left_out_of_the_bes
     worst = extreme_over_directions(measure, place, "worst").extreme
     assert (worst.status == NO_VALUE).all()
     assert np.isnan(worst.values).all()
-    assert worst.notes[0].reason == "along some directions: not along x"
+    assert worst.notes[0].reason.endswith(": not along x")
     best = extreme_over_directions(measure, place, "best").extreme
     assert (best.status == OK).all()
     np.testing.assert_allclose(best.values, 1.0, atol=1e-8)
-    assert best.notes[0].reason == "along some directions, which are left out: not along x"
+    assert "left out: " in best.notes[0].reason
     assert best.notes[0].count == 3
 
 

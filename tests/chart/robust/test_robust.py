@@ -210,9 +210,9 @@ def test_members_that_cannot_be_charted_are_named_and_not_fatal():
     assert list(chart.members) == [0]
     assert list(chart.failed) == [1]
     assert "moves nothing" in chart.failed[1]
-    with pytest.raises(ChartError, match="no member could be charted; the first: the wall"):
+    with pytest.raises(ChartError, match="no member"):
         robust_chart([Loop(apart, Controller(0.001))])
-    with pytest.raises(ValueError, match="at least one member"):
+    with pytest.raises(ValueError, match="one member"):
         robust_chart([])
 
 

@@ -153,7 +153,7 @@ def test_each_direction_of_a_polar_is_its_own_largest_stiffness():
 def test_a_direction_without_an_answer_is_data():
     device = load("five-bar")
     found = largest_stiffness_by_direction(device.at(), np.eye(3))
-    assert found.status == ("ok", "ok", "out of motion: the handle cannot move along the direction")
+    assert [one.partition(":")[0] for one in found.status] == ["ok", "ok", "out of motion"]
     assert np.isnan(found.stiffness[2])
     assert np.isfinite(found.stiffness[:2]).all()
 

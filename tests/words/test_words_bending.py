@@ -1,4 +1,4 @@
-"""The report's section on links that bend: every sentence, and a device that changes it."""
+"""What a report says of links that bend."""
 
 from __future__ import annotations
 
@@ -58,9 +58,6 @@ def changed(name, bent=None, rigid=None):
     return replace(own, bent=replace(own.bent, **bent or {}), rigid=replace(own.rigid, **rigid or {}))
 
 
-# --- which links bend, and as what ------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -110,8 +107,6 @@ def test_links_that_stay_rigid_are_named():
     assert several in section.beginning(found("stamper-delta"))
     assert section.kept(found("five-bar")) == ""
 
-
-# --- which way it moves what ------------------------------------------------------------------------
 
 STIFFNESS = [
     ("five-bar", "raises the largest stiffness from 7.849 kN/m with rigid links to 7.857 kN/m, 0.09535 % more."),
@@ -198,9 +193,6 @@ def test_where_the_first_mode_goes_otherwise():
     assert section.first_mode(none) == "A wall moves no mode in which anything gives."
     buckled = changed("five-bar", {"first_mode": nan, "chart": None}, {"first_mode": nan})
     assert section.first_mode(buckled) == ""
-
-
-# --- in the report ----------------------------------------------------------------------------------
 
 
 def test_hand_and_load_are_said_to_be_left_out():

@@ -16,12 +16,15 @@ from tests.study.study_cases import (
     study,
     study_document,
 )
+from tests.study.test_task import PERIOD
 from zwidth.device import new_device
 from zwidth.errors import DeviceError, TooLarge
 from zwidth.study import read_study, study_of
 
-DELAY = axis("loop.delay_samples", 0.0, 1.0)
+# --- every way in which a study file can be wrong, told in one line each -----------------------------
 
+
+DELAY = axis("loop.delay_samples", 0.0, 1.0)
 WRONG = [
     ({"device": "no-such"}, "device: 'no-such' is neither a file nor a bundled device"),
     ({"device": 3}, "device: must be text, got 3"),
@@ -376,3 +379,28 @@ def test_a_hypercube_of_any_size_is_read():
     made = study(axis(RIGHT_LENGTH, range=[0.1, 0.2]), sampling="latin-hypercube", count=10**9)
     assert made.sampling.count == 10**9
     assert 0.1 <= made.sampling.values(10**9 - 1)[0] <= 0.2
+
+
+# --- the points and directions of a task, and statistics over them -----------------------------------
+
+
+def test_faults_of_a_task_have_their_lines():
+    measures = ["worst(isotropy)"]
+    cases = [
+        ({"box_m": [[0, 1], [0, 1]], "points_m": [[0, 0]]}, "task.points_m: and box_m exclude each other"),
+        ({"center_m": [0, 0]}, "task.center_m: goes with radius_m; give both"),
+        ({"count": 3}, "task.count: is read with box_m or radius_m only"),
+        ({"box_m": [[1, 0], [0, 1]]}, "task.box_m.0: must be [lower, upper] with lower <= upper, got [1, 0]"),
+        ({"box_m": [[0, 1], [0, 1]], "count": [1, 2, 3]}, "task.count: must be one number, or 2 for the axes"),
+        ({"box_m": [[0, 1], [0, 1]], "count": 400, "directions": 4}, "task.count: makes 640000 points"),
+        ({"directions": [[0, 0]]}, "task.directions"),
+        ({"bux_m": 1}, "task.bux_m: is not a key of [task]; did you mean 'box_m'?"),
+        ({"operators": ["none"]}, "task.operators: is for an optimiser"),
+    ]
+    for given, line in cases:
+        lines = faults(study_document(PERIOD, measures=measures, task=given))
+        assert any(one.startswith(line) for one in lines), (lines, line)
+    both = study_document(PERIOD, measures=measures, task={}, workspace={})
+    assert any(one.startswith("workspace: and [task] exclude each other") for one in faults(both))
+    unused = study_document(PERIOD, measures=["isotropy"], task={})
+    assert any("is used only by measures over it, such as worst(isotropy)" in one for one in faults(unused))

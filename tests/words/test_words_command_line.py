@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
 from tests.cli.command_runner import MECHANISM, TWO_MASS, refusal_lines, run_command
+from tests.cli.test_cli_process import ZWIDTH
+from zwidth.errors import OutputError
+from zwidth.show.output import replacing
+
+# --- bad input through the command line: exit code 2, one line per fault, nothing on standard --------
+
 
 PLANT = """
 name = "two masses"
@@ -21,6 +31,7 @@ sampling_period_s = 0.001
 """
 FILTER = '[loop.velocity.filter]\ntype = "butterworth"\n'
 PLANT_AND_MECHANISM = "[mechanism]\n[[mechanism.links]]\nname = 'a'\n"
+
 
 # what is replaced in PLANT (None: the whole of it), by what, and for each line its key and words of it
 FILES = {
@@ -113,6 +124,7 @@ def test_a_loop_that_cannot_close():
 SENSOR_APART = [
     f"--set=plant.{key}" for key in ("stiffness_N_per_m=unset", "damping_Ns_per_m=unset", "sensor=[1.0, 0.0]")
 ]
+
 
 # a command line, and words of each of its lines
 LINES = [
@@ -266,3 +278,69 @@ def test_an_interruption_is_one_line_and_leaves_nothing_half_written(tmp_path, m
     assert (ran.code, ran.out, len(ran.lines)) == (130, "", 1)
     assert file.read_text() == "from before"
     assert list(tmp_path.iterdir()) == [file]
+
+
+# --- the command as a process: what it imports, signals, closed and full streams ---------------------
+
+
+@pytest.mark.parametrize("words", ["schema", "--help", "--version", f"chart {TWO_MASS} --output chart.csv"])
+def test_a_closed_standard_output_is_said_before_anything_is_computed(tmp_path, words):
+    line = f'exec "{ZWIDTH}" {words} >&-'
+    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "zwidth: standard output is closed; send it to a file, or to /dev/null\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize(
+    "words", [("devices",), ("schema",), ("chart", TWO_MASS, "--json"), ("--help",), ("--version",)]
+)
+def test_a_full_disk_is_said_on_one_line(words):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([ZWIDTH, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "standard output cannot be written" in done.stderr
+
+
+def test_a_warning_is_one_line():
+    program = """
+import warnings
+from zwidth.show.cli import main
+
+def warn(arguments):
+    warnings.warn("odd", UserWarning)
+    warnings.warn("arithmetic", RuntimeWarning)
+    return 0
+
+main.run = warn
+main.main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "zwidth: warning: odd\n")
+
+
+# --- strict JSON and CSV, and files that appear whole or not at all ----------------------------------
+
+
+def test_a_full_disk_is_an_error_with_the_files_name(tmp_path):
+    path = tmp_path / "a.csv"
+    with pytest.raises(OutputError, match=r"a\.csv: cannot be written: no space left"), replacing(path):
+        raise OSError(28, "No space left on device")
+
+
+# --- who may use the workbench, and what it hands out ------------------------------------------------
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="ctrl-C is no signal there that a test can send")
+def test_ctrl_c_ends_it_as_it_said() -> None:
+    command = [sys.executable, "-m", "zwidth", "app", "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert "ctrl-C ends it" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        try:
+            assert process.communicate(timeout=30)[1] == "zwidth: the workbench has ended\n"
+        finally:
+            process.kill()  # one that goes on would be waited for
+        assert process.returncode == 0

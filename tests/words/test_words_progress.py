@@ -8,10 +8,14 @@ from threading import Event
 
 import pytest
 
+from zwidth.compile_events import compiling
 from zwidth.progress import watched
 from zwidth.show import run
 from zwidth.show.cli import progress
+from zwidth.show.cli.first_use import KernelTimes, Progress, announce_compiling
 from zwidth.show.cli.progress import show_progress
+
+# --- what a long command says of how far it is -------------------------------------------------------
 
 
 @pytest.fixture
@@ -200,3 +204,26 @@ def test_compiled_code_is_watched_from_beside_it(monkeypatch):
     assert set(told) == {("steps", 5, 5)}
     with watched(None, "steps", lambda: 7, 5):
         pass
+
+
+# --- compiling at first use: what is kept on disk, when it is compiled anew, and that whoever --------
+
+
+def test_a_command_says_what_it_waits_for(monkeypatch, capsys):
+    times = KernelTimes({"zwidth.a": 20.0, "zwidth.b": 40.0}, {"chart": ["zwidth.a", "zwidth.b"]})
+    monkeypatch.setattr(KernelTimes, "read", lambda: times)
+    with announce_compiling("chart"):
+        for name in ("users.law", "zwidth.a", "zwidth.b"):
+            with compiling(name):
+                pass
+    assert capsys.readouterr().err == "zwidth: first use: compiling 2 kernels for this processor, about 60 s\n"
+
+
+def test_what_remains_is_told_as_it_goes(monkeypatch, capsys):
+    clock = iter([0.0, 6.0, 6.0, 6.0, 7.0])
+    monkeypatch.setattr("zwidth.show.cli.first_use.monotonic", lambda: next(clock))
+    progress = Progress({"a": 3.0, "b": 30.0, "c": 3.0}, 1)
+    progress.finish("a")
+    assert capsys.readouterr().err == "zwidth: 1 compiled, 2 to go, about 35 s left\n"
+    progress.finish("b")
+    assert capsys.readouterr().err == ""

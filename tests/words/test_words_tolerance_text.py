@@ -1,4 +1,4 @@
-"""`zwidth tolerance`: sentences that change with the device, files, resuming, and everything refused."""
+"""`zwidth tolerance`: the answer in sentences, and what is refused."""
 
 from __future__ import annotations
 
@@ -296,9 +296,6 @@ def test_everything_wrong_comes_at_once(folder):
         "series.toml: measures: isotropy needs a [mechanism]; this device gives its [plant] only",
         "series.toml: measures: decay_time needs a wanted wall; give stiffness_N_per_m and damping_Ns_per_m",
     ]
-
-
-# --- the page ---------------------------------------------------------------------------------------
 
 
 def blocks(language: str) -> list[str]:

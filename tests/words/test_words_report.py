@@ -1,4 +1,4 @@
-"""Every sentence of the report, and a device that changes it."""
+"""Each sentence of a report follows from its numbers."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.show.test_show_report import Page
+from tests.undrawn_figures import leave_undrawn
 from zwidth.device import from_document
 from zwidth.device.load import load
 from zwidth.loop.motion_names import group_names
 from zwidth.show import gather
 from zwidth.show.report import sentences
+from zwidth.show.report.report import page
 from zwidth.study import Variant, limiting_change
 from zwidth.study.sensitivity.result import Sensitivity
 
@@ -80,7 +83,6 @@ BY_DRIVES = (
 )
 BY_SPRING = "it is its flexibility, at 130.7 Hz: with a rigid structure, which cannot be built, it would reach"
 ONE_LATE = "with one sample of delay it would"
-
 STIFFNESS_SENTENCES = [
     (lambda: facts("five-bar"), f"{FIVE_BAR_OPENING} 7.849 kN/m, at 10.82 N s/m of virtual damping."),
     (lambda: facts("five-bar", LATE), f"{FIVE_BAR_OPENING} 1.708 kN/m, at 3.216 N s/m of virtual damping."),
@@ -549,3 +551,15 @@ def test_what_is_not_linear_is_said_to_be_left_out():
     both = facts("hapkit-course", "friction.coulomb_N=0.1", "loop.saturation.force_N=5")
     assert "leaves out dry friction and the force limit," in sentences.left_out(both)
     assert sentences.summary(both)[-1] == sentences.left_out(both)
+
+
+def test_the_page_says_which_question_each_answer_is_to(monkeypatch):
+    leave_undrawn(monkeypatch)
+    shown, late = (Page(page(facts(*of))).text for of in (("five-bar",), ("hapkit-course", LATE)))
+    assert "This asks for the cause: one thing at a time is changed, whether or not that can be built" in shown
+    assert "This asks what can be done: each number of the device file is changed by 1 %" in shown
+    assert "“What limits it” asks for the cause and names another: the flexibility of the drives" in shown
+    for label in ("rigid drives (ideal)", "no delay", "half the sampling period"):
+        assert label in shown
+    assert "half the sampling period (ideal)" not in shown
+    assert "no delay (ideal)" in late
