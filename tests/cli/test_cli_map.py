@@ -232,7 +232,7 @@ def test_the_page_s_python_says_what_it_comes_to(tmp_path, monkeypatch):
             assert (ran.code, ran.err) == (0, "")
     assert "379 cm²" in page
     assert (
-        "common area            378.9 cm², 25.73 %"
+        "378.9 cm², 25.73 %"
         in run_command(
             "map",
             "five-bar",

@@ -10,7 +10,9 @@ import pytest
 from tests.words.quoted_sentences import is_sentence, sentences_of
 
 TESTS = Path(__file__).parent.parent
-FIGURES: Final = "caption experiment felt figures guarantees limit_cycles load map motion polar robust study"
+FIGURES: Final = (
+    "caption experiment felt figures guarantees limit_cycles load map measured motion polar robust study"
+)
 # Files and folders that quote no message of zwidth: what the project's own tools print, the captions and labels of
 # figures, and the sentence about each argument of each function, which is all that its file is about
 ELSEWHERE: Final = [

@@ -490,7 +490,7 @@ def test_the_text_says_how_loud_what_was_clipped_and_a_better_pitch(tmp_path):
             "at least 0.1 and at most 1000, got 'octave'; or give auto",
         ),
         (("--sound-pitch", "nan", "--output", "a.wav"), "at least 0.1 and at most 1000"),
-        (("--sound-full-scale", "0", "--output", "a.wav"), "must be a number"),
+        (("--sound-full-scale", "0", "--output", "a.wav"), "must be a finite number"),
     ],
 )
 def test_options_that_cannot_be_are_refused(tmp_path, monkeypatch, words, text):

@@ -393,7 +393,7 @@ def test_people_read_the_same():
     ("words", "said"),
     [
         (("--offset", "0.5"), "no encoder steps"),
-        (("--offset", "2"), "from -0.5 up to 0.5"),
+        (("--offset", "2"), "at least -0.5 and at most 0.5"),
         (("--plane", "plane.png"), "no encoder steps"),
         (("--plane", "plane.csv"), "plane.csv"),
         ((*ROUGH[:2], "--plane", "plane.png", "--stiffness", "-1"), "positive stiffness"),

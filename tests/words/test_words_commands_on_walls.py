@@ -231,10 +231,10 @@ def test_a_device_that_breaks_nothing_shows_no_list(paddle):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--damping", "abc"), "must be a finite number, got 'abc'"),
-        (("--damping", "nan"), "must be a finite number, got 'nan'"),
-        (("--damping", "inf"), "must be a finite number, got 'inf'"),
-        (("--damping", ""), "must be a finite number, but it is missing"),
+        (("--damping", "abc"), "must be a finite number [N s/m], got 'abc'"),
+        (("--damping", "nan"), "must be a finite number [N s/m], got nan"),
+        (("--damping", "inf"), "must be a finite number [N s/m], got inf"),
+        (("--damping", ""), "must be a finite number [N s/m]"),
         (("--damping",), "requires an argument"),
         (("--output", "bounds.txt"), "must end in"),
         (("--output", "no/such/folder.csv"), "there is no folder"),
@@ -268,7 +268,7 @@ def test_walls_that_no_device_renders_are_refused(tmp_path):
     assert "line 2: stiffness_N_per_m: must be from -1e+15 to 1e+15, got '1e308'" in lines[0]
     for command in ("check", "felt"):
         (line,) = refusal_lines(command, TWO_MASS, "--stiffness", "1e308", "--damping", "5")
-        assert "'--stiffness': must be from -1e+15 to 1e+15, got '1e308'" in line
+        assert "'--stiffness': must be a finite number [N/m], got 1e+308" in line
     (point,) = document_of("check", TWO_MASS, "--stiffness", "1e15", "--damping", "1e15")["points"]
     assert point["verdict"] == "unstable"
 

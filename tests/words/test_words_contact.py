@@ -435,7 +435,7 @@ def test_durations_that_cannot_be_meant_are_refused(duration):
 
 @pytest.mark.parametrize("substeps", [0, -3, 100_001])
 def test_substeps_that_cannot_be_meant_are_refused(substeps):
-    with pytest.raises(ValueError, match="substeps must be from 1 to 100000"):
+    with pytest.raises(ValueError, match="substeps must be a whole number from 1 to 100000"):
         run(two_mass_loop(), 100.0, 1.0, 0.1, substeps=substeps)
 
 
