@@ -20,6 +20,7 @@ from zwidth import compile_events, machine_code
 from zwidth import compiled as compiled_module
 from zwidth.compile_events import compiling, listening
 from zwidth.compiled import can_be_taken_apart
+from zwidth.resources import in_chunks
 from zwidth.show.cli.first_use import KernelTimes
 from zwidth.show.cli.progress import time_text
 
