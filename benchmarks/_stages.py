@@ -14,8 +14,7 @@ from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_polyno
 from zwidth.chart.peak_search import NEAR_END, WIDE_SHARE, WIDE_STEP, search_peak
 from zwidth.chart.wall_samples import walls_of_samples
 from zwidth.compiled import compiled
-from zwidth.loop.circle_factors import COMPUTER, fill_computer, fill_plant
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import COMPUTER, LoopTable, fill_computer, fill_plant
 
 # In the order of the computation, and whether the stage only checks or decides what another has found.
 STAGES = (

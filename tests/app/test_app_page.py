@@ -490,7 +490,7 @@ def sampled_response(loop, frequency):
     """P(e^(jwT)) of a loop, as its circle's factors have it."""
     from zwidth.chart import terms_along
     from zwidth.loop import table_of_loops
-    from zwidth.loop.circle_factors import circle_factors
+    from zwidth.loop.loop_table import circle_factors
 
     A, AP, _ = terms_along(circle_factors(table_of_loops(loop)), 2.0 * np.pi * frequency * loop.period).T
     return AP / A

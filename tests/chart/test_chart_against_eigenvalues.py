@@ -8,7 +8,7 @@ import shapely
 
 from tests.systems import mass, random_loop, reference_transition_matrix, two_mass
 from zwidth.chart import boundary_points, stability_chart, work_array
-from zwidth.chart.hurwitz import QUOTIENT, hurwitz
+from zwidth.chart.loop_polynomials import QUOTIENT, hurwitz
 from zwidth.errors import ChartError
 from zwidth.loop import Butterworth, CentralDifference, Controller, FirstOrder, Loop
 

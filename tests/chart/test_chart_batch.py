@@ -12,7 +12,7 @@ from zwidth.chart import ALL_NUMBERS, MOST_DEGREE, TracedEdge, Tracer, closed_ri
 from zwidth.chart.chart_batch import STIFFEST, chart_numbers
 from zwidth.chart.curve import trace, walls
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, NO_WALL
-from zwidth.chart.hurwitz import edges_stable_set
+from zwidth.chart.loop_polynomials import edges_stable_set
 from zwidth.chart.wall_samples import HIDDEN
 from zwidth.errors import UnmovedError
 from zwidth.loop import Loop, table_of_loops

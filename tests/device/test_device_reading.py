@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from zwidth.device import bundled
 from zwidth.device.load import load
-from zwidth.device.read import parse_document
-from zwidth.device.text_file import decode
+from zwidth.device.read import decode, parse_document
 from zwidth.errors import DeviceError, FileError
 
 GOOD = b'name = "a mass"\n[plant]\nmass_kg = 0.1\n[loop]\nsampling_period_s = 0.001\n'

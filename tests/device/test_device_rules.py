@@ -11,9 +11,8 @@ from tests.device.device_cases import ARM_FILE, PLANT_FILE, with_changes
 from zwidth.device.address import assign_all
 from zwidth.device.faults import KeyPath, dotted
 from zwidth.device.load import check
-from zwidth.device.rules.designs import certainly_valid
 from zwidth.device.rules.rule import PERIOD, NumberRule, Numbers, places
-from zwidth.device.rules.table import RULES
+from zwidth.device.rules.table import RULES, certainly_valid
 from zwidth.errors import DeviceError
 
 KALMAN = {"method": "kalman", "acceleration_noise_m_per_s2": 50.0, "position_noise_m": 1e-5}

@@ -9,9 +9,8 @@ import pytest
 
 from zwidth import __version__
 from zwidth.device import address, from_document
-from zwidth.device.load import load, schema
-from zwidth.device.operator_choice import operator_table
-from zwidth.device.text_file import STORE_VERSION
+from zwidth.device.load import load, operator_table, schema
+from zwidth.device.read import STORE_VERSION
 from zwidth.errors import DeviceError, StoreError
 from zwidth.study import CellValues, Journal, Store, StudyFile, fingerprint, read_study
 

@@ -29,8 +29,8 @@ from .chart_batch import ALL_NUMBERS as ALL_NUMBERS
 from .edge_by_eigenvalues import closed_rings as closed_rings
 from .edge_crossings import EdgeChords as EdgeChords
 from .edge_crossings import exact_edge as exact_edge
-from .hurwitz import work_array as work_array
 from .loop_edge import TracedEdge as TracedEdge
+from .loop_polynomials import work_array as work_array
 from .measured.loop import MeasuredLoop as MeasuredLoop
 from .nyquist import terms_along as terms_along
 from .point_chart import numbers_of_points as numbers_of_points

@@ -21,7 +21,7 @@ from zwidth.chart.arcs import DAMPING, END_MARGIN, SLOPE, STIFFNESS, Arc, Arcs, 
 from zwidth.chart.curve import NO_LINE, OF_B, OF_K, zero_between
 from zwidth.chart.wall_samples import LANES_SIZE, walls_of_samples
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import CircleFactors, wall_on_circle
+from zwidth.loop.loop_table import CircleFactors, wall_on_circle
 
 POINTS: Final = 10  # of a panel's rule
 PANEL: Final = 3  # intervals between samples that are one panel at first

@@ -16,8 +16,7 @@ from zwidth.chart.edge_samples import degree_of, fill_loop
 from zwidth.chart.peak_search import search_peak
 from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.circle_factors import COMPUTER
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import COMPUTER, LoopTable
 from zwidth.resources import in_chunks
 
 _OWN: Final = local()  # each thread's working memory for single loops

@@ -32,8 +32,7 @@ from numba.core.errors import NumbaPerformanceWarning
 from zwidth.chart.chart_batch import ChartNumbers, empty_numbers, fill_numbers
 from zwidth.chart.edge_memory import MOST_SAMPLES, EdgeMemory, edge_memory
 from zwidth.chart.wall_samples import MOST_DEGREE
-from zwidth.loop.circle_factors import COMPUTER
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import COMPUTER, LoopTable
 from zwidth.tuple_references import TakesAddresses
 
 BLOCK: Final = 64  # threads of a block

@@ -35,10 +35,10 @@ from zwidth.chart.edge_samples import (
     fill_curve,
     flag_all,
 )
-from zwidth.chart.hurwitz import all_roots_inside
+from zwidth.chart.loop_polynomials import all_roots_inside
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
+from zwidth.loop.loop_table import DEGREE, wall_on_circle, wall_with_slopes
 
 # A stiffness below this share of the edge's largest |K| is rounding of 0; where K = 0+ is tested; a corner this
 # near to K = 0 lies on it; and how long a stable interval of K = 0+ is at least, as a share of the longest.

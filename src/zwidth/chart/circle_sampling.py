@@ -22,7 +22,7 @@ from zwidth.chart.curve import NO_LINE, OF_B, OF_K, zero_between
 from zwidth.chart.loop_polynomials import SPARE, ZEROS, LoopPolynomials
 from zwidth.chart.roots import divide, find_roots, real_root, spread_roots
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import (
+from zwidth.loop.loop_table import (
     FORCE,
     SECTIONS,
     VELOCITY,

@@ -14,12 +14,12 @@ import numpy as np
 from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_memory import NONE, OPEN, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.edge_samples import edge_flag
-from zwidth.chart.hurwitz import QUOTIENT, combine, deflate
+from zwidth.chart.loop_polynomials import QUOTIENT, combine, deflate
 from zwidth.chart.real_root_lines import line_of, wall_on_line
 from zwidth.chart.roots import divide, find_roots, spread_roots
 from zwidth.chart.wall_samples import EDGE
 from zwidth.compiled import compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
+from zwidth.loop.loop_table import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
 
 NEAR: Final = 0.1  # longest step of Newton's method, as a share of t
 # Where the flags on both sides of a corner are looked at, as a share of t.

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Floats
-from zwidth.chart.hurwitz import work_array
+from zwidth.chart.loop_polynomials import work_array
 from zwidth.chart.wall_samples import LANES_SIZE, flag_walls, walls_of_samples
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import CircleFactors, wall_on_circle, wall_with_slopes
+from zwidth.loop.loop_table import CircleFactors, wall_on_circle, wall_with_slopes
 
 # What `zero_between` looks for: a zero of K, of B, of dK/dtheta, of dB/dtheta, or of a + s K + v B.
 OF_K, OF_B, OF_SLOPE, OF_SLOPE_B, OF_LINE = range(5)

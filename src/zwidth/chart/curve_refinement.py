@@ -24,7 +24,7 @@ from zwidth.chart.edge_memory import NONE, SAMPLES, EdgeMemory
 from zwidth.chart.real_root_lines import line_of, sum_of_coefficients
 from zwidth.chart.wall_samples import UNKNOWN
 from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
-from zwidth.loop.circle_factors import DEGREE, wall_with_slopes
+from zwidth.loop.loop_table import DEGREE, wall_with_slopes
 
 NARROWEST: Final = 1e-7  # narrowest interval that is halved, in shares of t
 # How far the slopes must stay from the other half plane, in shares of the largest: what the cubic may be wrong by.

@@ -20,8 +20,7 @@ from zwidth.chart.real_root_lines import curve_end
 from zwidth.chart.roots import polynomial_radius, spread_roots
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import DEGREE
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import DEGREE, LoopTable
 
 # How much faster than the best found, in shares of 1 - radius, the next wall is looked for.
 FASTER: Final = 3e-5

@@ -14,11 +14,11 @@ import numpy as np
 from zwidth.chart.arcs import CHORD, MINUS, PAIR, PLUS
 from zwidth.chart.curve import OF_LINE, zero_between
 from zwidth.chart.edge_memory import ARCS, CROSSINGS, MOST_ARCS, MOST_PIECES, PIECES, RINGS, SAMPLES, EdgeMemory
-from zwidth.chart.hurwitz import edges_on_line
+from zwidth.chart.loop_polynomials import edges_on_line
 from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of, wall_on_line
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import DEGREE, half_angle, velocity_on_circle
+from zwidth.loop.loop_table import DEGREE, half_angle, velocity_on_circle
 
 # Corners closer than this share of the set's size are one.
 SAME_CORNER: Final = 1e-7

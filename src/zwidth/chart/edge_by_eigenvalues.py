@@ -36,8 +36,7 @@ from zwidth.chart.tracer import CIRCLE_TOLERANCE, ROOTS, Tracer
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.compiled import compiled
 from zwidth.errors import ChartError
-from zwidth.loop.circle_factors import COMPUTER, CircleFactors, wall_with_slopes
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import COMPUTER, CircleFactors, LoopTable, wall_with_slopes
 
 # Steps along the curve, in shares of the distance to its nearest singularity, tried one after the other.
 SHARES: Final = (0.2, 0.1, 0.05, 0.02)

@@ -18,11 +18,9 @@ import numpy as np
 from zwidth.arrays import Bytes, Floats, Ints
 from zwidth.chart.area import AreaMemory, area_memory
 from zwidth.chart.circle_sampling import Features, feature_memory
-from zwidth.chart.hurwitz import work_array
-from zwidth.chart.loop_polynomials import LoopPolynomials, polynomial_memory
+from zwidth.chart.loop_polynomials import LoopPolynomials, polynomial_memory, work_array
 from zwidth.chart.wall_samples import LANES_SIZE
-from zwidth.loop.circle_factors import CircleFactors, factor_memory
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import CircleFactors, LoopTable, factor_memory
 
 MOST_ARCS: Final = 256
 MOST_PIECES: Final = 256  # of the two lines of real roots

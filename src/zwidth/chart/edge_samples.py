@@ -14,22 +14,26 @@ from zwidth.chart.circle_sampling import (
 )
 from zwidth.chart.curve_refinement import refine_samples
 from zwidth.chart.edge_memory import CROSSINGS, NONE, SAMPLES, SETTLED, EdgeMemory
-from zwidth.chart.hurwitz import edges_stable_set
-from zwidth.chart.loop_polynomials import fill_computer_polynomials, fill_loop_polynomials, fill_polynomials
+from zwidth.chart.loop_polynomials import (
+    edges_stable_set,
+    fill_computer_polynomials,
+    fill_loop_polynomials,
+    fill_polynomials,
+)
 from zwidth.chart.wall_samples import UNKNOWN, flag_walls, walls_of_samples
 from zwidth.compiled import compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import (
+from zwidth.loop.loop_table import (
     COMPUTER,
     DEGREE,
     FORCE,
     VELOCITY,
     WHOLE_DELAY,
     WINDOW,
+    LoopTable,
     fill_computer,
     fill_plant,
     wall_on_circle,
 )
-from zwidth.loop.loop_table import LoopTable
 
 # Steps along the curve for a whole edge, in shares of the distance to its nearest singularity, and the longest.
 SHARE: Final = 0.2

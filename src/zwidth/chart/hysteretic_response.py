@@ -59,10 +59,9 @@ from zwidth.chart.measured.response_interpolation import interpolate_response
 from zwidth.chart.nyquist import terms_along
 from zwidth.chart.tracer import Tracer
 from zwidth.errors import HysteresisError, ResponseError
-from zwidth.loop.circle_factors import circle_factors
 from zwidth.loop.factor_response import factor_response
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import force_filter, table_of_loops
+from zwidth.loop.loop_table import circle_factors, force_filter, table_of_loops
 from zwidth.model.argument_checks import check_kind
 from zwidth.model.modes import RIGID, undamped_modes
 from zwidth.model.plant import Plant

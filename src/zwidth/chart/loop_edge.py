@@ -45,7 +45,7 @@ from zwidth.chart.tracer import CIRCLE_TOLERANCE, Tracer
 from zwidth.chart.verdict import distances_from_circle
 from zwidth.chart.wall_samples import EDGE, HIDDEN, NO_EDGE
 from zwidth.errors import ChartError
-from zwidth.loop.circle_factors import DEGREE
+from zwidth.loop.loop_table import DEGREE
 from zwidth.loop.realisation import StateSpace
 
 

@@ -18,8 +18,14 @@ from zwidth.chart.chart_numbers import fill_nodes
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, OF_SLOPE_B, zero_between
 from zwidth.chart.edge_memory import ARCS, EdgeMemory
 from zwidth.compiled import compiled_apart, compiled_inline, compiled_lean
-from zwidth.loop.circle_factors import CircleFactors, fill_computer, fill_plant, wall_on_circle, wall_with_slopes
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import (
+    CircleFactors,
+    LoopTable,
+    fill_computer,
+    fill_plant,
+    wall_on_circle,
+    wall_with_slopes,
+)
 
 # Nodes, and parts of edges within a strip, for which there is memory at each delay.
 NODES_EACH, PARTS_EACH = 2048, 64

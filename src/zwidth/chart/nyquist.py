@@ -15,7 +15,7 @@ import numpy as np
 from zwidth.arrays import Complexes, Floats, Ints
 from zwidth.chart.roots import divide
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.circle_factors import (
+from zwidth.loop.loop_table import (
     DEGREE,
     FORCE,
     SECTIONS,

@@ -23,11 +23,11 @@ from zwidth.chart.curve import NO_LINE, OF_B, OF_LINE, OF_SLOPE, Line, undamped_
 from zwidth.chart.curve_refinement import STRAY
 from zwidth.chart.edge_memory import DOUBTFUL, FOUND, SAMPLES, SETTLED, EdgeMemory
 from zwidth.chart.edge_samples import LONGEST, SHARE, edge_flag, fill_curve, flag_quadrant
-from zwidth.chart.hurwitz import edges_on_line, quotient_flag
+from zwidth.chart.loop_polynomials import edges_on_line, quotient_flag
 from zwidth.chart.real_root_lines import curve_end, line_crossing, line_of
 from zwidth.chart.wall_samples import EDGE, HIDDEN
 from zwidth.compiled import compiled_inline, compiled_lean
-from zwidth.loop.circle_factors import DEGREE, wall_on_circle, wall_with_slopes
+from zwidth.loop.loop_table import DEGREE, wall_on_circle, wall_with_slopes
 
 # Steps along the curve, in shares of the distance to its nearest singularity, and the longest
 # (`circle_sampling.fill_samples`): wide ones for loops up to SMALL_DEGREE, whose cells are few and large.

@@ -12,7 +12,7 @@ import numpy as np
 from zwidth.arrays import Floats
 from zwidth.chart.edge_memory import EdgeMemory
 from zwidth.compiled import compiled_lean
-from zwidth.loop.circle_factors import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
+from zwidth.loop.loop_table import DEGREE, CircleFactors, wall_on_circle, wall_with_slopes
 
 LAST_DIGITS: Final = 1e-14  # of an angle
 # Two lines are parallel, or an end of the curve at infinity, where a determinant is this small a share of its

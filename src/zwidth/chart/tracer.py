@@ -18,14 +18,27 @@ from zwidth.chart.area import arc_integral, area_memory, end_value
 from zwidth.chart.circle_sampling import MOST_SAMPLES, feature_memory, samples_of_loop
 from zwidth.chart.curve import NO_LINE, OF_SLOPE, trace, wall_at, walls, zero_between
 from zwidth.chart.edge_samples import LONGEST
-from zwidth.chart.hurwitz import all_roots_inside, edges_on_line, work_array
-from zwidth.chart.loop_polynomials import LoopPolynomials, polynomial_memory, polynomials_of_loop
+from zwidth.chart.loop_polynomials import (
+    LoopPolynomials,
+    all_roots_inside,
+    edges_on_line,
+    polynomial_memory,
+    polynomials_of_loop,
+    work_array,
+)
 from zwidth.chart.nyquist import phase_flags, terms_along
 from zwidth.chart.wall_samples import EDGE, HIDDEN, MOST_DEGREE, NO_EDGE
 from zwidth.compiled import compiled
-from zwidth.loop.circle_factors import DEGREE, WHOLE_DELAY, WINDOW, CircleFactors, circle_factors, wall_with_slopes
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import (
+    DEGREE,
+    WHOLE_DELAY,
+    WINDOW,
+    CircleFactors,
+    LoopTable,
+    circle_factors,
+    wall_with_slopes,
+)
 
 # A root this near the circle is on neither side of it.
 CIRCLE_TOLERANCE = 1e-9

@@ -47,9 +47,8 @@ from zwidth.chart.margin_edges import (
 from zwidth.chart.tracer import Tracer
 from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.compiled import compiled, compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import COMPUTER, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, table_of_loops
+from zwidth.loop.loop_table import COMPUTER, CircleFactors, LoopTable, factor_memory, table_of_loops
 from zwidth.resources import in_chunks
 
 DELAY_STEP: Final = 0.25  # samples from one delay to the next at most

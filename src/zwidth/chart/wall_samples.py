@@ -1,6 +1,6 @@
 """Walls of the curve at many samples of a circle, and which of them edge the stable set: arithmetic over lanes.
 
-A sample is t = tan(theta/2), s = i t in the bilinear variable (`loop.circle_factors`). A wall edges the stable set
+A sample is t = tan(theta/2), s = i t in the bilinear variable (`loop.loop_table`). A wall edges the stable set
 if p(s) = A + K S + B V divided by s^2 + t^2 is Hurwitz. With p_i t^i in place of p_i the divisor is s^2 + 1, and
 the division takes no multiplication.
 
@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Bytes, Floats
-from zwidth.chart.hurwitz import ROUNDING, edges_stable_set
+from zwidth.chart.loop_polynomials import ROUNDING, edges_stable_set
 from zwidth.compiled import compiled_apart, compiled_lean
-from zwidth.loop.circle_factors import FORCE, SECTIONS, SPLIT, VELOCITY, WHOLE_DELAY, WINDOW, CircleFactors
+from zwidth.loop.loop_table import FORCE, SECTIONS, SPLIT, VELOCITY, WHOLE_DELAY, WINDOW, CircleFactors
 
 EDGE, HIDDEN, NO_EDGE, UNKNOWN = 1, 0, -1, 2
 LANES: Final = 128  # samples that are computed together
@@ -55,7 +55,7 @@ def walls_of_samples(f: CircleFactors, t: Floats, count: int, K: Floats, B: Floa
 
 @compiled_lean
 def _walls_of_lanes(f: CircleFactors, n: int, w: Floats) -> None:
-    """K into row X and B into row Y for the samples in row T: the sums of `circle_factors.minus_inverse_plant`."""
+    """K into row X and B into row Y for the samples in row T: the sums of `loop_table.minus_inverse_plant`."""
     radius, split = f.radius[0], f.sizes[SPLIT]
     for k in range(n):
         t = w[T + k]
@@ -124,7 +124,7 @@ def _walls_of_lanes(f: CircleFactors, n: int, w: Floats) -> None:
 
 @compiled_lean
 def _times_factor(row: Floats, n: int, w: Floats) -> None:
-    """Rows W_X, W_Y over W times one factor, as in `circle_factors.factor_product`."""
+    """Rows W_X, W_Y over W times one factor, as in `loop_table.factor_product`."""
     n0, n1, n2, d0, d1, d2 = row[1], row[2], row[3], row[4], row[5], row[6]
     if row[0] == 1.0:
         # numerator times the conjugate denominator, over the square of the latter: rows stay free of divisions

@@ -18,22 +18,20 @@ from numpy.typing import ArrayLike
 from zwidth.arrays import Floats
 from zwidth.device.faults import KeyPath
 from zwidth.device.schema.loop import (
+    ButterworthFilter,
     EncoderSection,
     FeedforwardSection,
+    FirstOrderFilter,
+    FoawSection,
     ForceSensorSection,
+    KalmanSection,
     LocalSection,
     LoopSection,
+    VelocitySection,
 )
 from zwidth.device.schema.mechanism import DampingSection, DriveFrictionSection, DriveSection, FrictionSection
 from zwidth.device.schema.operator import OperatorSection
 from zwidth.device.schema.plant import PlantSection, ResponseSection
-from zwidth.device.schema.velocity import (
-    ButterworthFilter,
-    FirstOrderFilter,
-    FoawSection,
-    KalmanSection,
-    VelocitySection,
-)
 from zwidth.loop.controller import (
     NOT_KNOWN,
     Butterworth,

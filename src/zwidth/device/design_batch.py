@@ -2,7 +2,7 @@
 
 What takes arrays is listed (`ARRAYS`). Other keys, and a number that is 0 or infinite in some designs, may change
 what a device consists of: designs that differ there are built apart. All designs are checked at once
-(`rules.designs`); one that is not certain to be valid is built alone, and there gets its reason.
+(`rules.table`); one that is not certain to be valid is built alone, and there gets its reason.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from zwidth.device.faults import KeyPath
 from zwidth.device.legs import members
 from zwidth.device.load import build_device, check
 from zwidth.device.mechanism_check import masses_moved
-from zwidth.device.rules.designs import certainly_valid
+from zwidth.device.rules.table import certainly_valid
 from zwidth.device.schema.value_types import Section
 from zwidth.errors import DeviceError, PostureError
 from zwidth.loop.operating_point import OperatingPoint

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from zwidth import _verbs
 from zwidth.arrays import Floats
 from zwidth.device.faults import fail, quote, suggestion
-from zwidth.device.missing import missing_numbers
+from zwidth.device.plausibility import missing_numbers
 from zwidth.device.posture_arguments import joint_angles, positions, rotations, screws, unit_vectors
 from zwidth.errors import DeviceError
 from zwidth.loop.controller import Controller

@@ -13,8 +13,8 @@ import numpy as np
 
 from zwidth.arrays import Floats
 from zwidth.device.faults import Fault, fail, plural, quote
+from zwidth.device.read import LARGEST_TABLE, header_fault, non_blank_rows, read_text
 from zwidth.device.schema.plant import ResponseSection
-from zwidth.device.text_file import LARGEST_TABLE, header_fault, non_blank_rows, read_text
 from zwidth.errors import DeviceError, FileError, ResponseError
 from zwidth.model.raw_sweep import sweep_response
 from zwidth.model.response import MeasuredHandle, MeasuredPath, Response, mean_path

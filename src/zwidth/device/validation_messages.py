@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from zwidth.device.address import deep_copy
 from zwidth.device.faults import KeyPath, nearest, quote, suggestion
 from zwidth.device.schema import device_file as schema
-from zwidth.device.schema.velocity import DEFAULT_METHOD
+from zwidth.device.schema.loop import DEFAULT_METHOD
 
 # Units that numbers are often given in -> the unit of device files, and the factor.
 OTHER_UNITS: Final = {

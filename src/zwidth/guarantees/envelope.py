@@ -23,7 +23,7 @@ from zwidth.chart.arcs import Arc
 from zwidth.chart.curve import wall_at
 from zwidth.compiled import compiled
 from zwidth.guarantees.spring_family import SpringFamily, polygons_of
-from zwidth.loop.circle_factors import CircleFactors
+from zwidth.loop.loop_table import CircleFactors
 
 # Largest distance of a touching point from the cubic through its neighbours, and of chords from the cubic, in
 # shares of the set's size.

@@ -2,6 +2,20 @@
 
 What a controller's signals pass, force path and velocity estimate, are factors in d = z - 1; so are low passes.
 All numbers may have leading axes of designs (`model.design_axes`); the factors then have them, too.
+
+A loop's factors on a circle |z| = rho, in the half-angle form in which its curve of walls is evaluated.
+
+    z = rho (1 + s)/(1 - s),      d = z - 1 = [ (rho - 1) + (rho + 1) s ] / (1 - s)
+
+maps the left half plane of s to the inside of the circle (the thesis's Moebius map, eq. 4.38), and its imaginary
+axis to the circle: s = i t with t = tan(theta/2) is z = rho exp(i theta). A factor c2 d^2 + c1 d + c0 times
+(1 - s)^2 is a polynomial a0 + a1 s + a2 s^2 with real coefficients, products without cancellation where poles
+crowd z = 1. On the circle and times cos^2(theta/2), all that is left of it is
+
+    (a0 cos^2 - a2 sin^2) + i a1 sin cos            of the half angle theta/2
+
+Nothing but t enters: cos^2 = 1/(1 + t^2), sin^2 = t^2 cos^2, sin cos = t cos^2. No angle is computed, and t keeps
+its digits at both ends of the circle.
 """
 
 from __future__ import annotations
@@ -16,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
+from zwidth.compiled import compiled, compiled_apart, compiled_inline, compiled_lean
 from zwidth.loop.controller import Butterworth, Controller, FirstOrder, whole_samples
 from zwidth.loop.estimator import Estimator
 from zwidth.loop.hold import lag_share
@@ -23,7 +38,6 @@ from zwidth.model.design_axes import design_shape, stack_numbers
 
 if TYPE_CHECKING:
     from zwidth.loop.loop import Loop
-
 
 Rows = list[list[Any]]  # numbers, or arrays over designs
 
@@ -275,3 +289,240 @@ def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
         out[(slice(at, at + len(part)), *(slice(n) for n in part.shape[1:]))] = part
         at += len(part)
     return out
+
+
+# Places in `CircleFactors.sizes`.
+SECTIONS, FORCE, VELOCITY, WINDOW, WHOLE_DELAY, SPLIT, COMPUTER, DEGREE = range(8)
+
+
+class CircleFactors(NamedTuple):
+    """The factors of one loop on |z| = rho in powers of s: memory of the caller for loops up to a size.
+
+    sizes     (8,)       how many rows of `plant`, `force`, `velocity` and `window` are in use; whole delay, split;
+                         number of the computer whose factors these are, -1 for none; degree N of the loop
+    radius    (1,)       rho
+    plant     (m, 10)    each section's denominator (3), its numerators for the new and the old force (3 each), and
+                         1 where it is chained to the section before it
+    force     (k, 7)     the order (1 or 2) of each factor of the force path, its numerator (3), its denominator
+    (3) velocity  (v, 7)     the same of the velocity estimate
+    window    (n,)       its weights of past samples
+    """
+
+    sizes: Ints
+    radius: Floats
+    plant: Floats
+    force: Floats
+    velocity: Floats
+    window: Floats
+
+
+def factor_memory(loops: LoopTable) -> CircleFactors:
+    """Memory for the factors of any one of these loops."""
+    m, k, v, n = loops.rows.shape[1], loops.force.shape[1], loops.velocity.shape[1], loops.window.shape[1]
+    sizes = np.zeros(8, dtype=np.int64)
+    sizes[COMPUTER] = -1
+    return CircleFactors(sizes, np.ones(1), np.zeros((m, 10)), np.zeros((k, 7)), np.zeros((v, 7)), np.zeros(n))
+
+
+def circle_factors(loops: LoopTable, radius: float = 1.0) -> CircleFactors:
+    """The factors of the first of these loops."""
+    out = factor_memory(loops)
+    fill_first(loops, radius, out)
+    return out
+
+
+@compiled
+def fill_first(loops: LoopTable, radius: float, out: CircleFactors) -> None:
+    """The factors of loop 0."""
+    fill_computer(loops, 0, radius, out)
+    fill_plant(loops, 0, out)
+
+
+@compiled_lean
+def bilinear(c2: float, c1: float, c0: float, degree: int, radius: float, out: Floats) -> None:
+    """(1 - s)^degree (c2 d^2 + c1 d + c0) in ascending powers of s, degree 1 or 2."""
+    a0, a1 = radius - 1.0, radius + 1.0
+    if degree == 1:
+        out[0] = c1 * a0 + c0
+        out[1] = c1 * a1 - c0
+        out[2] = 0.0
+    else:
+        out[0] = (c2 * a0 + c1) * a0 + c0
+        out[1] = 2.0 * c2 * a0 * a1 + c1 * (a1 - a0) - 2.0 * c0
+        out[2] = (c2 * a1 - c1) * a1 + c0
+
+
+@compiled_lean
+def fill_plant(loops: LoopTable, i: int, out: CircleFactors) -> None:
+    """The sections of loop i on the circle, and its degree; the computer's factors stand already."""
+    radius, m = out.radius[0], loops.section_count[i]
+    for k in range(m):
+        bilinear(1.0, loops.rows[i, k, 0], loops.rows[i, k, 1], 2, radius, out.plant[k, 0:3])
+        bilinear(loops.rows[i, k, 2], loops.rows[i, k, 3], loops.rows[i, k, 4], 2, radius, out.plant[k, 3:6])
+        bilinear(loops.rows[i, k, 5], loops.rows[i, k, 6], loops.rows[i, k, 7], 2, radius, out.plant[k, 6:9])
+        out.plant[k, 9] = loops.rows[i, k, 8]
+    # sections have two poles each; the delay, its split and the window add theirs at z = 0
+    degree = 2 * m + out.sizes[WHOLE_DELAY] + out.sizes[SPLIT] + out.sizes[WINDOW] - 1
+    for k in range(out.sizes[FORCE]):
+        degree += int(out.force[k, 0])
+    for k in range(out.sizes[VELOCITY]):
+        degree += int(out.velocity[k, 0])
+    out.sizes[SECTIONS], out.sizes[DEGREE] = m, degree
+
+
+@compiled_lean
+def fill_computer(loops: LoopTable, c: int, radius: float, out: CircleFactors) -> None:
+    """The factors of computer c on the circle |z| = radius."""
+    out.radius[0] = radius
+    out.sizes[WHOLE_DELAY], out.sizes[SPLIT], out.sizes[COMPUTER] = loops.whole_delay[c], loops.split[c], c
+    out.sizes[FORCE], out.sizes[VELOCITY] = loops.force_count[c], loops.velocity_count[c]
+    out.sizes[WINDOW] = loops.window_count[c]
+    for k in range(loops.force_count[c]):
+        _fill_factor(loops.force[c, k], radius, out.force[k])
+    for k in range(loops.velocity_count[c]):
+        _fill_factor(loops.velocity[c, k], radius, out.velocity[k])
+    for k in range(loops.window_count[c]):
+        out.window[k] = loops.window[c, k]
+
+
+@compiled_lean
+def _fill_factor(factor: Floats, radius: float, out: Floats) -> None:
+    """One factor of a computer, at the order of its denominator."""
+    degree = 2 if factor[3] != 0.0 else 1
+    out[0] = degree
+    bilinear(factor[0], factor[1], factor[2], degree, radius, out[1:4])
+    bilinear(factor[3], factor[4], factor[5], degree, radius, out[4:7])
+
+
+@compiled_inline
+def half_angle(t: float) -> tuple[float, float, float]:
+    """cos^2, sin^2 and sin cos of theta/2, from t = tan(theta/2)."""
+    cc = 1.0 / (1.0 + t * t)
+    sc = t * cc
+    return cc, t * sc, sc
+
+
+@compiled_inline
+def scaled_factors(value: complex, factor: float) -> complex:
+    """A complex number times a real one; the plain product would make that complex, too."""
+    return complex(value.real * factor, value.imag * factor)
+
+
+@compiled_inline
+def turned(value: complex) -> complex:
+    """i times a complex number."""
+    return complex(-value.imag, value.real)
+
+
+@compiled_inline
+def quadratic(a0: float, a1: float, a2: float, cc: float, ss: float, sc: float) -> tuple[complex, complex]:
+    """(a0 + a1 s + a2 s^2) cos^2 on the circle, and its slope by theta."""
+    return complex(a0 * cc - a2 * ss, a1 * sc), complex(-(a0 + a2) * sc, 0.5 * a1 * (cc - ss))
+
+
+@compiled_inline
+def factor_product(
+    rows: Floats, count: int, cc: float, ss: float, sc: float, value: complex, slope: complex
+) -> tuple[complex, complex, float, float]:
+    """A value and its slope by theta times factors n/d, as n conj(d) over |d|^2: numerator and slope, denominator
+    and slope."""
+    bottom, dbottom = 1.0, 0.0
+    half = 0.5 * (cc - ss)
+    for k in range(count):
+        if rows[k, 0] == 1.0:
+            # (n0 cos + i n1 sin)/(d0 cos + i d1 sin)
+            along, across = rows[k, 2] * rows[k, 5], rows[k, 2] * rows[k, 4] - rows[k, 1] * rows[k, 5]
+            n0d0, d0d0, d1d1 = rows[k, 1] * rows[k, 4], rows[k, 4] * rows[k, 4], rows[k, 5] * rows[k, 5]
+            top, dtop = complex(n0d0 * cc + along * ss, across * sc), complex((along - n0d0) * sc, across * half)
+            size, dsize = d0d0 * cc + d1d1 * ss, (d1d1 - d0d0) * sc
+        else:
+            num, dnum = quadratic(rows[k, 1], rows[k, 2], rows[k, 3], cc, ss, sc)
+            den, dden = quadratic(rows[k, 4], rows[k, 5], rows[k, 6], cc, ss, sc)
+            top = num * den.conjugate()
+            dtop = dnum * den.conjugate() + num * dden.conjugate()
+            size = den.real * den.real + den.imag * den.imag
+            dsize = 2.0 * (den.real * dden.real + den.imag * dden.imag)
+        slope = slope * top + value * dtop
+        value = value * top
+        dbottom = dbottom * size + bottom * dsize
+        bottom = bottom * size
+    return value, slope, bottom, dbottom
+
+
+@compiled_inline
+def minus_inverse_plant(
+    f: CircleFactors, cc: float, ss: float, sc: float
+) -> tuple[complex, complex, complex, complex]:
+    """-1/P on the circle, delay and force path included: numerator and slope by theta, denominator and slope."""
+    top, bottom, dtop, dbottom = 0.0 + 0.0j, 1.0 + 0.0j, 0.0 + 0.0j, 0.0 + 0.0j
+    # denominators of the sections that a chain is not divided by, times (1 - s)^2 for each that it is
+    beside, dbeside = 1.0 + 0.0j, 0.0 + 0.0j
+    u = complex(cc - ss, 2.0 * sc)
+    plant, split, delay = f.plant, f.sizes[SPLIT], f.sizes[WHOLE_DELAY]
+    for k in range(f.sizes[SECTIONS]):
+        den, dden = quadratic(plant[k, 0], plant[k, 1], plant[k, 2], cc, ss, sc)
+        num, dnum = quadratic(plant[k, 3], plant[k, 4], plant[k, 5], cc, ss, sc)
+        if split:
+            old, dold = quadratic(plant[k, 6], plant[k, 7], plant[k, 8], cc, ss, sc)
+            back = scaled_factors(u.conjugate(), 1.0 / f.radius[0])
+            num, dnum = num + old * back, dnum + (dold - turned(old)) * back
+        if plant[k, 9] != 0.0:
+            dbeside = (dbeside - turned(beside)) * u.conjugate()
+            beside = beside * u.conjugate()
+        else:
+            beside, dbeside = bottom, dbottom
+        dtop = dtop * den + top * dden + dnum * beside + num * dbeside
+        top = top * den + num * beside
+        dbottom = dbottom * den + bottom * dden
+        bottom = bottom * den
+    bottom, dbottom = -bottom, -dbottom
+    top, dtop, size, dsize = factor_product(f.force, f.sizes[FORCE], cc, ss, sc, top, dtop)
+    for _ in range(delay):
+        dbottom = scaled_factors((dbottom + turned(bottom)) * u, f.radius[0])
+        bottom = scaled_factors(bottom * u, f.radius[0])
+    return scaled_factors(bottom, size), scaled_factors(dbottom, size) + scaled_factors(bottom, dsize), top, dtop
+
+
+@compiled_inline
+def velocity_on_circle(f: CircleFactors, cc: float, ss: float, sc: float) -> tuple[complex, complex, float, float]:
+    """w on the circle: numerator and slope by theta, denominator and slope, which are real."""
+    window = f.window
+    n = f.sizes[WINDOW]
+    value, slope = complex(window[n - 1], 0.0), 0.0 + 0.0j
+    if n > 1:
+        # Horner's scheme in 1/z, oldest sample first
+        back = scaled_factors(complex(cc - ss, -2.0 * sc), 1.0 / f.radius[0])
+        for k in range(n - 2, -1, -1):
+            slope = slope * back + value
+            value = value * back + complex(window[k], 0.0)
+        slope = -turned(slope * back)
+    return factor_product(f.velocity, f.sizes[VELOCITY], cc, ss, sc, value, slope)
+
+
+@compiled_apart
+def wall_with_slopes(f: CircleFactors, t: float) -> tuple[float, float, float, float]:
+    """K and B of the wall with a root at rho exp(i theta), t = tan(theta/2), and dK/dtheta, dB/dtheta."""
+    cc, ss, sc = half_angle(t)
+    X, dX, N, dN = minus_inverse_plant(f, cc, ss, sc)
+    Y, dY, Q, dQ = velocity_on_circle(f, cc, ss, sc)
+    inverse = scaled_factors(N.conjugate(), 1.0 / (N.real * N.real + N.imag * N.imag))
+    h = X * inverse
+    dh = (dX - h * dN) * inverse
+    w = scaled_factors(Y, 1.0 / Q)
+    dw = scaled_factors(dY - scaled_factors(w, dQ), 1.0 / Q)
+    # h = K + B w, h = -1/P: the imaginary part alone gives B
+    across = 1.0 / w.imag
+    B = h.imag * across
+    dB = (dh.imag - B * dw.imag) * across
+    return h.real - B * w.real, B, dh.real - dB * w.real - B * dw.real, dB
+
+
+@compiled_apart
+def wall_on_circle(f: CircleFactors, t: float) -> tuple[float, float]:
+    """K and B of `wall_with_slopes`, with a single division."""
+    cc, ss, sc = half_angle(t)
+    X, _, N, _ = minus_inverse_plant(f, cc, ss, sc)
+    Y, _, Q, _ = velocity_on_circle(f, cc, ss, sc)
+    h = X * N.conjugate()
+    over = 1.0 / ((N.real * N.real + N.imag * N.imag) * Y.imag)
+    return (h.real * Y.imag - h.imag * Y.real) * over, h.imag * Q * over

@@ -28,19 +28,20 @@ from zwidth.chart.table_radii import radii_at_points, slowest_roots
 from zwidth.chart.verdict import NAMES, NEAR, STABLE, UNSTABLE, eigenvalues, judge
 from zwidth.compiled import compiled
 from zwidth.errors import FeedbackError, MeasureError, NoValueError
-from zwidth.loop.circle_factors import (
+from zwidth.loop.controller import Controller
+from zwidth.loop.loop import Loop
+from zwidth.loop.loop_table import (
     COMPUTER,
     CircleFactors,
+    LoopTable,
     factor_memory,
     fill_computer,
     fill_plant,
+    force_filter,
     half_angle,
     minus_inverse_plant,
     velocity_on_circle,
 )
-from zwidth.loop.controller import Controller
-from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable, force_filter
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import OK, MeasureValues, WantedWall, WantedWalls
 from zwidth.measures.evaluation import complete_charts, complete_pointwise

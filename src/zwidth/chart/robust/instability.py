@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from zwidth.arrays import Flags, Floats, Ints
-from zwidth.chart.hurwitz import all_roots_inside, work_array
-from zwidth.chart.loop_polynomials import LoopPolynomials, fill_loop_polynomials, most_degree, polynomial_memory
+from zwidth.chart.loop_polynomials import (
+    LoopPolynomials,
+    all_roots_inside,
+    fill_loop_polynomials,
+    most_degree,
+    polynomial_memory,
+    work_array,
+)
 from zwidth.compiled import compiled, compiled_lean
-from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import DEGREE, CircleFactors, LoopTable, factor_memory
 from zwidth.resources import in_chunks
 
 

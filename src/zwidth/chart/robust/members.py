@@ -13,8 +13,8 @@ import shapely
 
 from zwidth.arrays import Floats
 from zwidth.chart.arcs import MINUS, PLUS, ROUNDING_AREA, signed_area
-from zwidth.chart.hurwitz import all_roots_inside, work_array
 from zwidth.chart.loop_edge import TracedEdge, trace_edge
+from zwidth.chart.loop_polynomials import all_roots_inside, work_array
 from zwidth.chart.tracer import ROOTS, Tracer
 from zwidth.errors import ChartError, UnmovedError
 from zwidth.loop.loop import Loop

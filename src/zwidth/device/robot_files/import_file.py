@@ -24,9 +24,8 @@ from pydantic import Field, ValidationError
 from zwidth.device.build import roll_pitch_yaw
 from zwidth.device.faults import Fault, comma_list, dotted, fail, suggestion
 from zwidth.device.load import from_document
-from zwidth.device.missing import unknown_numbers
-from zwidth.device.plausibility import implausible
-from zwidth.device.read import LARGEST_FILE, parse_document
+from zwidth.device.plausibility import implausible, unknown_numbers
+from zwidth.device.read import LARGEST_FILE, parse_document, read_text
 from zwidth.device.robot_files.compile_mjcf import compile_mjcf, mjcf_file, mujoco_or_fail
 from zwidth.device.robot_files.decide import Choices, Decided, decide, section_of
 from zwidth.device.robot_files.links import LinkTree, listed
@@ -35,7 +34,6 @@ from zwidth.device.robot_files.read_model import read_bodies, read_urdf
 from zwidth.device.robot_files.robot import BASE, WARNING, Finding, Motor, Robot, RobotClosure
 from zwidth.device.schema.mechanism import LoopClosure
 from zwidth.device.schema.value_types import Section
-from zwidth.device.text_file import read_text
 from zwidth.device.validation_messages import validation_messages
 from zwidth.errors import DeviceError, FileError
 from zwidth.model.argument_checks import check_choice

@@ -1,18 +1,46 @@
-"""All rules of a device file in the order in which they are read, and what they find wrong with a document."""
+"""All rules of a device file in the order in which they are read, and what they find wrong with a document.
+
+The rules of a device file over arrays of numbers: which of many designs are certain to be valid.
+
+Only the numbers that differ are looked at, of a device that is valid with the numbers of one of its designs. A
+design that is not certain to be valid is checked alone, which says what is wrong with it, if anything is. Each is
+judged by its own numbers.
+
+Rules about numbers, vectors and matrices are those of a file. What a file says of a single number is asked of the
+file's own types, at the ends of the range that they allow. Rules about keys hold for all designs, which have the
+same keys; a number that may stand for none, 0 or infinity, is so in all of them or in none (`design_batch`).
+"""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable, Iterator
+from typing import Any, Final
 
-from zwidth.device.address import exists, in_schema, table
-from zwidth.device.faults import KeyMessages
+import numpy as np
+from pydantic import AfterValidator, ValidationError
+
+from zwidth.arrays import Flags, Floats
+from zwidth.device.address import deep_copy, exists, in_schema, table
+from zwidth.device.faults import KeyMessages, KeyPath
 from zwidth.device.legs import spread_tables, written_path
-from zwidth.device.missing import partly_missing
+from zwidth.device.plausibility import partly_missing
 from zwidth.device.rules.loop import COMPUTER, RESPONSE, SAMPLING
 from zwidth.device.rules.mechanism import ARM, LEGS_AS_WRITTEN, MECHANISM
 from zwidth.device.rules.plant import HAND, MOTION, PLANT, WINDINGS
-from zwidth.device.rules.rule import Document, Rule, rule_faults
-from zwidth.device.schema.device_file import KINDS, flat_sources
+from zwidth.device.rules.rule import Document, NumberRule, Numbers, Rule, places, rule_faults
+from zwidth.device.schema.device_file import KINDS, DeviceFile, flat_sources
+from zwidth.device.schema.magnitudes import ValueRule
+from zwidth.device.schema.value_types import (
+    LARGEST,
+    Axis,
+    DampingMatrix,
+    Inertia,
+    MassMatrix,
+    StiffnessMatrix,
+    Vector,
+)
+from zwidth.device.validation_messages import without_unsupported
+from zwidth.model.design_axes import join_designs
 
 
 def _one_kind(document: Document) -> KeyMessages:
@@ -52,3 +80,121 @@ def device_faults(document: Document) -> KeyMessages:
     for path, message in rule_faults(RULES, flat):
         yield written_path(path, paths), message
     yield from rule_faults(AS_WRITTEN, document)
+
+
+Values = dict[KeyPath, Floats]
+
+# Place and key of lists whose numbers are judged together -> their type.
+TOGETHER: Final[dict[tuple[str, str], Any]] = {
+    ("plant", "mass_kg"): MassMatrix,
+    ("plant", "damping_Ns_per_m"): DampingMatrix,
+    ("plant", "stiffness_N_per_m"): StiffnessMatrix,
+    **{("plant", key): Vector for key in ("actuator", "sensor", "handle")},
+    ("mechanism.links.*", "axis"): Axis,
+    ("mechanism.links.*", "inertia_kg_m2"): Inertia,
+}
+VECTORS: Final = (Axis, Vector)
+
+
+def certainly_valid(document: Document, values: Values, count: int) -> Flags:
+    """Marks (count,) of the designs that are certain to be valid.
+
+    document  of one of the designs, a valid one
+    values    resolved path -> numbers (count,) of all designs, one path for each element of a list
+    """
+    valid, designs = np.ones(count, dtype=bool), Numbers(document, (), values)
+    together = {
+        (*path, key): kind for (place, key), kind in TOGETHER.items() for path, _ in places(document, place)
+    }
+    for steps, numbers in values.items():
+        valid &= np.isfinite(numbers) | np.isposinf(numbers)
+        if not any(steps[: len(whole)] == whole for whole in together):
+            valid &= _allowed_alone(document, steps, numbers)
+    for broken in (*_broken_rules(designs), *_broken_together(designs, together)):
+        valid &= ~np.broadcast_to(np.asarray(broken, dtype=bool), valid.shape)
+    return valid
+
+
+def _broken_rules(designs: Numbers) -> Iterator[Any]:
+    """Whether each design breaks each of the rules about numbers."""
+    for rule in RULES:
+        if isinstance(rule, NumberRule):
+            where = places(designs.document, rule.place)
+            yield from (broken for _, _, broken in rule.judged(designs, where))
+
+
+def _broken_together(designs: Numbers, together: dict[KeyPath, Any]) -> Iterator[Any]:
+    """Whether the vectors and matrices of each design break the rules of their types."""
+    for path, kind in together.items():
+        if any(steps[: len(path)] == path for steps in designs.values):
+            rules = [rule.func for rule in kind.__metadata__ if isinstance(rule, AfterValidator)]
+            value = _array(designs, path, kind in VECTORS)
+            yield np.abs(value).max(axis=-1 if kind in VECTORS else (-2, -1)) > LARGEST
+            yield from (rule.judge(value)[0] for rule in rules if isinstance(rule, ValueRule))
+
+
+def _array(designs: Numbers, path: KeyPath, vector: bool) -> Floats:
+    """The vectors (..., n) or matrices (..., n, n) of designs at a path, where one number may stand for either and
+    three moments for a matrix."""
+    own = Numbers(designs.document, path, designs.values)
+    held = own.held("")
+    if not isinstance(held, list):
+        return np.asarray(own.number(""), dtype=float)[(..., None) if vector else (..., None, None)]
+    if isinstance(held[0], list):
+        rows = [Numbers(designs.document, (*path, i), designs.values).numbers("") for i in range(len(held))]
+        return join_designs(rows, 1)
+    numbers = np.asarray(own.numbers(""), dtype=float)
+    return numbers if vector else numbers[..., None] * np.eye(len(held))
+
+
+def _allowed_alone(document: Document, steps: KeyPath, numbers: Floats) -> Flags:
+    """Which numbers the file may have at a path. Those between two that it may have are allowed, too, if they are
+    of one sign and not infinite."""
+    inside = np.zeros(len(numbers), dtype=bool)
+    for part in (numbers < 0.0, numbers == 0.0, (numbers > 0.0) & np.isfinite(numbers), np.isposinf(numbers)):
+        ordered = np.unique(numbers[part])
+        if not len(ordered):
+            continue
+        known = dict[int, bool]()
+
+        def allowed(place: int, ordered: Floats = ordered, known: dict[int, bool] = known) -> bool:
+            if place not in known:
+                known[place] = _may_be(document, steps, float(ordered[place]))
+            return known[place]
+
+        low, high = _allowed_range(allowed, len(ordered))
+        if low <= high:
+            inside |= part & (numbers >= ordered[low]) & (numbers <= ordered[high])
+    return inside
+
+
+def _allowed_range(allowed: Callable[[int], bool], count: int) -> tuple[int, int]:
+    """First and last place that is allowed, of places that are so from one to another; (0, -1) where none is."""
+    tried = [0, count - 1, *(count * share // 16 for share in range(1, 16)), *range(count)]
+    good = next((place for place in tried if allowed(place)), None)
+    if good is None:
+        return 0, -1
+    ends = []
+    for end in (0, count - 1):
+        inside, outside = good, end
+        if allowed(end):
+            inside = outside
+        while abs(outside - inside) > 1:
+            middle = (inside + outside) // 2
+            inside, outside = (middle, outside) if allowed(middle) else (inside, middle)
+        ends.append(inside)
+    return ends[0], ends[1]
+
+
+def _may_be(document: Document, steps: KeyPath, number: float) -> bool:
+    """Whether the types of a file take a number at a path."""
+    changed = deep_copy(document)
+    place: Any = changed
+    for step in steps[:-1]:
+        place = place[step]
+    place[steps[-1]] = number
+    try:
+        DeviceFile.model_validate(without_unsupported(changed)[0])
+    except ValidationError:
+        return False
+    return True

@@ -23,8 +23,8 @@ from pydantic import (
 
 from zwidth.arrays import Floats
 from zwidth.device.faults import quote
+from zwidth.device.read import FILE_VERSION
 from zwidth.device.schema import magnitudes
-from zwidth.device.text_file import FILE_VERSION
 
 SYMMETRY_TOLERANCE: Final = 1e-9  # relative to the largest element
 LARGEST: Final = 1e30  # SI units; the squares of such numbers can still be multiplied

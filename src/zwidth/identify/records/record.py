@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from zwidth.arrays import Ints
 from zwidth.device.faults import Fault, comma_list, fail, plural
-from zwidth.device.text_file import decode, header_fault, read_head
+from zwidth.device.read import decode, header_fault, read_head
 from zwidth.errors import DeviceError, FileError
 
 Piece = dict[str, NDArray[Any]]  # columns of numbers, and those of words

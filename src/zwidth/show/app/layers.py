@@ -20,8 +20,7 @@ from zwidth.errors import ChartError, MissingNumbersError, OutOfReach
 from zwidth.guarantees.disks import response_disks
 from zwidth.guarantees.port import port
 from zwidth.guarantees.stable_alone import stable_alone
-from zwidth.loop.circle_factors import circle_factors
-from zwidth.loop.loop_table import table_of_loops
+from zwidth.loop.loop_table import circle_factors, table_of_loops
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.catalogue import MEASURES
 from zwidth.model.operator import ABOUT_AN_AXIS

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from zwidth.device.device import Device
 from zwidth.device.faults import fail
-from zwidth.device.load import from_document
-from zwidth.device.operator_choice import document_held_by
+from zwidth.device.load import document_held_by, from_document
 from zwidth.device.read import OPERATORS, bundled_names, parse_document, read
 from zwidth.model.operator import Operator
 from zwidth.show.app.request import State

@@ -17,8 +17,7 @@ import uvicorn
 
 from zwidth.device import address
 from zwidth.device.device import Device
-from zwidth.device.read import bundled_names, device_text, first_bundled, parse_document
-from zwidth.device.text_file import read_text
+from zwidth.device.read import bundled_names, device_text, first_bundled, parse_document, read_text
 from zwidth.show.app.connection import LARGEST_FILE
 from zwidth.show.app.server import LARGEST_MESSAGE, LOOPBACK, Settings, make_app
 from zwidth.show.cli.errors import BadInput

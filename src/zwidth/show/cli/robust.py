@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.device.read import LARGEST_FILE
-from zwidth.device.text_file import read_text
+from zwidth.device.read import LARGEST_FILE, read_text
 from zwidth.errors import FileError, NoAnswerError
 from zwidth.loop.motion_names import listed_names
 from zwidth.questions import ROBUST
@@ -209,7 +208,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
 
 def _member(study: RobustStudy, member: int) -> str:
     """A member by its operator, where members differ in nothing else; otherwise by its number."""
-    from zwidth.device.operator_choice import NOBODY
+    from zwidth.device.load import NOBODY
     from zwidth.study.robust.family import MEAN
 
     values = study.members[member]

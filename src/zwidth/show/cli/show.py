@@ -51,7 +51,7 @@ class ShowCommand(Command):
         return case.point.describe()
 
     def document(self, case: CommandLine, result: Description) -> dict[str, Any]:
-        from zwidth.device.missing import unknown_numbers
+        from zwidth.device.plausibility import unknown_numbers
 
         unknown = unknown_numbers(case.device.document)
         missing = [{"path": path, "needed_for": one.needed_for} for one in unknown for path in one.paths]
@@ -139,7 +139,7 @@ def _joint_table(mechanism: Mechanism, joints: Mapping[str, Any]) -> Any:
 
 def _missing(device: Device) -> Iterator[Any]:
     """What the file leaves out, and what for it is needed."""
-    from zwidth.device.missing import unknown_numbers
+    from zwidth.device.plausibility import unknown_numbers
 
     unknown = unknown_numbers(device.document)
     if unknown:

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-from zwidth.device.operator_choice import load_of_table, table_of_load
+from zwidth.device.load import load_of_table, table_of_load
 from zwidth.loop.wall_matrices import WallMatrices
 from zwidth.show.circumstances import AS_GIVEN, computer_text, load_text, omission_text, operator_text
 from zwidth.show.figures.style import FAMILY, context, wrapped

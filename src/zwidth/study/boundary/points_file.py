@@ -14,7 +14,7 @@ from itertools import islice
 from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING, Any, Final
 
-from zwidth.device.text_file import LARGEST_TABLE, SEPARATORS, header_fault, non_blank_rows, read_text
+from zwidth.device.read import LARGEST_TABLE, SEPARATORS, header_fault, non_blank_rows, read_text
 from zwidth.errors import FileError
 from zwidth.model.argument_checks import check_choice
 from zwidth.result import Documented, documented, entry

@@ -19,8 +19,7 @@ from zwidth.chart.point_chart import table_of_points
 from zwidth.device import address
 from zwidth.device.design_batch import DesignBatch, design_batch, takes_arrays
 from zwidth.device.faults import KeyPath
-from zwidth.device.load import check
-from zwidth.device.operator_choice import with_operator
+from zwidth.device.load import check, with_operator
 from zwidth.errors import DeviceError, PostureError
 from zwidth.loop.loop_table import LoopTable
 from zwidth.loop.operating_point import OperatingPoint

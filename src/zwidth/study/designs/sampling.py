@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from zwidth.arrays import Floats, Ints
 from zwidth.device.faults import comma_list
-from zwidth.device.text_file import LARGEST_TABLE, read_text
+from zwidth.device.read import LARGEST_TABLE, read_text
 from zwidth.errors import FileError
 from zwidth.questions import WANTED_BY_KEY
 

@@ -17,12 +17,20 @@ from zwidth.device import address
 from zwidth.device.address import is_number, table, tables
 from zwidth.device.device import Device
 from zwidth.device.faults import Fault, KeyPath, fail
-from zwidth.device.load import from_document, in_order
-from zwidth.device.operator_choice import NOBODY, operator_table, with_operator
+from zwidth.device.load import NOBODY, from_document, in_order, operator_table, with_operator
 from zwidth.device.plausibility import warn_of_implausible
-from zwidth.device.read import DEVICES, LARGEST_FILE, OPERATORS, BundledFiles, bundled_names, parse_document, read
+from zwidth.device.read import (
+    DEVICES,
+    LARGEST_FILE,
+    OPERATORS,
+    BundledFiles,
+    bundled_names,
+    check_not_newer,
+    parse_document,
+    read,
+    read_text,
+)
 from zwidth.device.schema.device_file import DEVICE_KEYS, STUDY_KEYS
-from zwidth.device.text_file import check_not_newer, read_text
 from zwidth.errors import DeviceError, FileError, as_argument
 from zwidth.measures.definition import Measure
 from zwidth.measures.user_measures import load_measures

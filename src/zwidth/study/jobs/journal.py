@@ -22,7 +22,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from zwidth.device.text_file import STORE_VERSION, newer_version_message, without_checksums
+from zwidth.device.read import STORE_VERSION, newer_version_message, without_checksums
 from zwidth.errors import StoreError
 
 

@@ -24,7 +24,7 @@ from types import TracebackType
 from typing import Final
 
 from zwidth._version import __version__
-from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.device.read import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.errors import StoreError
 from zwidth.progress import Progress
 from zwidth.study.jobs.executor import SMALL, Executor, open_executor, run_job

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from zwidth._version import __version__
 from zwidth.arrays import Flags, Floats
-from zwidth.device.text_file import STORE_VERSION, newer_version_message, unchecked_version_message
+from zwidth.device.read import STORE_VERSION, newer_version_message, unchecked_version_message
 from zwidth.errors import StoreError
 from zwidth.measures.definition import MISSING, OUT_OF_TIME, STATUS, Note
 from zwidth.resources import check_memory

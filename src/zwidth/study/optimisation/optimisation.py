@@ -17,8 +17,7 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.chart.chart import largest_stiffness
 from zwidth.device.faults import plural
-from zwidth.device.load import from_document
-from zwidth.device.operator_choice import with_operator
+from zwidth.device.load import from_document, with_operator
 from zwidth.errors import DeviceError
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.measures.definition import FAILED, OK, OUT_OF_TIME, STATUS, Note, WantedWall

@@ -20,8 +20,7 @@ import numpy as np
 from zwidth.arrays import Floats, Ints
 from zwidth.device import address
 from zwidth.device.address import UNSET, edited_text
-from zwidth.device.read import LARGEST_FILE
-from zwidth.device.text_file import read_text
+from zwidth.device.read import LARGEST_FILE, read_text
 from zwidth.errors import DeviceError, FileError
 from zwidth.measures.definition import Note
 from zwidth.progress import Progress

@@ -25,8 +25,7 @@ from zwidth.chart.robust.measured import MeasuredRobustChart, measured_robust_ch
 from zwidth.device import address, build
 from zwidth.device.device import Device
 from zwidth.device.faults import Fault, KeyPath, dotted, fail, one_line, quote
-from zwidth.device.load import check, device_of_point, from_document
-from zwidth.device.operator_choice import document_held_by
+from zwidth.device.load import check, device_of_point, document_held_by, from_document
 from zwidth.device.rules.plant import operator_faults
 from zwidth.device.schema import device_file as schema
 from zwidth.device.schema.operator import OperatorSection

@@ -29,9 +29,8 @@ from zwidth.chart.real_root_lines import end_of_curve
 from zwidth.chart.tracer import Tracer, tracer_of
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.errors import NoAnswerError
-from zwidth.loop.circle_factors import DEGREE, CircleFactors, factor_memory
 from zwidth.loop.loop import Loop
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import DEGREE, CircleFactors, LoopTable, factor_memory
 from zwidth.resources import in_chunks
 
 Kind = Literal["smooth maximum", "corner", "edge at B = 0", "end of the curve"]

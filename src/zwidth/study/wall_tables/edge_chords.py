@@ -26,8 +26,7 @@ from zwidth.chart.point_chart import chart_at, table_of_points
 from zwidth.chart.wall_samples import MOST_DEGREE
 from zwidth.compiled import compiled, compiled_lean
 from zwidth.errors import ChartError, UnmovedError
-from zwidth.loop.circle_factors import COMPUTER, wall_on_circle
-from zwidth.loop.loop_table import LoopTable
+from zwidth.loop.loop_table import COMPUTER, LoopTable, wall_on_circle
 from zwidth.loop.operating_point import OperatingPoint
 from zwidth.resources import in_chunks
 

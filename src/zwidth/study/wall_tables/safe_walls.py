@@ -16,7 +16,7 @@ import numpy as np
 
 from zwidth.argument import check_arguments
 from zwidth.device.device import Device
-from zwidth.device.operator_choice import NOBODY
+from zwidth.device.load import NOBODY
 from zwidth.errors import Advice, WorkspaceError
 from zwidth.measures.definition import OK, STATUS, Note
 from zwidth.model.argument_checks import check_kind, wrong_type
