@@ -1,4 +1,4 @@
-"""What it changes that links bend: a device beside the same with rigid links.
+"""The effect of bending links: a device beside the same with rigid links.
 
 Of a file with beams, links are made rigid that keep their mass, centre of mass and inertia. Of one without, links
 that can are taken as round tubes, to see whether bending is worth a thought: of aluminium 6061, as long as the
@@ -87,7 +87,7 @@ class BendingNumbers(Documented):
     @property
     @documented("N/m", before="static_stiffness")
     def stiffness_max(self) -> float:
-        """[N/m]; nan where no wall is stable, or the chart cannot be computed."""
+        """Largest stiffness [N/m]; nan where no wall is stable, or the chart cannot be computed."""
         return nan if self.chart is None else self.chart.stiffness_max
 
 
@@ -130,7 +130,7 @@ class Bending(Result):
 
 
 def bending(device: Device, point: OperatingPoint | None = None) -> Bending | None:
-    """What it changes that links bend, at one operating point; left out: the device's reference.
+    """The effect of bending links at one operating point; left out: the device's reference.
 
     Returns  None of a device without links that could bend: given by a plant or a response, without lengths, with
              masses that are not known, or asked for in its rigid model
@@ -144,10 +144,10 @@ def bending(device: Device, point: OperatingPoint | None = None) -> Bending | No
     tubes = () if beams else typical_tubes(device)
     if not (beams or tubes):
         return None
-    own = _numbers(point)
+    own = _bending_numbers(point)
     other = with_rigid_links(device) if beams else with_tubes(device, tubes)
     try:
-        changed = _numbers(_there(other, device, point))
+        changed = _bending_numbers(_placed_like(other, device, point))
     except EquilibriumError as error:
         changed = BendingNumbers(None, nan, nan, f"no equilibrium: {error}")
     if beams:
@@ -157,9 +157,9 @@ def bending(device: Device, point: OperatingPoint | None = None) -> Bending | No
     return Bending(links, tubes, kept, changed, own).about(point)
 
 
-def _there(other: Device, device: Device, point: OperatingPoint) -> OperatingPoint:
-    """Another device at an operating point of a device, in the same hands and under the same load. Raises
-    EquilibriumError where it has no equilibrium there."""
+def _placed_like(other: Device, device: Device, point: OperatingPoint) -> OperatingPoint:
+    """Another device at the operating point of a device, with its operator and load. Raises EquilibriumError where
+    it has no equilibrium there."""
     if point.load is not None and point.load is not device.load:
         other = other.under(point.load)
     found = other.at_point(point)
@@ -167,11 +167,12 @@ def _there(other: Device, device: Device, point: OperatingPoint) -> OperatingPoi
 
 
 def _links(device: Device) -> list[dict[str, Any]]:
-    """The tables of a device's links, those of a leg once."""
+    """The tables of a device's links in its file, those of a leg once."""
     return [link for _, link in written(table(device.document, "mechanism"), "links")]
 
 
 def _length(link: dict[str, Any]) -> float:
+    """Length of a link by its table [m]; 0 where none is given."""
     length = link.get("length_m", 0.0)
     return float(length) if is_number(length) else 0.0
 
@@ -257,8 +258,8 @@ def _known_axis(link: dict[str, Any]) -> Floats | None:
     return np.asarray(axis / np.linalg.norm(axis))
 
 
-def _numbers(point: OperatingPoint) -> BendingNumbers:
-    """Raises what `OperatingPoint.loop` raises."""
+def _bending_numbers(point: OperatingPoint) -> BendingNumbers:
+    """The numbers of a device at an operating point. Raises what `OperatingPoint.loop` raises."""
     first = _first_moved(point.ungripped_plant)
     chart, reason = None, ""
     try:
@@ -271,8 +272,8 @@ def _numbers(point: OperatingPoint) -> BendingNumbers:
 
 
 def _first_moved(plant: Plant) -> float:
-    """The lowest natural frequency of a mode of which the wall makes more than MOVED of its motion [Hz]; nan if
-    there is none."""
+    """Lowest natural frequency of a mode that has more than the share MOVED of the motion that a force of the wall
+    makes at the sensor [Hz]; nan if there is none."""
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     share = np.abs((shapes.T @ plant.actuator) * (shapes.T @ plant.sensor))
     moved = squared[(squared > 0.0) & (share > MOVED * share.sum())]

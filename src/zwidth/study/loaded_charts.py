@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import exp, inf, log, nan
+from math import exp, inf, isnan, log, nan
 from typing import Any, Final
 
 import numpy as np
@@ -80,24 +80,24 @@ class PushedChart:
 
     @property
     def stiffness_max(self) -> float:
-        """[N/m]; nan if there is none."""
+        """Largest stiffness [N/m]; nan if there is none."""
         return nan if self.chart is None else self.chart.stiffness_max
 
     @property
     def growth_rate(self) -> float:
-        """Of the fastest-growing sideways motion [1/s]; nan if there is none."""
+        """Growth rate of the fastest-growing sideways motion [1/s]; nan if there is none."""
         return nan if self.sideways is None else self.sideways.growth_rate
 
     @property
     def wall_force(self) -> float:
-        """[N]; 0 where nothing pushes."""
+        """Force of the wall at the equilibrium [N], nan where there is none; 0 where nothing pushes."""
         if self.equilibrium is None:
             return 0.0 if self.chart is not None and not self.push else nan
         return self.equilibrium.wall_force
 
     @property
     def sideways_force(self) -> Floats:
-        """(3,) of the hand across the direction [N]."""
+        """Force of the hand across the direction (3,) [N]; nan where there is no equilibrium."""
         if self.equilibrium is None:
             return np.full(3, 0.0 if self.chart is not None and not self.push else nan)
         return self.equilibrium.sideways_force
@@ -123,27 +123,27 @@ class LoadPath(Result):
 
     @property
     def pushes(self) -> Floats:
-        """(k,) [N]."""
+        """Push of each step (k,) [N]."""
         return np.array([step.push for step in self.steps])
 
     @property
     def stiffness_max(self) -> Floats:
-        """(k,) largest stiffness [N/m]; nan where there is none."""
+        """Largest stiffness (k,) [N/m]; nan where there is none."""
         return np.array([step.stiffness_max for step in self.steps])
 
     @property
     def growth_rates(self) -> Floats:
-        """(k,) of the fastest-growing sideways motion [1/s]; nan where there is none."""
+        """Growth rate of the fastest-growing sideways motion (k,) [1/s]; nan where there is none."""
         return np.array([step.growth_rate for step in self.steps])
 
     @property
     def hand_neglected(self) -> Floats:
-        """(k,) largest stiffness with the change of the hand's force left out [N/m]."""
+        """Largest stiffness with the change of the hand's force left out (k,) [N/m]."""
         return np.array([step.hand_neglected for step in self.steps])
 
     @property
     def fixed_surface(self) -> Floats:
-        """(k,) largest stiffness with surface and hand fixed [N/m]."""
+        """Largest stiffness with surface and hand fixed (k,) [N/m]."""
         return np.array([step.fixed_surface for step in self.steps])
 
     @property
@@ -165,11 +165,12 @@ class LoadPath(Result):
         }
 
     def table(self) -> dict[str, Any]:
-        """The same as columns, one push a row."""
+        """The charts as columns, one push a row."""
         forces = np.array([step.sideways_force for step in self.steps])
         return self._columns() | {f"sideways_force_{axis}_N": forces[:, k] for k, axis in enumerate("xyz")}
 
     def _columns(self) -> dict[str, Any]:
+        """Lists of one entry for each push, by key and unit, but for the sideways force."""
         charts = [step.chart for step in self.steps]
         moved = [step.sideways for step in self.steps]
         return {
@@ -265,6 +266,7 @@ class _Pushes:
 
     @classmethod
     def of(cls, device: Device, point: OperatingPoint | None) -> _Pushes:
+        """The pushes of a device at an operating point; None: the device's reference, and its own load."""
         load = device.load if point is None or point.load is None else point.load
         bare = device_without_load(device if point is None else device_of_point(device, point))
         here = bare.at() if point is None else bare.at_point(point)
@@ -291,7 +293,7 @@ class _Pushes:
             chart = stability_chart(point.loop, decay=False).about(point).drawn()
         except (ChartError, UnresolvedError) as error:
             return PushedChart(push, f"undecided: {error}", equilibrium=found, fixed_surface_status="undecided")
-        status = OK if chart.stiffness_max == chart.stiffness_max else NONE_STABLE
+        status = NONE_STABLE if isnan(chart.stiffness_max) else OK
         surface, why = chart.stiffness_max, status
         if push and status == OK:
             surface, why = self._fixed_surface(device, push, chart.stiffness_max)

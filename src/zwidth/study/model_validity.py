@@ -164,18 +164,22 @@ def edge_distance(walls: Floats, chart: StabilityChart) -> Floats:
 
 
 def _error(walls: Floats, chart: StabilityChart, tracer: Tracer) -> Floats:
-    """`edge_distance`; where the model's wall at the same frequency is near, from points of its exact curve around
-    that frequency, since the chords of a large chart are too coarse for small walls."""
+    """e of each wall (k, 3) from the edge of a model's chart, as `edge_distance`; where the model's wall at the
+    same frequency is near, from points of its exact curve: chords are too coarse for small walls.
+
+    tracer  of the model's loop
+    """
     in_radians = 2.0 * pi * chart.loop.period
     ranges = [(float(arc.frequency.min()), float(arc.frequency.max())) for arc in chart.boundary]
     best = edge_distance(walls, chart)
     for n, wall in enumerate(walls):
+        frequency = wall[2]
         for low, high in ranges:
-            if not low < wall[2] < high:
+            if not low < frequency < high:
                 continue
-            error = float(np.max(np.abs(np.array(tracer.wall(in_radians * wall[2])[:2]) / wall[:2] - 1.0)))
+            error = float(np.max(np.abs(np.array(tracer.wall(in_radians * frequency)[:2]) / wall[:2] - 1.0)))
             if error < NEAR:
-                frequencies = [f for f in wall[2] * (1.0 + error * CLOSE) if low < f < high]
+                frequencies = [f for f in frequency * (1.0 + error * CLOSE) if low < f < high]
                 points = np.array([(*tracer.wall(in_radians * f)[:2], f) for f in frequencies])
                 best[n] = float(_nearest(points / wall - 1.0))
     return best
@@ -206,7 +210,10 @@ def _nearest(points: Floats) -> Floats:
 
 
 class _Edge:
-    """Up to WALLS walls with K > 0, B > 0 along the pair curve of a chart's edge, by ascending frequency."""
+    """Up to WALLS walls with K > 0, B > 0 along the pair curve of a chart's edge, by ascending frequency.
+
+    frequency, walls, arc  as in `Validity`
+    """
 
     def __init__(self, chart: StabilityChart) -> None:
         self.tracer = Tracer(chart.loop)
@@ -219,7 +226,7 @@ class _Edge:
         points = [self._within(arc[(arc[:, 2] > 0.0) & (arc[:, 2] < nyquist)]) for arc in points]
         walls = np.concatenate([np.zeros((0, 3)), *points])
         order = np.argsort(walls[:, 2], kind="stable")
-        order = order[_spread(len(order), WALLS)]
+        order = order[_spread_indices(len(order), WALLS)]
         self.frequency, self.walls = walls[order, 2], walls[order]
         self.arc = np.repeat(np.arange(len(arcs)), [len(arc) for arc in points])[order]
 
@@ -244,7 +251,7 @@ class _Edge:
 def _fit(
     edge: _Edge, controller: Controller, key: str, label: str, plant: Plant | None, reason: str, tolerance: float
 ) -> ModelFit:
-    """The `ModelFit` of one model to the full one; `reason` says why it has no plant."""
+    """How one model fits the full one along its edge; `reason` says why it has no plant."""
     none = np.empty(0)
     if plant is None:
         return ModelFit(key, label, none, none, (), reason)
@@ -266,27 +273,28 @@ def _fit(
 
 
 def _range_end(frequency: Floats, fits: Callable[[float], bool], good: int, bad: int) -> float:
-    """The frequency between two neighbours at which a model ceases to fit, by bisection."""
+    """The frequency [Hz] at which a model ceases to fit, by bisection between neighbours with the indices `good`
+    and `bad`; `bad` may lie beyond an end of the edge."""
     if not 0 <= bad < len(frequency):
         return float(frequency[good])
     return _last_fitting(fits, float(frequency[good]), float(frequency[bad]))
 
 
 def _last_fitting(fits: Callable[[float], bool], fitting: float, outside: float) -> float:
-    """The frequency next to `outside` for which `fits` still holds, by bisection."""
+    """The frequency nearest to `outside` for which `fits` still holds [Hz], by bisection from `fitting`."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (fitting + outside)
         fitting, outside = (middle, outside) if fits(middle) else (fitting, middle)
     return fitting
 
 
-def _spread(count: int, at_most: int) -> Ints:
-    """Evenly spread indices among `count`, the first and the last with them."""
+def _spread_indices(count: int, at_most: int) -> Ints:
+    """Indices spread evenly over 0 to count - 1, at most so many, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, at_most)).round().astype(np.int64))
 
 
 def _runs(good: Flags) -> Iterator[tuple[int, int]]:
-    """First and last of each stretch of True."""
+    """First and last index of each stretch of True."""
     turns = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
     for start, end in zip(turns[::2], turns[1::2], strict=True):
         yield int(start), int(end) - 1

@@ -120,7 +120,7 @@ def run_experiment(
     first = _stability_trial(loop, operator, plan)
     report_search = partial(report, "looking for stable walls")
     place = StableExtent(
-        *journal.get_or_compute("place", lambda: _numbers(find_stable_walls(first, plan.box, report_search)))
+        *journal.get_or_compute("place", lambda: _field_values(find_stable_walls(first, plan.box, report_search)))
     )
     report_search(1, 1)
     low = 0.0 if plan.box is None else max(plan.box.stiffness[0], 0.0)
@@ -139,7 +139,7 @@ def run_experiment(
             runs.append([*edges, *tips])
             done += 1
             report("measuring the boundary", done, total_trials)
-    chart = _chart(loop, operator)
+    chart = _exact_chart(loop, operator)
     points, lost = _combine_trials(runs, chart, 2 * len(grid) + len(dampings if dampings is not None else ()))
     cause_list = _causes(loop, operator, plan, place, runs[0], journal, report) if causes else ()
     return Experiment(plan, place, points, lost, subjects, chart, cause_list, journal.entries_read)
@@ -214,10 +214,11 @@ def _trial(loop: Loop, operator: Operator | None, plan: Plan, subject: int, tria
     if plan.trials > 1:
         random = np.random.default_rng([plan.seed, subject, trial])
         factors = tuple(np.exp(plan.spread * random.standard_normal(3)).tolist())
-    return _stability_trial(loop, operator, plan, factors, seed=(plan.seed * 1000 + subject) * 1000 + trial)
+    seed = (plan.seed * 1000 + subject) * 1000 + trial  # another one for each of 1000 subjects and trials
+    return _stability_trial(loop, operator, plan, factors, seed)
 
 
-def _numbers(record: Any) -> list[Any]:
+def _field_values(record: Any) -> list[Any]:
     """The fields of a dataclass in their order, as a journal keeps them."""
     return [getattr(record, field.name) for field in fields(record)]
 
@@ -225,12 +226,13 @@ def _numbers(record: Any) -> list[Any]:
 def _edge_points(journal: Journal, name: str, compute: Callable[[], list[EdgePoint]]) -> list[EdgePoint]:
     """The points that the journal keeps under this name; computed where it has none."""
     return [
-        EdgePoint(*numbers) for numbers in journal.get_or_compute(name, lambda: [_numbers(p) for p in compute()])
+        EdgePoint(*numbers)
+        for numbers in journal.get_or_compute(name, lambda: [_field_values(p) for p in compute()])
     ]
 
 
-def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
-    """The exact chart with the operator; None where the loop has none."""
+def _exact_chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
+    """The exact chart of the loop held by the operator; None where it has none."""
     held = loop if operator is None else Loop(attach(loop.plant, operator), loop.controller)
     try:
         return stability_chart(held, decay=False).drawn()
@@ -241,7 +243,12 @@ def _chart(loop: Loop, operator: Operator | None) -> StabilityChart | None:
 def _combine_trials(
     runs: list[list[EdgePoint]], chart: StabilityChart | None, requested_points: int
 ) -> tuple[tuple[MeasuredPoint, ...], int]:
-    """Points of all trials by edge and chosen stiffness or damping, and how many no trial found."""
+    """Points of all trials, joined by edge and chosen stiffness or damping; and how many no trial found.
+
+    runs              points of each trial
+    chart             exact one, for the number that was bisected; None: nan
+    requested_points  number of points that were looked for
+    """
     by_edge: dict[tuple[EdgeKind, float], list[EdgePoint]] = {}
     for points in runs:
         for point in points:
@@ -286,11 +293,11 @@ def _causes(
     journal: Journal,
     report: Progress,
 ) -> tuple[Cause, ...]:
-    """Edges measured again without each nonlinear part, at a few of the stiffnesses of these points."""
+    """The edges measured again without each nonlinear part, at EXPLAINED of the stiffnesses of these points."""
     names = loop.nonlinear.kinds
     grid = sorted({p.stiffness for p in points if p.edge == "lower"})
     picked = [grid[i] for i in np.unique(np.linspace(0, len(grid) - 1, min(EXPLAINED + 2, len(grid))).astype(int))]
-    picked = picked[1:-1] or picked
+    picked = picked[1:-1] or picked  # without the lowest and the highest stiffness
     compared = [p for p in points if p.edge != "tip" and p.stiffness in picked]
     causes = []
     for done, name in enumerate(names):

@@ -131,7 +131,7 @@ class Experiment(Result):
 
     @cached_property
     def damping_range(self) -> float:
-        """The widest range of stable dampings that was measured [N s/m]; nan if no stiffness has both edges."""
+        """Width of the widest range of stable dampings measured [N s/m]; nan if no stiffness has both edges."""
         upper = {p.stiffness: p.damping for p in self.points if p.edge == "upper"}
         both = [upper[p.stiffness] - p.damping for p in self.points if p.edge == "lower" and p.stiffness in upper]
         return max(both, default=nan)
@@ -189,7 +189,7 @@ class BeyondTip(NamedTuple):
 
 
 def edges_beyond_tips(experiment: Experiment) -> list[BeyondTip]:
-    """For each tip that edges lie beyond, the stiffest of them; the tip that lies lowest against its edge first.
+    """Tips that contradict stiffer edges, each with the stiffest of these; the tip lowest against its edge first.
 
     An edge at a stiffness says that the walls on its inner side are stable. A tip says that no stiffer wall is, at
     its damping. Both cannot be right where the edge is stiffer than the tip and the tip's damping is on its inner
@@ -214,7 +214,8 @@ def edges_beyond_tips(experiment: Experiment) -> list[BeyondTip]:
 
 
 def _stable_ranges(experiment: Experiment) -> dict[float, tuple[float, float]]:
-    """By stiffness, the dampings that every trial found stable, from the tip's damping to the edges found."""
+    """Stiffness -> least and largest damping that every trial found stable [N s/m], from the damping of the stable
+    extent to the edges found."""
     start_damping = experiment.place.damping
     ranges: dict[float, tuple[float, float]] = {}
     for point in experiment.points:

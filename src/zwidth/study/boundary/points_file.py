@@ -58,7 +58,7 @@ def read_walls(file: File) -> Walls:
 
     Raises FileError  if it cannot be read, lacks a column or holds no wall, or with every line that is wrong
     """
-    return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _read(file, {})]
+    return [(row[COLUMNS[0]], row[COLUMNS[1]]) for row in _rows(file, {})]
 
 
 def read_points(file: File) -> list[UserPoint]:
@@ -67,10 +67,10 @@ def read_points(file: File) -> list[UserPoint]:
     Raises FileError  as `read_walls`
     """
     optional: dict[str, Reader] = {
-        "edge": partial(_word, EDGES),
-        "verdict": partial(_word, VERDICTS),
-        **dict.fromkeys(SPREADS, _spread),
-        "trials": _trials,
+        "edge": partial(_read_word, EDGES),
+        "verdict": partial(_read_word, VERDICTS),
+        **dict.fromkeys(SPREADS, _read_spread_end),
+        "trials": _read_trials,
     }
     return [
         UserPoint(
@@ -84,26 +84,29 @@ def read_points(file: File) -> list[UserPoint]:
             trials=row.get("trials", 1),
             verdict=row.get("verdict", ""),
         )
-        for row in _read(file, optional)
+        for row in _rows(file, optional)
     ]
 
 
-def _word(allowed: tuple[str, ...], text: str) -> tuple[str, str]:
+def _read_word(allowed: tuple[str, ...], text: str) -> tuple[str, str]:
+    """A cell that holds one of the allowed texts, and what is wrong with it ("" if nothing)."""
     return text, "" if text in allowed else f"must be {', '.join(allowed[:-1])} or nothing, got {text[:60]!r}"
 
 
-def _spread(text: str) -> tuple[float, str]:
+def _read_spread_end(text: str) -> tuple[float, str]:
+    """Read an end of a spread, nan where the cell is empty; returns it and what is wrong, as `wall_number`."""
     return wall_number(text) if text else (nan, "")
 
 
-def _trials(text: str) -> tuple[int, str]:
+def _read_trials(text: str) -> tuple[int, str]:
+    """Read a number of trials, 1 where the cell is empty; returns it and what is wrong ("" if nothing)."""
     if not text or (text.isdecimal() and len(text) < MOST_DIGITS and int(text) > 0):
         return int(text or 1), ""
     return 1, f"must be a whole number from 1 on, got {text[:60]!r}"
 
 
-def _read(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
-    """The rows, each as column -> value; of the optional columns those that the file has."""
+def _rows(file: File, optional: Mapping[str, Reader]) -> list[dict[str, Any]]:
+    """The rows of a file, each as column -> value; of the optional columns those that it has. Raises FileError."""
     rows = csv.reader(_text(file).splitlines(), strict=True)
     faults: list[str] = []
     cells_of_rows: list[dict[str, Any]] = []
@@ -167,6 +170,7 @@ def _column_indices(file: File, header: list[str], optional: Collection[str]) ->
 
 
 def _text(file: File) -> str:
+    """The text of a file. Raises FileError with its name."""
     try:
         return read_text(file, LARGEST_TABLE, pipes=True)
     except FileError as error:

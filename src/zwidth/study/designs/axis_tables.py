@@ -87,7 +87,7 @@ def _number_axis(
     faults  that this axis' are added to
     bounds  as for `axes_of`
     """
-    message = list(key_faults(device.document, key, _values(table), whole_ranges=bounds))
+    message = list(key_faults(device.document, key, _values_with_paths(table), whole_ranges=bounds))
     faults += message
     if message:
         return None
@@ -181,7 +181,7 @@ def _catalogue_axis(
     return None if faults else Axis(key, tuple(parts), parts=tuple(parts.values()))
 
 
-_SOME_NUMBER: Final[list[tuple[KeyPath, Any]]] = [(("set",), 1)]
+_SOME_NUMBER: Final[list[tuple[KeyPath, Any]]] = [(("set",), 1)]  # stands for those of a catalogue
 
 
 def _takes_whole_numbers(document: dict[str, Any], key: str) -> bool:
@@ -190,7 +190,7 @@ def _takes_whole_numbers(document: dict[str, Any], key: str) -> bool:
     return "integer" in kinds and "number" not in kinds
 
 
-def _values(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
+def _values_with_paths(table: dict[str, Any]) -> list[tuple[KeyPath, Any]]:
     """The entries of the axis's range and values, each with its key path."""
     return [
         ((key, n), value)
@@ -207,7 +207,7 @@ def _well_typed(values: list[tuple[KeyPath, Any]]) -> Iterator[tuple[KeyPath, An
 
 
 def _axis(table: dict[str, Any], key: str, unit: str, ties: tuple[Tie, ...]) -> Axis | None:
-    """The axis; None where its values have a fault, which `study_schema` or `_values_faults` reports."""
+    """The axis of a table; None where its values have a fault: `study_schema` or `_values_faults` reports it."""
     span, values, count = table.get("range"), table.get("values"), table.get("count")
     logarithmic = table.get("scale") == "log"
     if isinstance(values, list) and values and span is None:
@@ -231,6 +231,7 @@ def overlap_faults(
 
     key    of the axis itself, or of a number tied to it
     axis   key of the axis that sets it
+    where  key path of the key, for messages
     taken  what axes before this one set; the key is added
     kind   what messages call an axis
     """
@@ -248,12 +249,12 @@ def overlap_faults(
             yield (where, f"'{key}' {by} already; remove one of the two")
         elif steps[: len(other)] == other or other[: len(steps)] == steps:
             yield (where, f"'{key}' overlaps '{shown}', which {by} already; remove one of the two")
-        elif _exclude(steps, other):
+        elif _exclude_each_other(steps, other):
             yield (where, f"'{key}' excludes '{shown}', which {by} already; remove one of them")
     taken.setdefault(steps, (key, axis))
 
 
-def _exclude(one: KeyPath, other: KeyPath) -> bool:
+def _exclude_each_other(one: KeyPath, other: KeyPath) -> bool:
     """Whether these keys belong to one table and exclude each other."""
     if one[:-1] != other[:-1]:
         return False
@@ -343,7 +344,8 @@ def ties_of(
 ) -> Iterator[Tie]:
     """The ties without a fault, and a matrix element's tie to its mirror image; faults go to `faults_of_axes`.
 
-    kind  what messages call an axis
+    taken  what axes so far set; what the ties set is added
+    kind   what messages call an axis
     """
     document, given = device.document, table.get("tie")
     for n, tied in enumerate(given if isinstance(given, list) else []):
@@ -380,6 +382,7 @@ def mirrored(document: dict[str, Any], key: str) -> str | None:
 def _tie_faults(
     document: dict[str, Any], key: str, to: str, factor: Any, power: Any, table: dict[str, Any]
 ) -> Iterator[TableFault]:
+    """Faults of a tie of the number at `to` to the axis at `key`; `table` is that of the axis."""
     try:
         address.resolve(document, to)
         own = address.get(document, to) if address.exists(document, to) else None
@@ -389,15 +392,15 @@ def _tie_faults(
     if factor is not None and power is not None:
         yield (("factor",), "and power exclude each other; remove one of them")
     elif power is None:
-        values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values(table)[:1]]
+        values: list[tuple[KeyPath, Any]] = [(("key",), value) for _, value in _values_with_paths(table)[:1]]
         yield from (
             ((), message.replace(f"'{key}'", f"'{to}'")) for _, message in key_faults(document, to, values)
         )
-        if factor is not None and any(isinstance(value, str) for _, value in _values(table)):
+        if factor is not None and any(isinstance(value, str) for _, value in _values_with_paths(table)):
             yield (("factor",), "cannot multiply texts, and the values of this axis are texts; remove it")
     else:
         base = address.get(document, key) if address.exists(document, key) else None
-        if not _numbers(own):
+        if not _all_numbers(own):
             yield (
                 (),
                 f"'{to}' has no value in the device file, which power needs; use factor, or set it first",
@@ -405,25 +408,26 @@ def _tie_faults(
         if not is_number(base) or base == 0:
             given = f"got {quote(base)}" if base is not None else "and it has none; set it first"
             yield (("power",), f"needs a value of '{key}' other than 0 in the device file, {given}")
-        elif not all(is_number(value) and value / base > 0 for _, value in _well_typed(_values(table))):
+        elif not all(is_number(value) and value / base > 0 for _, value in _well_typed(_values_with_paths(table))):
             yield (("power",), f"needs values of the sign that '{key}' has in the device file, {quote(base)}")
 
 
-def _numbers(value: Any) -> bool:
-    return bool(value) and all(map(_numbers, value)) if isinstance(value, list) else is_number(value)
+def _all_numbers(value: Any) -> bool:
+    """Whether a value is a number, or nested lists of numbers, none empty."""
+    return bool(value) and all(map(_all_numbers, value)) if isinstance(value, list) else is_number(value)
 
 
 def _circumstance_faults(key: str, table: dict[str, Any], device: Device | None) -> Iterator[TableFault]:
     """Faults of the values of a circumstance, such as a position or an assembly, for this device."""
     if key in WANTED:
         number = WANTED_BY_KEY[key]
-        for where, value in _well_typed(_values(table)):
+        for where, value in _well_typed(_values_with_paths(table)):
             if not is_number(value) or not number.allows(value):
                 yield (where, f"must be a finite number, {number.allowed}, got {quote(value)}")
         return
     if "range" in table:
         yield (("range",), f"cannot be used: {key} is not a number; write values = [...]")
-    for where, value in _values(table):
+    for where, value in _values_with_paths(table):
         if where[0] == "values" and (message := circumstance_fault(key, value, device)):
             yield (where, message)
 
@@ -438,7 +442,7 @@ def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
     checks: dict[str, Callable[[Device], Any]] = {
         "at": lambda known: known.position(value),
         "direction": lambda known: known.direction(value),
-        "assembly": lambda known: _assembly(known, value),
+        "assembly": lambda known: _check_assembly(known, value),
     }
     if key == "model" and value not in MODELS:
         return f"must be one of {', '.join(MODELS)}, got {quote(value)}"
@@ -451,7 +455,8 @@ def circumstance_fault(key: str, value: Any, device: Device | None) -> str:
     return ""
 
 
-def _assembly(device: Device, name: str) -> None:
+def _check_assembly(device: Device, name: str) -> None:
+    """Raise DeviceError where a device has no assembly of this name."""
     if device.mechanism is None:
         device.at(assembly=name)  # raises the fault that a [plant] has no assemblies
     elif name not in device.mechanism.assemblies:

@@ -2,7 +2,7 @@
 
 `Requirement`: a lower or an upper bound on a measure.
 
-Summary of a map: averages and extremes over the workspace.
+`over_the_workspace`: averages and extremes of a map.
 """
 
 from __future__ import annotations
@@ -73,6 +73,7 @@ def areas(x: Floats, y: Floats) -> Floats:
 
 
 def _trapezoids(x: Floats) -> Floats:
+    """Length that belongs to each point x (n,) by the trapezoidal rule: half of the steps beside it."""
     step = np.diff(x)
     return np.asarray(0.5 * (np.append(step, 0.0) + np.append(0.0, step)))
 
@@ -138,8 +139,8 @@ class Column:
         return f"{self.statistic}_{self.measure.key if self.unit or not self.measure.unit else self.measure.name}"
 
     def without_value(self, values: MeasureValues) -> tuple[float, int, str]:
-        """What a column is that needs a value at each cell and has none at some: nan, their commonest status
-        and its reason."""
+        """Value, status and reason of a column that needs a value at each cell and has none at some: nan, and the
+        commonest status of those."""
         kinds, counts = np.unique(values.status[values.status != OK], return_counts=True)
         status = int(kinds[np.argmax(counts)])
         return float("nan"), status, next((note.reason for note in values.notes if note.status == status), "")
@@ -214,6 +215,7 @@ def column_named(
 
 
 def _judged(measure: Measure, better: Better | None) -> Measure:
+    """The measure, with the values that are better where it leaves that open."""
     return measure if measure.better is not None or better is None else replace(measure, better=better)
 
 

@@ -1,8 +1,6 @@
 """Designs of a study that are built and measured together: those that consist of the same parts.
 
 Which designs are computed together never changes a design's result: every step looks at its own numbers alone.
-
-Designs of a study that are built together at one operating point, and their loops.
 """
 
 from __future__ import annotations
@@ -63,7 +61,7 @@ class DesignGroup:
 class DesignGrouping:
     """How the designs of a study fall into groups.
 
-    document   of the device
+    document   of the device;   label  of it, for messages
     operators  as in `Study`
     """
 
@@ -90,8 +88,8 @@ class DesignGrouping:
                 yield group
 
     def _kinds(self, key: str, values: Sequence[Any]) -> tuple[Ints, Sequence[Any]]:
-        """A number for each value that stands for its kind, and the kinds by these numbers: what must be alike in
-        designs that are built together."""
+        """For each value (k,) a number that stands for its kind, and the kinds by these numbers. Designs that are
+        built together have values of the same kind."""
         steps = self._path(key)
         if key in WANTED:
             return np.zeros(len(values), dtype=np.int64), [None]
@@ -104,6 +102,7 @@ class DesignGrouping:
         return np.array(code), list(number_of)
 
     def _kind(self, key: str, steps: KeyPath | None, value: Any) -> str:
+        """Kind of one value: "number" for all that arrays may hold, else the value; of a list that of each."""
         if isinstance(value, list | tuple) and (key == "at" or (steps is not None and takes_arrays(steps))):
             return f"[{', '.join(self._kind(key, steps, inner) for inner in value)}]"
         number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -120,6 +119,7 @@ class DesignGrouping:
         return self._steps[key]
 
     def _group(self, rows: Rows, kind: tuple[Any, ...], taken: list[DesignColumn]) -> DesignGroup | None:
+        """The group of the designs `rows`, which all have one kind; None where no batch can be built of them."""
         document = self._document(kind, taken, len(rows))
         if document is None:
             return None
@@ -139,7 +139,7 @@ class DesignGrouping:
         return DesignGroup(rows, batch, valid, positions, chosen)
 
     def _document(self, kind: tuple[Any, ...], taken: list[DesignColumn], count: int) -> dict[str, Any] | None:
-        """The document of a valid design of a kind; None where none is found among these."""
+        """The document of a valid design of a kind; None where none of the `count` designs of `taken` is valid."""
         if self._documents.get(kind) is None:
             for row in range(count):
                 try:
@@ -181,7 +181,7 @@ class BuiltDesigns:
     """Designs of the same parts, built together.
 
     rows   (P,)  their numbers in the study
-    point  (P,)  where they are
+    point  (P,)  their operating points
     """
 
     rows: Rows

@@ -1,8 +1,7 @@
 """Axes of a study, the numbers tied to them, and the designs they span.
 
-Catalogues: tables of parts, such as motors or tubes, from which an axis of a study chooses one a design.
-
-A CSV file with a line of headings. One column holds the names of the parts, the others their numbers.
+Catalogues: tables of parts, such as motors or tubes, from which an axis of a study chooses one for each design. A
+CSV file with a line of headings: one column holds the names of the parts, the others their numbers.
 
 Latin hypercubes whose designs are computed one by one, by their number: no design needs another's.
 
@@ -72,6 +71,7 @@ class Tie:
 
 
 def _times(value: Any, factor: float) -> Any:
+    """A number, or each number of nested lists, times a factor."""
     return [_times(inner, factor) for inner in value] if isinstance(value, list) else factor * value
 
 
@@ -176,7 +176,7 @@ class Sampling:
 
     @property
     def kind(self) -> str:
-        """What it is called in a study file."""
+        """The sampling's name in a study file."""
         return "paired" if self.paired else "grid" if self.size is None else "latin-hypercube"
 
     @property
@@ -261,6 +261,7 @@ def read_catalogue(path: Path, columns: Mapping[str, str]) -> dict[str, Part]:
 
 
 def _parts(headings: list[str], rows: list[list[str]], columns: Mapping[str, str]) -> dict[str, Part]:
+    """The parts of the rows below the headings, as `read_catalogue`. Raises FileError with all that is wrong."""
     parts: dict[str, Part] = {}
     wrong: list[str] = []
     for number, row in enumerate(rows, 1):
@@ -300,7 +301,7 @@ def _number(text: str) -> float | None:
 ROUNDS: Final = 10  # of the network; four make it random for large n, small n need more
 FEW: Final = 4096  # designs that are put in order
 BLOCK: Final = 1024  # designs that are computed at once where one is asked for
-_GAMMA: Final = np.uint64(0x9E3779B97F4A7C15)
+_GAMMA: Final = np.uint64(0x9E3779B97F4A7C15)  # step between the numbers that SplitMix64 hashes
 _BELOW_ONE: Final = float(np.nextafter(1.0, 0.0))
 
 Words = NDArray[np.uint64]
@@ -316,7 +317,7 @@ def shares(seed: int, axis: int, size: int, first: int, last: int) -> Floats:
     """
     keys = _keys(seed, axis)
     designs = np.arange(first, last, dtype=np.uint64)
-    places = (_hash(designs * _GAMMA + keys[ROUNDS]) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    places = (_hash(designs * _GAMMA + keys[ROUNDS]) >> np.uint64(11)).astype(np.float64) * 2.0**-53  # 53 bits
     order = _ordered(seed, axis, size)[first:last] if size <= FEW else _permuted(designs, size, keys)
     parts = order.astype(np.float64)
     # the division may round up to 1
@@ -330,23 +331,25 @@ def share(seed: int, axis: int, size: int, design: int) -> float:
 
 @lru_cache(maxsize=64)
 def _block(seed: int, axis: int, size: int, number: int) -> Floats:
+    """The `shares` of one block of BLOCK designs, kept for the next design of it."""
     return shares(seed, axis, size, number * BLOCK, min((number + 1) * BLOCK, size))
 
 
 @lru_cache(maxsize=64)
 def _keys(seed: int, axis: int) -> Words:
+    """Keys of the hashes (ROUNDS + 1,): of each round of the network, and of the places in the parts."""
     return np.random.SeedSequence((seed, axis)).generate_state(ROUNDS + 1, np.uint64).astype(np.uint64)
 
 
 @lru_cache(maxsize=64)
 def _ordered(seed: int, axis: int, size: int) -> Ints:
-    """A permutation of the numbers below `size`, by sorting."""
+    """A permutation (size,) of the numbers below `size`: the order of their hashes."""
     hashes = _hash(np.arange(size, dtype=np.uint64) * _GAMMA + _keys(seed, axis)[0])
     return np.argsort(hashes, kind="stable")
 
 
 def _permuted(numbers: Words, size: int, keys: Words) -> Words:
-    """Images of numbers below `size` under a permutation of them."""
+    """Images of numbers below `size` under a permutation of them; keys (ROUNDS + 1,) of its hashes."""
     low = isqrt(size - 1) + 1  # bases of the two digits; their product is hardly above the size
     high = -(-size // low)
     images = _network(numbers, np.uint64(low), np.uint64(high), keys)
@@ -356,7 +359,7 @@ def _permuted(numbers: Words, size: int, keys: Words) -> Words:
 
 
 def _network(numbers: Words, low: np.uint64, high: np.uint64, keys: Words) -> Words:
-    """Images under a permutation of the numbers below low * high."""
+    """Images of numbers below low * high under a permutation of them: the Feistel network (see the file)."""
     left, right = numbers // low, numbers % low
     for n in range(0, ROUNDS, 2):
         left = (left + _hash(right + keys[n]) % high) % high

@@ -202,7 +202,7 @@ def _in_rendered_units(study: Study) -> Study:
 
 
 def _missing(document: dict[str, Any], needs: Sequence[str]) -> Iterator[tuple[KeyPath, str]]:
-    """Keys that a document needs and has not; one that is only misspelt is reported as a key that there is not."""
+    """Faults of keys that a document needs and lacks; the schema reports one that is only misspelt, as unknown."""
     for key in needs:
         others = [other for other in document if other not in StudyFile.model_fields]
         if key not in document and all(nearest(other, list(StudyFile.model_fields)) != key for other in others):
@@ -316,7 +316,7 @@ def _plane_of_document(
 def _task(
     document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults, bounds: bool
 ) -> Task | None:
-    """The task of the study; None without one, or where anything is wrong with it."""
+    """The task of the study; None without one, or where anything is wrong with it, which is added to `faults`."""
     if "task" not in document:
         return None
     if "workspace" in document:

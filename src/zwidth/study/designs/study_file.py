@@ -1,6 +1,6 @@
 """From a study file to a `Study`, or to the list of everything that is wrong with it.
 
-From the arguments of a function to a `Study`: the same checks as of a study file, in the words of Python.
+`study_over`: a study from the arguments of a function, by the same checks, its faults in the words of Python.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def study_of(
 
 
 def _device_instead(label: str, what: str) -> DeviceError:
-    """The fault of a device that was given as a study."""
+    """The error about a device, or a device file, that was given as a study; `what` it is, in words."""
     name = json.dumps(File(label).name)
     return fail(
         label, "", f"is {what}, not a study; write a study file with device = {name}, measures and an [[axis]]"
@@ -346,12 +346,13 @@ def _angle_faults(device: Device, angles: Mapping[str, float], axes: Mapping[str
 
 
 def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
-    """A fault of the document, under the name of the argument that it came from."""
+    """The fault at a path of the document, under the argument that it came from; `keys` of the axes."""
     argument = ARGUMENTS.get(str(path[0]), str(path[0]))
     if path[0] != "axis" or len(path) < 3:
         return Fault(argument, "", message)
-    key = keys[int(path[1])]
-    if path[2] != "key":
+    _, number, entry, *_ = path
+    key = keys[int(number)]
+    if entry != "key":
         return Fault(argument, key, message)
     return Fault(
         argument, "", f"'{key}' as an axis is called '{KEYS[key]}'" if key in RENAMED_ARGUMENTS else message

@@ -40,7 +40,7 @@ def key_of(argument: Argument) -> Any:
     return documented_key(text, argument.unit or None, default=None, **limits)
 
 
-def _by_name(value: Any) -> Any:
+def _tie_as_table(value: Any) -> Any:
     """A tie written as its key alone, as a table."""
     if not isinstance(value, str | dict):
         raise ValueError(f"must be a path, or a table with a key, got {quote(value)}")
@@ -48,10 +48,12 @@ def _by_name(value: Any) -> Any:
 
 
 def _one_or_two(value: Any) -> Any:
+    """A single count for both axes of the grid."""
     return [value, value] if is_number(value) else value
 
 
 def _plane(value: Any) -> Any:
+    """The name of a plane or the six numbers of its axes, as given. Raises ValueError for anything else."""
     if isinstance(value, str) or (isinstance(value, list) and len(value) == 6 and all(map(is_number, value))):
         return value
     raise ValueError(f"must be 'xy', 'xz', 'yz' or six numbers, got {quote(value)}")
@@ -68,7 +70,7 @@ class TieSection(Section):
     )
 
 
-TieEntry = Annotated[TieSection, BeforeValidator(_by_name)]
+TieEntry = Annotated[TieSection, BeforeValidator(_tie_as_table)]
 
 
 class AxisSection(Section):
@@ -152,6 +154,7 @@ class StudyWorkspaceSection(Section):
 
 
 def _one_or_more(value: Any) -> Any:
+    """A single number as a list."""
     return [value] if is_number(value) else value
 
 
@@ -287,7 +290,7 @@ _TABLES: Final[dict[str, Any]] = {
 }
 
 
-def _table(path: KeyPath) -> Any:
+def _section_of(path: KeyPath) -> Any:
     """The section that the last key of a path stands in."""
     names = [part for part in path[:-1] if isinstance(part, str) and part in _TABLES]
     return _TABLES[names[-1]] if names else StudyFile
@@ -299,7 +302,7 @@ def description(path: KeyPath) -> str:
     >>> description(("workspace", "plane"))
     'xy, xz, yz or six numbers'
     """
-    field = _table(path).model_fields.get(str(path[-1]))
+    field = _section_of(path).model_fields.get(str(path[-1]))
     if field is None or not field.description:
         return ""
     extra = field.json_schema_extra
@@ -313,7 +316,7 @@ def unknown(path: KeyPath) -> str:
     >>> unknown(("axis", 0, "ranges"))
     "is not a key of an [[axis]]; did you mean 'range'?"
     """
-    section, key = _table(path), str(path[-1])
+    section, key = _section_of(path), str(path[-1])
     here = {
         AxisSection: "an [[axis]]",
         ToleranceSection: "a [[tolerance]]",

@@ -6,7 +6,7 @@ run_study("study.toml").dataset()["stiffness_max"]
 The results are labelled arrays, a document, and a table. These list every design, and so must fit into memory.
 `table_pieces` gives one piece after the other.
 
-What the designs come to is found in one pass over them: extremes, and how many there are of each status.
+Extremes, and how many designs there are of each status, are found in one pass over them (`ColumnSummary`).
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def sweep_dataset(sweep: Sweep) -> xr.Dataset:
 
 
 def column_attributes(sweep: Sweep, column: int) -> dict[str, str]:
-    """What a dataset says of a column."""
+    """Attributes of a column's variable in a dataset."""
     one = sweep.job.columns[column]
     return {
         **unit_attributes(one.unit),
@@ -102,7 +102,7 @@ def column_attributes(sweep: Sweep, column: int) -> dict[str, str]:
         "source": one.measure.source,
         "better": one.better or "",
         "key": one.key,
-        "notes": "\n".join(_sentence(sweep, note) for note in sweep.cells.notes[column]),
+        "notes": "\n".join(_note_sentence(sweep, note) for note in sweep.cells.notes[column]),
     }
 
 
@@ -119,11 +119,13 @@ def coordinates(sweep: Sweep, first: int, last: int) -> dict[str, Any]:
         ]
         found = {DESIGN: np.arange(first, last)}
     for dim, axis, values in along:
-        found |= {name: (dim, *column) for name, column in _columns(sweep, axis, values)}
+        found |= {name: (dim, *column) for name, column in _axis_coordinates(sweep, axis, values)}
     return found
 
 
-def _columns(sweep: Sweep, axis: Axis, values: list[Any]) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
+def _axis_coordinates(
+    sweep: Sweep, axis: Axis, values: list[Any]
+) -> Iterator[tuple[str, tuple[Any, dict[str, str]]]]:
     """The coordinates of an axis: its values, their components, and the numbers tied to it."""
     attributes = {**unit_attributes(axis.unit), "long_name": axis.key, "scale": "log" if axis.log else "linear"}
     if values and isinstance(values[0], tuple):
@@ -200,10 +202,11 @@ def table_pieces(sweep: Sweep) -> Iterator[dict[str, Sequence[Any]]]:
 
 
 def _table_piece(sweep: Sweep, first: int, cells: CellValues) -> dict[str, Sequence[Any]]:
+    """Rows of the table as columns: designs from number `first` on, whose measures are `cells`."""
     piece: dict[str, Sequence[Any]] = {}
     for axis, values, places in sweep.job.sampling.columns(first, first + len(cells.values)):
         for key, along in ((axis.key, values), *((tie.key, map(tie.value, values)) for tie in axis.ties)):
-            texts = [_cell(value) for value in along]
+            texts = [_table_cell(value) for value in along]
             piece[key] = [texts[place] for place in places.tolist()]
     for n, one in enumerate(sweep.job.columns):
         piece[one.key] = cells.values[:, n].tolist()
@@ -215,15 +218,16 @@ def _table_piece(sweep: Sweep, first: int, cells: CellValues) -> dict[str, Seque
 def note_sentences(sweep: Sweep) -> Iterator[tuple[str, str]]:
     """Name of a column, and why designs have no value in it: a sentence for each reason."""
     for name, notes in zip(sweep.job.measures, sweep.cells.notes, strict=True):
-        yield from ((name, _sentence(sweep, note)) for note in notes)
+        yield from ((name, _note_sentence(sweep, note)) for note in notes)
 
 
-def _cell(value: Any) -> Any:
+def _table_cell(value: Any) -> Any:
+    """A value as a cell of the table: lists as JSON."""
     return json.dumps(value) if isinstance(value, list | tuple) else value
 
 
-def _sentence(sweep: Sweep, note: Note) -> str:
-    """A reason, how many designs it is of, and the first of them."""
+def _note_sentence(sweep: Sweep, note: Note) -> str:
+    """A note in words: number of designs, status, reason, and the values of the first of them along the axes."""
     sampling = sweep.job.sampling
     values = sampling.values(note.first[0])
     where = ", ".join(
@@ -234,7 +238,7 @@ def _sentence(sweep: Sweep, note: Note) -> str:
 
 
 def status_flags() -> dict[str, Any]:
-    """What a dataset says of a column of status."""
+    """Attributes of a variable of status in a dataset."""
     meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
     return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
 
@@ -257,7 +261,7 @@ def dataset_attributes(sweep: Sweep) -> dict[str, Any]:
 
 @dataclass
 class ColumnSummary:
-    """One column of a study.
+    """Extremes of one column of a study, and its designs by status.
 
     lowest, highest  value and number of the first design that has it; None where no design has a value
     counts           (256,)  number of designs by status
@@ -357,6 +361,7 @@ class Sweep(Result):
         return sweep_table(self)
 
     def _extremes(self, column: int) -> str:
+        """A column in words: its least and largest value, and how many designs have one."""
         one, summary = self.job.columns[column], self.summaries[column]
         span = ""
         if summary.lowest is not None and summary.highest is not None:

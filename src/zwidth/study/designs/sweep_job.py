@@ -58,7 +58,7 @@ from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
 
 MOST_CELLS: Final = 65536  # designs, or positions of their workspaces, that are in memory at once
-Found: TypeAlias = tuple[Any, Any, str]  # value and status, or those of all cells, and the reason
+Found: TypeAlias = tuple[Any, Any, str]  # value and status, of one cell or of all, and the reason
 WALL: Final = tuple(WANTED)  # numbers of the wanted wall, as arguments
 
 
@@ -117,7 +117,7 @@ class SweepJob:
 
     @property
     def _width(self) -> int:
-        """Numbers of each column."""
+        """How many numbers each column has."""
         if not self.cells or self.positions is None:
             return 1
         return int(self.positions[..., 0].size) * (1 if self.directions is None else len(self.directions))
@@ -148,6 +148,7 @@ class SweepJob:
         reasons: list[dict[tuple[int, str], list[int]]] = [{} for _ in self.columns]
 
         def fill(row: int, column: int, found: Found) -> None:
+            """Note what was found of a design, and the reason with the design's number."""
             values[row, column], status[row, column], reason = found
             if reason:
                 reasons[column].setdefault((int(np.max(found[1])), reason), []).append(first + row)
@@ -169,6 +170,7 @@ class SweepJob:
 
     @cached_property
     def _grouping(self) -> DesignGrouping:
+        """How the designs fall into groups that are built together."""
         return DesignGrouping(self.document, self.label, self.operators)
 
     def _design_columns(self, first: int, last: int) -> Iterator[DesignColumn]:
@@ -178,7 +180,10 @@ class SweepJob:
                 yield DesignColumn(key, each, places)
 
     def _together(self, group: DesignGroup, first: int) -> Iterator[tuple[int, int, Found]]:
-        """Row, column and value of each design of a group that need not be asked for alone."""
+        """Row, column and what was found, of the designs of a group that need not be computed alone.
+
+        first  number of the design of row 0
+        """
         chosen = {**self.fixed_circumstances, **group.chosen}
         circumstances = [chosen.get(key) for key in ("direction", "assembly", "model")]
         if isinstance(chosen.get("at"), Mapping):  # joint angles are solved for one design at a time
@@ -243,9 +248,10 @@ class SweepJob:
             return none.status, none.reason
 
     def _measured(self, one: Column, point: OperatingPoint, designs: Ints, same: bool) -> Iterator[Found | None]:
-        """Value, status and reason of a column for each of several designs; None for one to be asked for alone.
+        """Value, status and reason of a column for each of several designs; None for one to be computed alone.
 
-        point  of all designs along its first axis; `same`: one for all
+        point    of all designs along its first axis; `same`: one for all
+        designs  (P,) their numbers in the study
         """
         measure = one.measure
         if same and not measure.of_wall:
@@ -278,6 +284,7 @@ class SweepJob:
             yield None if len(known) > 1 else (*found[:2], found[2] or "".join(known))
 
     def _over_positions(self, one: Column) -> bool:
+        """Whether a column is a statistic over all positions."""
         return one.statistic is not None and self.positions is not None
 
     def _reduced(self, one: Column, found: MeasureValues, point: Callable[[], OperatingPoint]) -> Found:
@@ -295,7 +302,7 @@ class SweepJob:
         return one.reduce(found, point, self.weights)
 
     def _column_value(self, one: Column, measure: Measure, point: OperatingPoint) -> Found:
-        """Value, status and reason of one column; its measure is about the design's wanted wall."""
+        """Value, status and reason of a column at a point; `measure` is its own at the design's wanted wall."""
         try:
             if not self._over_positions(one) and measure.each:
                 status = int(point.status)
@@ -305,7 +312,7 @@ class SweepJob:
             return np.nan, NO_VALUE, error.spelled(as_key)
 
     def _walls(self, designs: Ints, point: OperatingPoint) -> WantedWall | WantedWalls:
-        """The walls wanted of some designs, along the first of the points' axes."""
+        """The wanted walls of designs, by their numbers (P,), along the first of the point's axes."""
         each = [self.design(int(number)).wall for number in designs]
         given = [name for name in WALL if getattr(each[0], name) is not None]  # and so of all of them
         later = [1] * (len(point.shape) - 1)
@@ -373,6 +380,7 @@ class Design:
         return point if self.job.directions is None else point.along_each(self.job.directions)
 
     def _solve_once(self, name: str, positions: Any) -> OperatingPoint:
+        """The operating point of a name, solved when it is first asked for. Raises _NoPoint each time."""
         if name not in self.points:
             try:
                 self.points[name] = self._solve(name, positions)
@@ -384,6 +392,7 @@ class Design:
         return point
 
     def _solve(self, name: str, positions: Any) -> OperatingPoint:
+        """The operating point at some positions. The job keeps the last posture of a name for the next design."""
         try:
             device = self.job.device(self.settings)
             assembly = self._circumstance("assembly")
@@ -415,16 +424,19 @@ class Design:
         return point
 
     def _circumstance(self, key: str) -> Any:
+        """The value of a circumstance: the design's own, else that of all designs; None for neither."""
         return self.settings.get(key, self.job.fixed_circumstances.get(key))
 
 
 def _status_of(error: OutOfReach | Singular | BeyondLimit) -> int:
+    """The status of a design whose handle position this error refuses."""
     if isinstance(error, BeyondLimit):
         return BEYOND_LIMIT
     return OUT_OF_REACH if isinstance(error, OutOfReach) else SINGULAR
 
 
 def _error_text(error: Exception) -> str:
+    """An error on one line, with all faults of a device."""
     if not isinstance(error, DeviceError):
         return str(error)
     return "; ".join(": ".join(filter(None, (fault.key, fault.message))) for fault in error.faults)

@@ -90,6 +90,7 @@ def demands_of(given: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _shape_faults(given: Mapping[str, Any], device: Device) -> Iterator[Fault]:
+    """Faults of the keys of [task] that describe the shape and its points."""
     shapes = [key for key in SHAPES if key in given]
     if len(shapes) > 1:
         yield ((shapes[1],), f"and {shapes[0]} exclude each other; remove one of them")
@@ -113,7 +114,10 @@ def _shape_faults(given: Mapping[str, Any], device: Device) -> Iterator[Fault]:
 def _positions(
     given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
 ) -> Floats | None:
-    """Positions (n, 3) of the shape's points; None without a mechanism."""
+    """Positions (n, 3) of the shape's points, or the reference [m]; None without a mechanism, and with faults.
+
+    given  the table [task]
+    """
     if device.mechanism is None:
         return None
     count = given.get("count")
@@ -126,7 +130,7 @@ def _positions(
             if len(each) != len(box):
                 faults.append((("count",), f"must be one number, or {len(box)} for the axes of box_m"))
                 return None
-            lines = [_line(span, PER_AXIS if n is None else n, finer) for span, n in zip(box, each, strict=True)]
+            lines = [_steps(span, PER_AXIS if n is None else n, finer) for span, n in zip(box, each, strict=True)]
             corners = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(box))
             return np.array([device.position(point) for point in corners.tolist()])
         if "radius_m" in given:
@@ -144,8 +148,11 @@ def _positions(
     return np.asarray(point.posture.position, dtype=np.float64)[None] if point.posture is not None else None
 
 
-def _line(span: Sequence[float], count: int, finer: int) -> Floats:
-    """Coordinates along one axis of a box; a single one where it has no extent, or one point is wanted."""
+def _steps(span: Sequence[float], count: int, finer: int) -> Floats:
+    """Coordinates (k,) along one axis of a box [m]; the middle alone where it has no extent, or for one point.
+
+    finer  as for `task_of`
+    """
     low, high = map(float, span)
     if low == high or count == 1:
         return np.array([0.5 * (low + high)])
@@ -168,7 +175,7 @@ def _round_points(rings: int, solid: bool) -> Floats:
 def _directions(
     given: Mapping[str, Any], document: Mapping[str, Any], device: Device, faults: list[Fault], finer: int
 ) -> Floats | None:
-    """Unit vectors (d, 3) along which walls are rendered; None: the device's own."""
+    """Unit vectors (d, 3) along which walls are rendered; None: the device's own, or there are faults."""
     wanted = given.get("directions")
     if device.mechanism is None or wanted is None:
         return None

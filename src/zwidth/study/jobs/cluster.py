@@ -43,7 +43,7 @@ LOST: Final = 3  # times that the workers of a range may end, one after the othe
 
 
 class Cluster:
-    """A cluster as an executor, see `executor_interface.Executor`.
+    """A cluster as an executor, see `executor.Executor`.
 
     address     of the scheduler, or "local": workers of its own on this computer
     workers     number of local ones; None: one for each core
@@ -74,6 +74,7 @@ class Cluster:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """End the run's processes on the workers, leave the scheduler and let dask's loggers speak again."""
         client, self._client = self._client, None
         if client is not None:
             with suppress(Exception):
@@ -138,12 +139,13 @@ class Cluster:
         return lost
 
     def _connect(self) -> Client:
+        """The client; the first call connects it and checks its workers. Raises ClusterError where that fails."""
         if self._client is not None:
             return self._client
         from distributed import Client, LocalCluster
 
         self._silence()
-        if self.address != LOCAL and (fault := _no_answer(self.address)):
+        if self.address != LOCAL and (fault := _connection_message(self.address)):
             self.__exit__(None, None, None)
             raise ClusterError(fault)
         where: Any = self.address
@@ -171,7 +173,7 @@ class Cluster:
         return self._client
 
     def _silence(self) -> None:
-        """Let dask be silent here: what it has to say of a lost connection, an error says in one line."""
+        """Raise the levels of dask's loggers until `__exit__`: a ClusterError says in one line what they would."""
         for name in [*logging.root.manager.loggerDict, "distributed"]:
             logger = logging.getLogger(name)
             if name.startswith(("distributed", "tornado", "asyncio")) and logger.level < logging.CRITICAL:
@@ -203,25 +205,25 @@ class Cluster:
 
 
 class _Tasks:
-    """The ranges of a job that are on their way through a cluster."""
+    """The ranges of one job's cells that were sent to a cluster and are not finished."""
 
     def __init__(self, cluster: Cluster, client: Client, job: PackedJob) -> None:
         self.cluster, self.client = cluster, client
         # sent once, and from worker to worker; the scheduler can have it made again where a worker has ended
-        self.job = client.submit(_itself, job, key=f"zwidth-job-{job.key}-{secrets.token_hex(4)}")
+        self.job = client.submit(_job_itself, job, key=f"zwidth-job-{job.key}-{secrets.token_hex(4)}")
         self.replies: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self.running: dict[Future, tuple[CellRange, int]] = {}  # future -> range, and how often it was lost
         self.events: list[str] = []
         self._looked = monotonic()
 
     def finished(self, ranges: Iterable[CellRange]) -> Generator[tuple[CellRange, Batch], None, None]:
-        """The ranges with their cells, as they are finished."""
+        """Send ranges of cells, and yield each with its batch as it is finished."""
         coming = iter(ranges)
         self._fill(coming)
         while self.running:
-            future = self._next()
+            future = self._next_finished()
             task, lost = self.running.pop(future, ((0, 0), -1))
-            if lost < 0:
+            if lost < 0:  # is not one of those that run
                 continue
             batch = self._result(future, task, lost)
             self._fill(coming)
@@ -243,6 +245,7 @@ class _Tasks:
             self._send(task, 0)
 
     def _send(self, task: CellRange, lost: int) -> None:
+        """Have a range of cells computed by a worker; its workers have ended `lost` times before."""
         cluster = self.cluster
         future = self.client.submit(
             compute_on_worker,
@@ -257,15 +260,15 @@ class _Tasks:
         self.running[future] = task, lost
         future.add_done_callback(self.replies.put)
 
-    def _next(self) -> Future:
+    def _next_finished(self) -> Future:
         """A future that is finished, one way or other. Raises ClusterEnded where the scheduler has ended."""
         while True:
             if monotonic() - self._looked > LOOK:
-                self._look()
+                self._check_scheduler()
             with suppress(queue.Empty):
                 return self.replies.get(timeout=LOOK)
 
-    def _look(self) -> None:
+    def _check_scheduler(self) -> None:
         """See whether the scheduler is there, and all its workers."""
         self._looked = monotonic()
         if not _is_connected(self.client):
@@ -289,12 +292,13 @@ class _Tasks:
         return batch
 
 
-def _itself(job: PackedJob) -> PackedJob:
+def _job_itself(job: PackedJob) -> PackedJob:
+    """The job, as the result of a task: so the cluster holds it once, and each range only refers to it."""
     return job
 
 
 def _within(seconds: float, call: Callable[[], Any]) -> Any:
-    """What a call returns; None where it does not return in time, or raises.
+    """What a call returns; None where it does not return within `seconds`, or raises.
 
     A call of dask waits for ever for a scheduler that is there and does nothing; a thread of its own does.
     """
@@ -311,6 +315,7 @@ def _within(seconds: float, call: Callable[[], Any]) -> Any:
 
 
 def _is_connected(client: Client) -> bool:
+    """Whether the connection of a client to its scheduler is open."""
     communication = client.scheduler_comm
     return client.status == "running" and communication is not None and not communication.comm.closed()
 
@@ -324,11 +329,12 @@ def _is_of_connection(error: Exception) -> bool:
 
 
 def _workers_of(client: Client) -> dict[str, int]:
+    """Address -> number of threads of each worker."""
     return {str(address): int(threads) for address, threads in client.nthreads().items()}
 
 
 def _versions_there() -> Callable[[], dict[str, str]]:
-    """`cluster_worker.versions` as a function that a worker without zwidth can be sent: it is sent as code."""
+    """A function that returns `workers.versions`, {} without zwidth; nested, so that dask sends it as code."""
 
     def ask() -> dict[str, str]:
         try:
@@ -344,8 +350,8 @@ def _versions_there() -> Callable[[], dict[str, str]]:
     return ask
 
 
-def _no_answer(address: str) -> str:
-    """Why nobody can talk to a scheduler at this address; "" where it answers.
+def _connection_message(address: str) -> str:
+    """Message: why a client cannot talk to a scheduler at this address, and what to do; "" where it answers.
 
     Asked beforehand, and by a thread that is left alone after a while: a client would wait for ever for a program
     that takes the call and says nothing.

@@ -3,13 +3,7 @@
     run(job, Store(path, job), progress)
 
 Cells are computed in batches of consecutive ones. Results do not depend on the batches, nor on the process
-that computes them.
-
-How many cells of a job make a batch.
-
-What computes the batches of jobs: processes of this computer, or a cluster.
-
-Processes of this computer that compute ranges of jobs in parallel.
+that computes them: this one, others of this computer (`Processes`), or a cluster.
 """
 
 from __future__ import annotations
@@ -116,7 +110,7 @@ def run_job(
             stack.enter_context(store.locked())
         packed, executor = _executor_for(job, stack, processor, workers, time_limit, cluster, executor)
         slots = (workers or cores()) if executor is None else executor.slots
-        size = _size(job, store, batch, slots, processor, executor, packed)
+        size = _cells_per_batch(job, store, batch, slots, processor, executor, packed)
         stack.enter_context(computing_on(processor))
         plan = _Plan(job, store, size, executor.time_limit if executor is not None else None, again)
         if executor is not None and packed is not None:
@@ -128,7 +122,8 @@ def run_job(
 
 def check_cells(count: int, measures: int) -> None:
     """Raise TooLarge where the cells of a job would not fit into memory."""
-    numbers = 2.0 * count * measures * 9 / 8  # values and status, and a copy while they are put together
+    # 8 bytes of value and 1 of status, in numbers of 8 bytes; twice, for a copy while they are put together
+    numbers = 2.0 * count * measures * 9 / 8
     check_memory(numbers, f"{count} cells of {measures} measures", "ask for fewer, or keep them in a store")
 
 
@@ -141,7 +136,10 @@ def _executor_for(
     cluster: str | None,
     executor: Executor | None,
 ) -> tuple[PackedJob | None, Executor | None]:
-    """The packed job and what computes all of it; None: this process does, at least at first."""
+    """The packed job and the executor that computes all its cells; None, None: this process begins by itself.
+
+    stack  ends an executor that is opened here
+    """
     if executor is not None and (workers, time_limit, cluster) != (None, None, None):
         raise ValueError("an executor has its own workers, time limit and cluster; give either it or them")
     if executor is None and time_limit is None and cluster is None:
@@ -162,7 +160,7 @@ def _executor_for(
     return packed, executor
 
 
-def _size(
+def _cells_per_batch(
     job: Job,
     store: Store | None,
     batch: int | None,
@@ -171,7 +169,7 @@ def _size(
     executor: Executor | None,
     packed: PackedJob | None,
 ) -> int:
-    """Cells per batch; a store is begun with it."""
+    """Number of cells per batch: the store's, the one given, or one measured; a new store is begun with it."""
     if store is not None and store.batch is not None:
         return store.batch
     if processor == "cuda":
@@ -181,7 +179,7 @@ def _size(
     elif executor is None or packed is None:
         size = batch_size(job.compute, job.count, slots)
     elif store is None and job.count <= SMALL:
-        size = -(-job.count // (4 * executor.slots)) or 1
+        size = -(-job.count // (4 * executor.slots)) or 1  # so that no slot waits long for the last batch
     else:
         size = batch_size(lambda first, last: _drain(executor, packed, first, last), job.count, slots)
     if store is not None:
@@ -190,7 +188,7 @@ def _size(
 
 
 def _drain(executor: Executor, packed: PackedJob, first: int, last: int) -> None:
-    """Compute a range by an executor for the time it takes."""
+    """Compute cells first to last - 1 by an executor and drop them: only the time it takes is wanted."""
     with closing(executor.compute(packed, [(first, last)])) as batches:
         for _ in batches:
             pass
@@ -199,6 +197,7 @@ def _drain(executor: Executor, packed: PackedJob, first: int, last: int) -> None
 class _Plan:
     """Which batches of a job are to be computed.
 
+    size   cells per batch
     left   number of cells that are to be computed
     done   (batches,)  whether each is there
     """
@@ -209,7 +208,7 @@ class _Plan:
         self.count, self.size = job.count, size
         self.done: Flags = np.zeros(-(-job.count // size), dtype=bool)
         if store is not None:
-            self.done = store.done(time_limit if again else 0.0)
+            self.done = store.done(time_limit if again else 0.0)  # 0: cells out of time stay so
             store.limit_time(time_limit)
         self.left = sum(last - first for first, last in self.ranges())
 
@@ -228,7 +227,7 @@ def _collect(
     progress: Progress | None,
     stage: str,
 ) -> Cells:
-    """Take the batches as they are finished, and put them where they are kept."""
+    """Write batches to the store, else into memory, as they are finished; return all cells."""
     total, done = job.count, job.count - plan.left
     memory = None if store is not None else _CellCollection(job)
     events, fault = _Events(), _Fault(plan.left if not done else -1)
@@ -283,18 +282,20 @@ class _CellCollection:
 
 
 class _Events:
-    """Tells of processes that were lost."""
+    """Warns of processes that were lost: of MOST_EVENTS one by one, of the others by their number."""
 
     def __init__(self) -> None:
         self.count = 0
 
     def tell(self, events: tuple[str, ...]) -> None:
+        """Warn of each lost process, a sentence each, until there were MOST_EVENTS."""
         for event in events:
             self.count += 1
             if self.count <= MOST_EVENTS:
                 warnings.warn(event, RecoveredWarning, stacklevel=4)
 
     def close(self) -> None:
+        """Warn of the number of further lost processes."""
         if self.count > MOST_EVENTS:
             more = f"{self.count - MOST_EVENTS} more processes that computed were lost, and their cells recovered"
             warnings.warn(more, RecoveredWarning, stacklevel=4)
@@ -303,16 +304,16 @@ class _Events:
 class _Fault:
     """Holds batches back until it is certain that the job has no fault that every cell meets.
 
-    left  number of cells to come; -1: some cells are known already
+    left  number of cells to come; -1: there is a cell without the fault
     """
 
     def __init__(self, left: int) -> None:
         self.left = left
         self.held: list[tuple[int, CellValues]] = []
-        self.count, self.text = 0, ""
+        self.count, self.text = 0, ""  # of the cells held, and of the error that each of them raised
 
     def sift(self, first: int, batch: Batch) -> Iterator[tuple[int, CellValues]]:
-        """The batches that may be kept. Raises the error that all cells raise."""
+        """Take a batch; yield those that may be kept, with their first cells. Raises the error of all cells."""
         self.held.append((first, batch.cells))
         error = batch.error
         if self.left >= 0 and error is not None and (not self.count or str(error) == self.text):
@@ -373,7 +374,7 @@ def batch_size(compute: Callable[[int, int], object], count: int, slots: int) ->
         first = int(place * (count - size))
         place = (place + GOLDEN) % 1.0
         try:
-            seconds = _seconds(compute, first, first + size)
+            seconds = _computing_time(compute, first, first + size)
         except Exception as error:
             if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
                 raise  # ctrl-C during a call of compiled code
@@ -385,8 +386,8 @@ def batch_size(compute: Callable[[int, int], object], count: int, slots: int) ->
     return most if failed < FAILED_TRIALS else max(1, min(most, size))
 
 
-def _seconds(compute: Callable[[int, int], object], first: int, last: int) -> float:
-    """The time that some cells take; of those that take long, the second time."""
+def _computing_time(compute: Callable[[int, int], object], first: int, last: int) -> float:
+    """Time to compute cells first to last - 1 [s]; from TRIAL on that of a second run: the first may load code."""
     seconds = 0.0
     for _ in range(2):
         began = perf_counter()
@@ -552,10 +553,12 @@ class _Feed:
                 self.replies.get_nowait()
 
     def _next(self) -> CellRange | None:
+        """The next range; None where there are no more."""
         with self.lock:
             return next(self.ranges, None)
 
     def _put(self, reply: Reply | None) -> None:
+        """Queue a reply, None for a thread that ends; wait while the queue is full, but not after `stop`."""
         while True:
             try:
                 self.replies.put(reply, timeout=0.1)

@@ -81,7 +81,7 @@ class Journal:
         if path.exists() and not path.is_file():
             raise StoreError(f"{path.name or path}: is not an ordinary file; name another")
         data = path.read_bytes() if path.exists() else b""
-        lines = _read(path, data.split(b"\n")[:-1], data != b"", question)
+        lines = _lines_to_keep(path, data.split(b"\n")[:-1], data != b"", question)
         self.known = {entry["name"]: entry["value"] for entry in map(read_checked_line, lines[1:])}
         if (text := b"".join(line + b"\n" for line in lines)) != data:
             path.write_bytes(text)
@@ -103,8 +103,8 @@ class Journal:
         return self.known[name]
 
 
-def _read(path: Path, lines: list[bytes], not_empty: bool, question: str) -> list[bytes]:
-    """The lines up to the first that is damaged; for a journal of another question, a new first line alone."""
+def _lines_to_keep(path: Path, lines: list[bytes], not_empty: bool, question: str) -> list[bytes]:
+    """The lines of a journal to keep: up to the first damaged one; of another question, a new first line alone."""
     first = json.dumps({"version": STORE_VERSION, "question": question}).encode()
     header = _entry(lines[0]) if lines else {}
     if message := newer_version_message(header.get("version"), STORE_VERSION):

@@ -98,6 +98,8 @@ class JobSeries:
     def _is_kept_for(self, own: dict[str, str]) -> bool:
         """Whether the folder says that it keeps this question's work. Raises StoreError where it keeps another's.
 
+        own  "question" and "study": fingerprints of this question with the release, and without it
+
         Without a store no work is lost, whatever it says. A folder with stores and without a fingerprint is of an
         older layout: it is recognised by its stores, one after another.
         """
@@ -137,7 +139,7 @@ class JobSeries:
         """
         whole = job.count if of is None else of
 
-        def told(said: str, now: int, _: int) -> None:
+        def report(said: str, now: int, _: int) -> None:
             if self.progress is not None:
                 self.progress(said, min(done + now, whole), whole)
 
@@ -157,7 +159,7 @@ class JobSeries:
         cells = run_job(
             job,
             store,
-            told,
+            report,
             1 if executor is None else None,
             batch=batch if batch < SMALL else None,
             stage=stage,
@@ -181,6 +183,7 @@ class JobSeries:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """End the processes and release the folder, whose lock file is removed."""
         self._stack.close()
         if self.folder is not None and self._lock.held:
             self._lock.release()

@@ -197,9 +197,11 @@ class Store:
             shutil.rmtree(self.path, ignore_errors=True)
 
     def _is_there(self) -> bool:
+        """Whether there is something at the path but an empty folder."""
         return self.path.exists() and not (self.path.is_dir() and not any(self.path.iterdir()))
 
     def _acquire(self, folder: Path) -> None:
+        """Lock the folder. Raises StoreError where another run holds the lock."""
         if not self._lock.acquire(folder):
             raise StoreError(
                 f"{self.path.name}: {owner_of(folder)} is computing into it; wait until that has ended, or name "
@@ -207,6 +209,7 @@ class Store:
             )
 
     def _create_arrays(self, group: Any, batch: int) -> None:
+        """Create the empty arrays of values and status, in chunks of `batch` cells with checksums."""
         from zarr.codecs import Crc32cCodec, ZstdCodec
 
         # the checksum stands last, over the bytes that lie on the disk
@@ -246,7 +249,7 @@ class Store:
         return float(limit) if isinstance(limit, int | float) else 0.0
 
     def _open(self) -> None:
-        """Open the folder: a store of this question, or something that is refused."""
+        """Open the folder. Raises StoreError where it is not the undamaged store of this question and release."""
         import zarr
 
         other = StoreError(f"{self.path.name}: is not the store of a study; name another folder, or remove it")
@@ -280,6 +283,7 @@ class Store:
         self.batch = batch
 
     def _check_disk(self) -> None:
+        """Raise StoreError where the cells of the job would not fit on the disk of the folder."""
         folder = next((p for p in (self.path, *self.path.absolute().parents) if p.exists()), Path())
         free, wanted = shutil.disk_usage(folder).free, float(PER_CELL) * self.count * len(self.measures)
         if wanted > free:
@@ -297,12 +301,12 @@ def _digest_of(attributes: Mapping[str, Any]) -> str:
 
 
 def _descriptions(folder: Path) -> dict[str, str]:
-    """Digests of the descriptions of a store's arrays."""
+    """Array's name -> digest of the file that describes it."""
     return {name: hashlib.sha256((folder / name / DESCRIPTION).read_bytes()).hexdigest() for name in ARRAYS}
 
 
 def _digest_of_cells(values: Floats, status: NDArray[np.uint8]) -> int:
-    """Digest of a batch's numbers; all nan are alike, of which zarr keeps none apart."""
+    """CRC-32 of a batch's numbers; of all nan alike, since zarr may give back another nan than was written."""
     plain = np.where(np.isnan(values), np.nan, values).astype("<f8")
     return zlib.crc32(np.asarray(status, dtype=np.uint8).tobytes(), zlib.crc32(plain.tobytes()))
 
@@ -358,6 +362,7 @@ class StoredCells:
         return CellValues(self.values, self.status, self.notes)
 
     def _check(self) -> None:
+        """Raise TooLarge where all cells would not fit into memory."""
         count, measures = self.store.count, len(self.store.measures)
         check_memory(
             2.0 * count * measures * PER_CELL / 8,

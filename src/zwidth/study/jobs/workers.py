@@ -5,15 +5,12 @@ for linear algebra, fed through pipes. The caller's main script is not run in it
 needs no guard. Ctrl-C does not reach it: the process that started it ends it, and if that one is killed, the
 system ends it, even amid compiled code.
 
-What a worker of a dask cluster does: it hands each range to a process of its own, as on a single computer.
+A worker of a dask cluster hands each range to a process of its own, as on a single computer: a cell that ends its
+process, or never ends, is treated alike in both, and numba and linear algebra have one thread for each range.
 
-So a cell that ends its process, or never ends, is treated alike in both, and numba and linear algebra have one
-thread for each range.
-
-Compute a range of cells although some of them raise, end their process or never end.
-
-A range that fails is cut into pieces, and these again, down to the cells that cannot be computed. These become
-data: a status and a reason. All others get their values, the same as in any other division of the job.
+A range in which cells raise, end their process or never end is cut into pieces, and these again, down to the cells
+that cannot be computed. These become data: a status and a reason. All others get their values, the same as in any
+other division of the job.
 """
 
 from __future__ import annotations
@@ -166,6 +163,7 @@ class WorkerProcess:
         self._jobs = [*self._jobs, job.key][-MOST_JOBS:]
 
     def _start(self) -> None:
+        """Start the process and wait until it answers. Raises CannotStart after STARTS tries."""
         environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
         command = [sys.executable, "-c", START, json.dumps(sys.path)]
         for left in reversed(range(STARTS)):
@@ -194,7 +192,7 @@ class WorkerProcess:
                 return
 
     def _ask(self, message: tuple[Any, ...], limit: float | None) -> Any:
-        """Send a message and return what the process answers."""
+        """Send a message; return the reply's content. Raises OutOfTime after `limit` [s], without compiling."""
         process = self.process
         if process is None:  # ended by another thread
             raise WorkerLost("the run was ended")
@@ -207,27 +205,29 @@ class WorkerProcess:
                 if clock is not None:
                     clock.run(not reply[1])
         except (OSError, ValueError) as error:  # ValueError: closed by `end`
-            raise WorkerLost(self._lost(process, error)) from None
+            raise WorkerLost(self._forget(process, error)) from None
         finally:
             if clock is not None:
                 clock.run(False)
-        if reply[0] == "raised":
-            raise reply[1]
-        return reply[1]
+        kind, content = reply
+        if kind == "raised":
+            raise content
+        return content
 
     def _read(self, process: subprocess.Popen[bytes], clock: _Clock | None = None) -> tuple[str, Any]:
+        """Kind and content of the next reply. Raises WorkerLost; OutOfTime where the clock ended the process."""
         assert process.stdout is not None
         try:
             reply: tuple[str, Any] = pickle.load(process.stdout)
         except (EOFError, OSError, ValueError, pickle.UnpicklingError) as error:
-            text = self._lost(process, error)
+            text = self._forget(process, error)
             if clock is not None and clock.over:
                 raise OutOfTime(f"took longer than {self.time_limit:g} s") from None
             raise WorkerLost(text) from None
         return reply
 
-    def _lost(self, process: subprocess.Popen[bytes], error: Exception) -> str:
-        """Forget the process. Returns how it ended."""
+    def _forget(self, process: subprocess.Popen[bytes], error: Exception) -> str:
+        """Forget a process that answers no more. Returns how it ended, in words."""
         code: int | None = None
         with suppress(subprocess.TimeoutExpired):
             code = process.wait(GRACE)
@@ -300,6 +300,7 @@ def work() -> None:
         sent.flush()
 
     def compiling(_: str, ended: bool) -> None:
+        """Reply that the process begins or ends to compile: `depth` counts functions amid compiling."""
         nonlocal depth
         depth += -1 if ended else 1
         if depth == (0 if ended else 1):
@@ -343,6 +344,7 @@ class ended_with_its_starter:
         self._set(False)
 
     def _set(self, on: bool) -> None:
+        """Have the system send SIGIO when the input closes, or no longer."""
         with suppress(ImportError, AttributeError, OSError):
             import fcntl
             import select
@@ -453,7 +455,7 @@ def different(own: dict[str, str], expected: dict[str, str]) -> str:
 PIECES: Final = 8  # into which a range that failed is cut
 TRIES: Final = 2  # of a range that ended its process: another program may have ended it, or a lack of memory
 TRIES_ALONE: Final = 3  # of a single cell
-UNLIMITED: Final = 10**12
+UNLIMITED: Final = 10**12  # notes: a batch keeps all of its own
 
 Attempt = Callable[[int, int], CellValues]
 
@@ -494,7 +496,7 @@ def compute_range(attempt: Attempt, measures: int, first: int, last: int) -> Bat
     ranges = [(first, last)]
     while ranges:
         begin, end = ranges.pop()
-        found = _attempt(attempt, begin, end, events)
+        found = _attempt_several_times(attempt, begin, end, events)
         if isinstance(found, CellValues):
             parts.append(found)
             errors.append(None)
@@ -509,10 +511,13 @@ def compute_range(attempt: Attempt, measures: int, first: int, last: int) -> Bat
     return Batch(_join(parts, measures), tuple(events), errors[0] if same else None)
 
 
-def _attempt(
+def _attempt_several_times(
     attempt: Attempt, first: int, last: int, events: list[str]
 ) -> CellValues | tuple[int, str, Exception | None]:
-    """The cells, or the status and the reason why there are none, and the error that says so."""
+    """Cells first to last - 1, tried several times; or status, reason and error why there are none.
+
+    events  gets a sentence for each process that was lost
+    """
     tries = TRIES if last - first > 1 else TRIES_ALONE
     for left in reversed(range(tries)):
         try:
@@ -521,7 +526,7 @@ def _attempt(
             raise
         except WorkerLost as error:
             again = "computed again" if left or last - first > 1 else "left out"
-            events.append(f"{error}; {_cells(first, last)} {again}")
+            events.append(f"{error}; {_cells_in_words(first, last)} {again}")
             lost = error
         except OutOfTime as error:
             return OUT_OF_TIME, str(error), None
@@ -536,7 +541,8 @@ def _first_line(error: Exception) -> str:
     return str(error).splitlines()[0] if str(error) else "without a message"
 
 
-def _cells(first: int, last: int) -> str:
+def _cells_in_words(first: int, last: int) -> str:
+    """Numbers of the cells with their verb, for a message."""
     return f"number {first} is" if last - first == 1 else f"numbers {first} to {last - 1} are"
 
 
@@ -552,6 +558,7 @@ def _cut(first: int, last: int) -> list[tuple[int, int]]:
 
 
 def _join(parts: list[CellValues], measures: int) -> CellValues:
+    """Consecutive pieces of cells as one."""
     if len(parts) == 1:
         return parts[0]
     notes = (merge_notes([note for part in parts for note in part.notes[m]], UNLIMITED) for m in range(measures))

@@ -18,6 +18,7 @@ from zwidth.measures.definition import NO_VALUE, OK, MeasureValues, Note
 from zwidth.measures.workspace_statistics import global_conditioning_index, overall
 from zwidth.study.designs.column import Column
 from zwidth.study.designs.sampling import CIRCUMSTANCES, Axis, Sampling
+from zwidth.study.designs.study import Study
 from zwidth.study.designs.sweep_job import SweepJob, sweep_job
 from zwidth.study.jobs.job import CellValues
 from zwidth.study.jobs.journal import fingerprint
@@ -78,10 +79,10 @@ class EvaluationJob:
 class DesignJudgement:
     """What k designs are worth.
 
-    values     (k, c)  of each column; nan where there is none
+    values     (k, c)  of each of c columns; nan where there is none
     status     (k, c)  as in `measures.definition`
     absent     (k, c)  share of the points at which the column has no value
-    cells      (k, c, w)  the column's values at all points, member by member
+    cells      (k, c, w)  the column's values at all w points, member by member
     """
 
     values: Floats
@@ -90,6 +91,7 @@ class DesignJudgement:
     cells: Floats
 
     def __getitem__(self, index: Any) -> DesignJudgement:
+        """Some of the designs."""
         return DesignJudgement(self.values[index], self.status[index], self.absent[index], self.cells[index])
 
     def followed_by(self, other: DesignJudgement) -> DesignJudgement:
@@ -119,6 +121,7 @@ class DesignJudgement:
         return violated
 
     def _without(self, column: int) -> Floats:
+        """Violation by which a design counts that has no value in a column (k,), see `violations`."""
         return np.asarray(MOST_VIOLATED * (1.0 + self.absent[:, column]))
 
 
@@ -147,7 +150,7 @@ class Judge:
         self._devices = 1 + drawn
         study = replace(problem.study, columns=problem.columns)
         try:
-            self._sweep = replace(sweep_job(_small(study)), cells=True)
+            self._sweep = replace(sweep_job(_three_designs(study)), cells=True)
         except MissingMeasures as error:
             names = [column.name for column in problem.columns]
             faults = [(problem.paths[names.index(name)], f"{name} {why}") for name, why in error.refused.items()]
@@ -178,7 +181,10 @@ class Judge:
     def _produced(
         self, changes: MemberChanges, columns: dict[str, list[Any]], count: int
     ) -> dict[str, list[list[Any]]]:
-        """Path -> for each design the number as it is, and as it is produced, of each number with a tolerance."""
+        """Path of each number with a tolerance -> for each design the number as it is, then as it is produced.
+
+        columns  path -> value of each of `count` designs, of the numbers that designs set
+        """
         document = self.problem.study.device.document
         variables = {address.resolve(document, key): key for key in columns if key not in CIRCUMSTANCES}
         produced: dict[str, list[list[Any]]] = {}
@@ -217,7 +223,7 @@ class Judge:
         return values
 
     def _cells(self, found: CellValues) -> tuple[Floats, NDArray[np.uint8]]:
-        """Values and status (k, c, members, w), produced devices the faster among the members."""
+        """Values and status (k, c, members, w) of a job's cells; members: each operator, with each device."""
         k, columns = len(found.values), len(self.problem.columns)
         shape = (k, len(self.problem.members) * self._devices, columns, -1)
         return np.moveaxis(found.values.reshape(shape), 1, 2), np.moveaxis(found.status.reshape(shape), 1, 2)
@@ -230,6 +236,7 @@ class Judge:
 
     @cached_property
     def _weights(self) -> Floats | None:
+        """Area of each position of the workspace [m²]; None without a workspace."""
         return None if self._sweep.weights is None else self._sweep.weights.ravel()
 
     def _reduce(self, column: Column, cells: Floats, status: NDArray[np.uint8]) -> tuple[float, int]:
@@ -249,8 +256,8 @@ class Judge:
         return value, NO_VALUE if np.isnan(value) else OK
 
 
-def _small(study: Any) -> Any:
-    """The study with the designs at the ends and in the middle of its bounds, for checks."""
+def _three_designs(study: Study) -> Study:
+    """The study with three designs, at the ends and in the middle of its bounds: checks need no more."""
     from zwidth.study.optimisation.search import values_at
 
     axes = study.sampling.axes

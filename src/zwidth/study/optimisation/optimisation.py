@@ -1,8 +1,7 @@
 """`Optimisation`: the best designs found, beside the device as it is, and how they were found.
 
-Fronts: designs of which none is better in every objective, what they dominate, and their knee.
-
-The front's designs looked at again: on a finer grid of the task, and in nonlinear simulation.
+They form a front: designs of which none is better in every objective. Its designs are looked at again: on a finer
+grid of the task, as produced within tolerances, and in nonlinear simulation.
 """
 
 from __future__ import annotations
@@ -124,7 +123,7 @@ class Optimisation(Result):
 
     @property
     def word(self) -> str:
-        """What the design at `knee` is called."""
+        """Name of the design at `knee` in texts: "best found" or "knee"."""
         return BEST_FOUND if len(self.problem.objectives) == 1 else "knee"
 
     @property
@@ -156,14 +155,14 @@ class Optimisation(Result):
         for objective in self.problem.objectives:
             column = self.problem.columns[objective.column]
             if not (self.judgement.status[:, objective.column] == OK).any():
-                return self._nowhere(objective.column, f"{column.name} has no value in any design tried")
+                return self._with_cause(objective.column, f"{column.name} has no value in any design tried")
         records = sorted(self.demands, key=lambda one: one.kept)
         if not records:
             return "no design tried has a value in every objective"
         first = records[0]
         column = self.problem.columns[first.demand.column]
         if np.isnan(first.best):
-            return self._nowhere(
+            return self._with_cause(
                 first.demand.column, f"no design tried keeps {first.demand.full_text}: it has no value"
             )
         if not first.kept:
@@ -172,8 +171,8 @@ class Optimisation(Result):
         each = "; ".join(f"{one.demand.full_text} is kept by {one.kept:.1%}" for one in records)
         return f"no design tried keeps all demands together: {each}"
 
-    def _nowhere(self, column: int, sentence: str) -> str:
-        """A sentence with the commonest cause."""
+    def _with_cause(self, column: int, sentence: str) -> str:
+        """The sentence, with how many designs have which status in the column, and the first reason."""
         kinds, counts = np.unique(self.judgement.status[:, column], return_counts=True)
         why = "; ".join(f"{n} {STATUS[int(kind)]}" for kind, n in zip(kinds, counts, strict=True))
         notes = self.notes.get(self.problem.columns[column].name, ())
@@ -195,7 +194,7 @@ class Optimisation(Result):
 
     @cached_property
     def not_judged(self) -> tuple[NotJudged, ...]:
-        """Designs that failed or ran out of time, by which; they keep no demand."""
+        """Designs without values because they failed, or ran out of time; they keep no demand."""
         lost = []
         for status in GIVEN_UP:
             count = int((self.judgement.status == status).any(axis=1).sum())
@@ -213,7 +212,7 @@ class Optimisation(Result):
         return {key: one for axis, value in pairs for key, (one,) in axis.columns([value])}
 
     def design(self, place: int) -> dict[str, Any]:
-        """The same, and the part that it takes of each catalogue."""
+        """The `settings` of a design of the front, and the part that it takes of each catalogue."""
         (values,) = values_at(self.problem.variables, self.shares[self.front[place], None])
         pairs = zip(self.problem.variables, values, strict=True)
         return {axis.key: value for axis, value in pairs if axis.parts} | self.settings(place)
@@ -274,6 +273,7 @@ class Optimisation(Result):
         }
 
     def _baseline_document(self, names: list[str]) -> dict[str, Any]:
+        """Values and status of the device as it is; `names` are those of the columns."""
         assert self.baseline is not None
         values, status = self.baseline.values[0].tolist(), self.baseline.status[0].tolist()
         return {
@@ -297,6 +297,7 @@ class Optimisation(Result):
         ]
 
     def _bars_document(self, bars: Bars, names: list[str]) -> list[dict[str, Any]]:
+        """The bars of each design of the front by key; `names` are those of the columns."""
         return [
             {
                 "devices": bars.devices,
@@ -326,6 +327,7 @@ def _end_of(axis: Axis, share: float) -> list[str]:
     """
     many = pieces(axis)
     if axis.span is not None:
+        # of whole numbers the share is in the middle of its piece
         if min(share, 1.0 - share) > (0.5 / many if many else 0.0) + AT_BOUND:
             return []
         return [f"{axis.key} at its {'upper' if share > 0.5 else 'lower'} bound"]
@@ -456,7 +458,8 @@ class Bars:
 
 
 def bars_of(problem: Problem, produced: Floats) -> Bars:
-    """Bars from the columns (devices, k, c) of designs: as they are, which is left out, and as produced."""
+    """Bars of k designs from their columns (1 + devices, k, c), of which the first, the designs as they are, is
+    left out."""
     drawn = produced[1:]
     kept = ~np.isnan(drawn).any(axis=-1)
     for demand in problem.demands:
@@ -482,7 +485,7 @@ def finer_problem(problem: Problem) -> Problem | None:
 
 
 def _points(task: Task) -> int:
-    """Number of points times directions."""
+    """Number of points times directions of a task."""
     return (0 if task.positions is None else len(task.positions)) * (
         1 if task.directions is None else len(task.directions)
     )
@@ -499,7 +502,7 @@ def simulate_front_contact(problem: Problem, design: dict[str, Any], cells: Sequ
     """
     try:
         point = worst_point(problem, design, cells)
-        wall = _wall(problem.study.wall, point)
+        wall = _wall_to_simulate(problem.study.wall, point)
         if wall is None:
             return Contact(reason="no wall with K > 0 and B >= 0 is stable where it is worst")
         motion = point.simulate(stiffness=wall[0], damping=wall[1])
@@ -508,7 +511,8 @@ def simulate_front_contact(problem: Problem, design: dict[str, Any], cells: Sequ
     return Contact(*wall, motion.stable, float(motion.amplitude))
 
 
-def _wall(wanted: WantedWall, point: OperatingPoint) -> tuple[float, float] | None:
+def _wall_to_simulate(wanted: WantedWall, point: OperatingPoint) -> tuple[float, float] | None:
+    """The wall to simulate, K [N/m] and B [N s/m]: see `simulate_front_contact`; None where none is stable."""
     if wanted.stiffness is not None and wanted.damping is not None:
         return wanted.stiffness, wanted.damping
     peak = largest_stiffness(point.loop)

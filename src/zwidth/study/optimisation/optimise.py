@@ -1,9 +1,9 @@
-"""Look for the best designs of a study: search, polish, and what the front is worth.
+"""Look for the best designs of a study: search, polish, and judge the front again.
 
 found = optimise("study.toml")
 found.values, found.knee
 
-The front's designs as device files, ready to use.
+`device_files`: the front's designs as device files, ready to use.
 """
 
 from __future__ import annotations
@@ -79,12 +79,12 @@ def optimise(
 
 
 def optimise_by(study: Study, series: JobSeries) -> Optimisation:
-    """The same, computed by a series of jobs."""
+    """Look for the best designs of a study, see `optimise`, by a series of jobs."""
     problem = problem_of(study)
     archive = _Archive(problem, series)
     series.begin(archive.question)
     baseline = archive.baseline()
-    start = _start(problem)
+    start = _own_shares(problem)
     alone = len(problem.objectives) == 1
     searching, spent = problem.budget - int((POLISHED_ALONE if alone else POLISHED) * problem.budget), 0
     for number, (shares, tell) in enumerate(generations(problem, searching, start), 1):
@@ -159,7 +159,10 @@ class _Archive:
         return bool((absent == 1.0).all(axis=0).any())
 
     def judge(self, shares: Floats, stage: str, of: int) -> DesignJudgement:
-        """Judge designs and keep those that are new."""
+        """The judgement of designs (n, v), of which those that are new are computed and kept.
+
+        stage, of  what progress is reported under, and the number of designs at its end
+        """
         places, new = [], list[int]()
         for n, row in enumerate(shares):
             if (key := row.tobytes()) not in self._places:
@@ -176,6 +179,7 @@ class _Archive:
         return self.judgement[places]
 
     def _run(self, designs: list[tuple[Any, ...]], stage: str, done: int, of: int) -> CellValues:
+        """Cells of the job that computes some designs."""
         return self._compute(self.judging.job(designs), stage, done, of)
 
     def _compute(self, job: EvaluationJob, stage: str, done: int, of: int) -> CellValues:
@@ -199,7 +203,7 @@ class _Archive:
         return undominated(costs)
 
     def best_apart(self) -> Ints:
-        """Some of the best designs that keep all demands, of a single objective, not close to each other."""
+        """Up to STARTS designs, best first, that keep all demands and lie APART; for a single objective."""
         kept = np.asarray(~self.judgement.violations(self.problem).any(axis=1))
         costs, shares = self.judgement.costs(self.problem)[:, 0], self.shares
         chosen: list[int] = []
@@ -217,7 +221,7 @@ class _Archive:
         return replace(found, finer=self._finer(best), bars=self._bars(best), contacts=self._contacts(found))
 
     def _bars(self, best: Ints) -> Bars | None:
-        """What tolerances make of the front; None without any."""
+        """Spread of the front's designs as produced within tolerances; None without any."""
         if not self.problem.tolerances or not len(best):
             return None
         judging = Judge(self.problem, PRODUCED)
@@ -226,7 +230,7 @@ class _Archive:
         return bars_of(self.problem, judging.judge_produced(cells))
 
     def _finer(self, best: Ints) -> DesignJudgement | None:
-        """The front on a finer grid of the task."""
+        """The judgement of the front's designs on a finer grid of the task; None where there is none."""
         problem = finer_problem(self.problem)
         if problem is None or not len(best):
             return None
@@ -246,6 +250,7 @@ class _Archive:
         return tuple(contacts)
 
     def _tell(self, stage: str, done: int, of: int) -> None:
+        """Report progress, where it is wanted."""
         if self.progress is not None:
             self.progress(stage, done, of)
 
@@ -260,13 +265,14 @@ def own_values(problem: Problem) -> list[Any]:
 
 
 def _has(document: dict[str, Any], key: str) -> bool:
+    """Whether a device file has something at a path."""
     try:
         return address.exists(document, key)
     except DeviceError:  # a circumstance, or a path that leads nowhere yet
         return False
 
 
-def _start(problem: Problem) -> Floats:
+def _own_shares(problem: Problem) -> Floats:
     """The device as it is, as shares (1, v), if it lies within the bounds; else none (0, v)."""
     own = own_values(problem)
     shares = [
@@ -323,11 +329,12 @@ def files_there(folder: Path, study: Study) -> tuple[list[Path], list[Path]]:
         return [], []
     name = re.compile(rf"{re.escape(_stem(study))}-\d+\.toml")
     named = [path for path in sorted(folder.iterdir()) if name.fullmatch(path.name)]
-    own = [path for path in named if _is_of(path, study)]
+    own = [path for path in named if _was_written_for(path, study)]
     return own, [path for path in named if path not in own]
 
 
-def _is_of(path: Path, study: Study) -> bool:
+def _was_written_for(path: Path, study: Study) -> bool:
+    """Whether a file was written for a design of this study: its text names the study as its source."""
     try:
         return f"{_origin(study)}, seed " in read_text(path, LARGEST_FILE)
     except FileError:
@@ -340,6 +347,7 @@ def _stem(study: Study) -> str:
 
 
 def _origin(study: Study) -> str:
+    """How files name the study that their design was found in."""
     return f"optimised, study {Path(study.label).name}"
 
 

@@ -131,8 +131,13 @@ def _extend_bundles(problem: Problem, designs: list[_Design], free: Ints, judge:
     around = 2 * len(free)
     for n, (one, shares, own) in enumerate(joining):
         beside = judged[n * around : (n + 1) * around]
-        pieces = [_pieces(problem, g.column, shares, own, free, beside, g.sign) for g in problem.objectives]
-        kept = [_pieces(problem, d.column, shares, own, free, beside, d.sign) for d in problem.demands]
+        pieces = [
+            _values_and_derivatives(problem, g.column, shares, own, free, beside, g.sign)
+            for g in problem.objectives
+        ]
+        kept = [
+            _values_and_derivatives(problem, d.column, shares, own, free, beside, d.sign) for d in problem.demands
+        ]
         one.bundle = [*one.bundle, _Linear(shares[free], pieces, kept)][-KEPT:]
         one.joining = []
     return len(joining) * around
@@ -148,7 +153,7 @@ def _try_all(problem: Problem, tried: list[tuple[_Design, Floats]], weights: Flo
 
 
 def _probes(one: _Design, free: Ints) -> Floats:
-    """Designs in which each of the free variables is changed by itself, up and down, by some amounts."""
+    """Designs (n, v) in which one of the free variables is changed, up or down, by PROBES of `one.probing`."""
     rows = []
     for amount in PROBES:
         for v in free.tolist():
@@ -169,6 +174,7 @@ def neighbouring_designs(shares: Floats, free: Ints) -> Floats:
 
 
 def _offsets(share: float) -> Floats:
+    """The two steps of a share from which a derivative is taken: down and up, both inward at a bound."""
     if share < STEP:
         return np.array([STEP, 2.0 * STEP])
     if share > 1.0 - STEP:
@@ -205,7 +211,7 @@ def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats
     own = one.judgement.costs(problem)[0]
     gain = np.append(np.zeros(count), -1.0)
     while one.reach >= SMALLEST:
-        rows, limits = [], []
+        rows, limits = [], []  # rows @ (step, s) <= limits
         for linear in one.bundle:
             away = x - linear.shares
             if np.abs(away).max() > NEAR * one.reach:
@@ -227,7 +233,7 @@ def _step(problem: Problem, one: _Design, free: Ints, weights: Floats) -> Floats
     return None
 
 
-def _pieces(
+def _values_and_derivatives(
     problem: Problem,
     column: int,
     shares: Floats,
@@ -249,13 +255,18 @@ def _pieces(
 
 
 def _trials(shares: Floats, free: Ints, step: Floats) -> Floats:
+    """Designs (l, v) to which a step (f,) of the free variables leads at each of l LENGTHS, within the bounds."""
     rows = np.repeat(shares[None], len(LENGTHS), axis=0)
     rows[:, free] = np.clip(rows[:, free] + np.outer(LENGTHS, step), 0.0, 1.0)
     return rows
 
 
 def _move(problem: Problem, one: _Design, tried: Floats, judged: DesignJudgement, weights: Floats) -> None:
-    """Go to the best of the designs tried, if it is better; and choose what is tried next."""
+    """Move a design to the best of those tried, if it is better; choose its next step, probes and bundle.
+
+    tried, judged  (n, v) shares, from the longest step to the shortest, and their judgement
+    weights        (m,) as for `polish`
+    """
     own = one.judgement.costs(problem)
     gains = ((own - judged.costs(problem)) / weights).min(axis=1)
     violated = judged.violations(problem).sum(axis=1)

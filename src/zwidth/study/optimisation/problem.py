@@ -178,7 +178,7 @@ def problem_of(study: Study) -> Problem:
 def _plane(
     document: dict[str, Any], device: Device | None, columns: Sequence[Column], faults: TableFaults
 ) -> PlaneGrid | None:
-    """The grid over the workspace of statistics; None with a task, or where no column is one."""
+    """The grid over the workspace for columns that are statistics; None with a task, or without such columns."""
     if "task" in document:
         return None
     return plane_of_study(document, device, columns, None, faults, as_key)
@@ -211,8 +211,12 @@ class _Requests:
         self._check_numbers(given)
 
     def _place(self, name: str, better: Better, path: KeyPath) -> int | None:
-        """Place among the columns of the one that a key names; None where it has a fault."""
-        overall = "task" in self.document
+        """Index in `columns`, to which it is added, of the column that a key names; None where it has a fault.
+
+        better  which values are to count as better
+        path    of the key in the study, for messages
+        """
+        overall = "task" in self.document  # of a column without a statistic the worst over its points
         try:
             column = column_named(name, self.user_measures, better)
         except ValueError as error:
@@ -234,6 +238,7 @@ class _Requests:
         return self.columns.index(column)
 
     def _read_objectives(self, given: dict[str, Any]) -> None:
+        """Take the objectives from the table [optimise]."""
         for name, goal in table(given, "objectives").items():
             if goal in ("max", "min") and name:
                 better: Better = "higher" if goal == "max" else "lower"
@@ -246,6 +251,7 @@ class _Requests:
                 self.faults.append((("optimise",), message))
 
     def _read_demands(self, given: dict[str, Any]) -> None:
+        """Take the demands from [task], and from the constraints in the table [optimise]."""
         for key, bound in demands_of(table(dict(self.document), "task")).items():
             measure, at_least = DEMANDS[key]
             at = self._place(measure, "higher" if at_least else "lower", ("task", key))
@@ -265,6 +271,7 @@ class _Requests:
             self.demands += [] if at is None else [Demand(name, at, at_least, value)]
 
     def _check_numbers(self, given: dict[str, Any]) -> None:
+        """Note a budget that is too small, and devices within tolerances where there are none."""
         budget = given.get("budget", BUDGET)
         if is_number(budget) and 1 <= budget < LEAST_BUDGET:
             message = f"must be at least {LEAST_BUDGET} designs, got {budget}"
@@ -281,6 +288,7 @@ def _misspelt(key: str, given: Mapping[str, Any], section: type[Section]) -> boo
 
 
 def _finite(text: str) -> float | None:
+    """The finite number that a text holds; None where it holds none."""
     try:
         value = float(text)
     except ValueError:

@@ -4,7 +4,7 @@ Deb, Pratap, Agarwal and Meyarivan 2002 (known by its implementation, pymoo's): 
 come before others, and those before each other by the sum of what they violate; then by fronts, and within a
 front by how much room is round them.
 
-Variables of an optimisation: the axes of its study, each on the unit interval.
+Variables of an optimisation are the axes of its study, each on the unit interval.
 
 A share of 0 is a variable's lower bound and 1 its upper one. What takes whole numbers, listed values or parts of a
 catalogue divides the interval into equal pieces, one each, and a share is moved to the middle of its piece.
@@ -64,6 +64,7 @@ def generations(
         told = []
 
         def tell(costs: Floats, violations: Floats) -> None:
+            """Hand the costs (n, m) and violations (n,) of the designs asked for to the algorithm."""
             # where a demand is violated costs are not compared, but may not be nan
             F, G = np.where(np.isfinite(costs), costs, 0.0), violations[:, None]
             Evaluator().eval(StaticProblem(bounds, F=F, G=G), asked)  # noqa: B023
@@ -76,7 +77,7 @@ def generations(
 
 
 def _first_generation(problem: Problem, size: int, first: Floats) -> Floats:
-    """Shares of a Latin hypercube, in which the given designs stand in place of the first ones."""
+    """Shares (size, v) of a Latin hypercube, in which the designs `first` (k, v) replace the first ones."""
     axes = problem.variables
     unit = tuple(Axis(axis.key, (), (0.0, 1.0)) for axis in axes)
     hypercube = Sampling(unit, size, problem.seed)
@@ -86,6 +87,7 @@ def _first_generation(problem: Problem, size: int, first: Floats) -> Floats:
 
 
 def _repair(problem: Problem) -> Any:
+    """pymoo's operator that keeps designs within what the variables may have."""
     from pymoo.core.repair import Repair
 
     class Settled(Repair):  # type: ignore[misc]
@@ -98,6 +100,7 @@ def _repair(problem: Problem) -> Any:
 
 
 def _mutation(problem: Problem) -> Any:
+    """pymoo's operator that changes designs at random."""
     from pymoo.core.mutation import Mutation
     from pymoo.operators.mutation.pm import PM
 
@@ -109,7 +112,7 @@ def _mutation(problem: Problem) -> Any:
 
         def __init__(self) -> None:
             super().__init__()
-            self.polynomial = PM(eta=20)
+            self.polynomial = PM(eta=20)  # the larger, the nearer to the parent
 
         def _do(self, bounds: Any, X: Floats, *, random_state: np.random.Generator, **more: Any) -> Floats:
             X = self.polynomial._do(bounds, X, random_state=random_state, **more)
@@ -165,7 +168,7 @@ def value_at(axis: Axis, share: float) -> Any:
 
 
 def values_at(axes: Sequence[Axis], shares: Floats) -> list[tuple[Any, ...]]:
-    """The variables' values of designs at shares (k, v)."""
+    """The values of the variables of designs at shares (k, v), one tuple for each design."""
     return [tuple(map(value_at, axes, row)) for row in shares.tolist()]
 
 

@@ -130,6 +130,7 @@ class Family:
     ranges: tuple[Range, ...]
     operators: tuple[str, ...]
     operating_point: OperatingPoint
+    # member -> points that were built together, and its place among them
     _built: dict[FamilyMember, tuple[OperatingPoint, int]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -183,7 +184,7 @@ class Family:
         return address.assign_all(document, settings)
 
     def _paths(self, document: dict[str, Any]) -> Iterator[tuple[KeyPath, int]]:
-        """Resolved path of each number that differs in a document, and whose of the ranges it is."""
+        """Resolved path of each number of a document that differs, and its range's index; mirror images, too."""
         for k, one in enumerate(self.ranges):
             steps = address.resolve(document, one.path)
             yield steps, k
@@ -191,7 +192,7 @@ class Family:
                 yield image, k
 
     def _columns(self, members: Sequence[FamilyMember], document: dict[str, Any]) -> list[DesignColumn]:
-        """The numbers that differ in the document of several members."""
+        """For each number that differs in the document: its path, and its values in several members."""
         values = [[one.at(member.shares[k]) for member in members] for k, one in enumerate(self.ranges)]
         every = np.arange(len(members))
         return [DesignColumn(dotted(steps, document), values[k], every) for steps, k in self._paths(document)]
@@ -389,6 +390,7 @@ class MeasuredFamily:
             raise RangeError(faults)
 
     def _check_operator(self, operator: int) -> None:
+        """Raise DeviceError where an operator is to hold a device whose response has no usable handle."""
         document = self.family.held_documents[operator]
         if "operator" in document and (obstacle := handle_obstacle(self.response)):
             name = f"{self.family.operators[operator]} " if self.family.operators else ""
@@ -396,7 +398,7 @@ class MeasuredFamily:
             raise fail(self.family.device.label, "operator", text)
 
     def _faults_at(self, member: FamilyMember, path: str, value: float) -> list[RangeFault]:
-        """What is wrong with the device at one end of a range."""
+        """What is wrong with a member at one end of a range: the value of the number at the path."""
         try:
             self._built(member)
         except (DeviceError, ValueError) as error:
@@ -405,7 +407,7 @@ class MeasuredFamily:
         return []
 
     def _built(self, member: FamilyMember) -> tuple[Controller, float, Operator | None]:
-        """Computer, what its delay exceeds whole samples by, and operator of a member."""
+        """Computer with whole samples of delay, the part of a sample that this lacks, and operator of a member."""
         document = self.family.document(member)
         loop = document["loop"]
         unit = 1.0 if "delay_samples" in loop else float(loop["sampling_period_s"])
@@ -420,10 +422,11 @@ class MeasuredFamily:
 
     @cached_property
     def _ports(self) -> dict[bool, MeasuredPort]:
-        """Ports by whether somebody holds the handle, made when they are needed."""
+        """Whether somebody holds the handle -> measured port; see `_port`."""
         return {}
 
     def _port(self, held: bool) -> MeasuredPort:
+        """The port of the measured response, with the handle if an operator holds it; made once."""
         if held not in self._ports:
             point = self.family.operating_point
             self._ports[held] = point.measured_port if held else command_port(self.response, self.period)

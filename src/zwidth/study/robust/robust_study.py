@@ -288,7 +288,10 @@ class _Members:
 
 
 def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
-    """Corners, centre and Sobol's points of the ranges, for every operator."""
+    """Members to chart before the search: corners, centre and Sobol's points of the ranges, for every operator.
+
+    members  largest number of members charted, of which the share REFINING is left to the search
+    """
     from scipy.stats import qmc
 
     free, operators = family.free, max(len(family.operators), 1)
@@ -309,7 +312,7 @@ def _sample(family: Family, members: int, seed: int) -> Iterator[FamilyMember]:
 
 
 def _violation(charted: _Members, chart: RobustChart, unseen: int, seed: int) -> Violation | None:
-    """What random members say of the robust walls; None where there are no ranges, or no walls."""
+    """`unseen` random members tried on the robust walls; None where there are no ranges, or no walls."""
     if not charted.family.free or not chart.regions:
         return None
     return try_unseen_members(charted.family, chart, unseen, seed, charted.progress)
@@ -334,6 +337,7 @@ def _measured_study(family: Family, members: int, unseen: int, seed: int, progre
         chart = charted.chart()
     except ChartError as error:
         raise NoAnswerError(str(error)) from None
+    # seeds: [seed, 1] is of the members tried afterwards
     tried = list(random_measured_members(measured, unseen, [seed, 2], AT_ENDS)) if family.free else []
     chart, rounds, area_change, settled, unknown = _add_deepest(charted, chart, tried, members)
     violation = None
@@ -387,6 +391,6 @@ def _add_deepest(
 
 
 def _area_change(before: CommonChart, after: CommonChart) -> float:
-    """Share by which the area of the whole set became smaller."""
-    areas = [sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after)]
-    return max(1.0 - areas[1] / areas[0], 0.0) if areas[0] > 0.0 else 0.0
+    """Share 0..1 of its area, over all regions, that the robust set of walls lost from one chart to the next."""
+    old, new = (sum(shapely.Polygon(ring).area for ring in chart.regions) for chart in (before, after))
+    return max(1.0 - new / old, 0.0) if old > 0.0 else 0.0

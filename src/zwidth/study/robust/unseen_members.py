@@ -90,6 +90,7 @@ def try_unseen_members(
 
 
 def _random_members(family: Family, count: int, seed: int) -> Iterator[FamilyMember]:
+    """`count` random members: each of some operator, with uniform shares 0..1 of the ranges."""
     random = np.random.default_rng([seed, 1])
     for _ in range(count):
         operator = int(random.integers(max(len(family.operators), 1)))
@@ -99,8 +100,8 @@ def _random_members(family: Family, count: int, seed: int) -> Iterator[FamilyMem
 def _tried(
     family: Family, members: list[FamilyMember], walls: Floats, report: Callable[[int], None], before: int
 ) -> Iterator[tuple[Ints, Floats, Floats]]:
-    """Places of members, and their `_worst_walls`: of those built together, then of each of the others; one that
-    cannot be built is left out.
+    """Places (m,) of members and their `_worst_walls`, two (m,): of those built together, then of each of the
+    others; one that cannot be built is left out.
 
     report, before  reports the number of members tried, and how many were before these
     """
@@ -159,11 +160,8 @@ def sample_walls(chart: RobustChart) -> Floats:
         count = max(int(np.ceil(EDGE_WALLS * along[-1] / total)), 2)
         at = np.linspace(0.0, along[-1], count + 1)[1:]
         points = np.column_stack([np.interp(at, along, x) for x in (arc.stiffness, arc.damping)]) / size
-        ahead = (
-            points
-            - np.column_stack([np.interp(at - 1e-3 * at[-1], along, x) for x in (arc.stiffness, arc.damping)])
-            / size
-        )
+        behind = [np.interp(at - 1e-3 * at[-1], along, x) for x in (arc.stiffness, arc.damping)]
+        ahead = points - np.column_stack(behind) / size
         left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.maximum(np.hypot(*ahead.T), 1e-300)[:, None]
         inside.append((points + DEPTH * left) * size)
     low = np.vstack(chart.regions).min(axis=0)
@@ -176,6 +174,7 @@ def sample_walls(chart: RobustChart) -> Floats:
 
 
 def _lengths(K: Floats, B: Floats, size: Floats) -> Floats:
+    """Lengths (n - 1,) of the chords of a curve K, B (n,), in shares of the set's size (2,)."""
     return np.asarray(np.hypot(np.diff(K) / size[0], np.diff(B) / size[1]))
 
 
@@ -223,7 +222,7 @@ def curve_of_walls(loop: MeasuredLoop, box: tuple[float, float, float, float]) -
     theta = (coarse[:-1, None] + share * np.diff(coarse)[:, None]).ravel()
     K, B, _ = loop.walls(theta)
     pieces = [np.column_stack([K, B])]
-    for kind in (-1, -2):
+    for kind in (-1, -2):  # of a root at z = 1, and at z = -1
         h, w = measured_real_root(loop, kind)
         if not np.isfinite(h):
             continue
@@ -238,7 +237,11 @@ def curve_of_walls(loop: MeasuredLoop, box: tuple[float, float, float, float]) -
 
 
 class RobustWalls:
-    """The robust walls of a chart, against which curves of other members are held."""
+    """The robust walls of a chart, and how far curves of other members run into them.
+
+    box    KMIN, BMIN, KMAX, BMAX [N/m], [N s/m]
+    shape  the walls [K, B] in shares of the box's size
+    """
 
     def __init__(self, chart: MeasuredRobustChart) -> None:
         whole = shapely.union_all([shapely.Polygon(ring) for ring in chart.regions])
@@ -249,18 +252,18 @@ class RobustWalls:
         shapely.prepare(self.shape)
 
     def intrusion(self, loop: MeasuredLoop) -> Intrusion:
-        """How far a member's curve runs inside."""
+        """How far the curve of a member's walls with a root on the circle runs inside."""
         walls = curve_of_walls(loop, self.box) / self.size
         inside = walls[shapely.contains_xy(self.shape, *walls.T)]
         if not len(inside):
             return Intrusion(0.0, 0.0)
         away = shapely.distance(self.edge, shapely.points(inside))
         buildable = inside[(inside[:, 0] > 0.0) & (inside[:, 1] >= 0.0) & (away > MEASURED_DEPTH)]
-        softer = max((self._above(*wall) for wall in buildable), default=0.0)
+        softer = max((self._distance_to_stiffest(*wall) for wall in buildable), default=0.0)
         return Intrusion(float(away.max()), softer)
 
-    def _above(self, K: float, B: float) -> float:
-        """Distance [N/m] of a wall from the stiffest robust one of its damping."""
+    def _distance_to_stiffest(self, K: float, B: float) -> float:
+        """Stiffness [N/m] from a wall, in shares of the set's size, to the stiffest robust one at its damping."""
         right = self.shape.bounds[2]
         line = shapely.intersection(self.shape, shapely.LineString([(K, B), (right, B)]))
         return float((line.bounds[2] - K) * self.size[0]) if not line.is_empty else 0.0
@@ -312,7 +315,7 @@ class MemberRadii:
         self._loops: dict[FamilyMember, Loop | None] = {}
 
     def prepare(self, wanted: Sequence[tuple[FamilyMember, Wall]]) -> None:
-        """Compute those of all members that can be built together; the rest waits until it is needed."""
+        """Compute the radii of all members that can be built together; the rest waits until it is needed."""
         pairs = [pair for pair in dict.fromkeys(wanted) if pair not in self._radii]
         number = {member: n for n, member in enumerate(dict.fromkeys(member for member, _ in pairs))}
         member_of = np.array([number[member] for member, _ in pairs], dtype=np.int64)
@@ -342,6 +345,7 @@ class MemberRadii:
         return any(loop is None for loop in self._loops.values())
 
     def _loop(self, member: FamilyMember) -> Loop | None:
+        """A member's loop, built once; None for one that cannot be built."""
         if member not in self._loops:
             try:
                 self._loops[member] = self.family.loop(member)
@@ -389,7 +393,7 @@ def _searched_walls(chart: RobustChart) -> list[tuple[Wall, tuple[int, ...]]]:
 def _worst_members(
     radii: MemberRadii, starts: Sequence[tuple[FamilyMember, Wall]]
 ) -> list[tuple[FamilyMember, float]]:
-    """The member and the radius that each search comes to, from a member at a wall."""
+    """The member and the spectral radius that the search from each start (member, wall) comes to."""
     found: dict[int, tuple[FamilyMember, float]] = {}
     climbing = {n: _climb(radii, *start) for n, start in enumerate(starts)}
     while climbing:

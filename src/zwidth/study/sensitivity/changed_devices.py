@@ -3,7 +3,7 @@
 Devices are built together for every change and every step that a derivative may take. What cannot be built so is
 built alone, when it is asked for.
 
-Derivatives of computed numbers by extrapolated differences, with an estimate of their error.
+Derivatives of computed numbers are extrapolated differences, with an estimate of their error (`Derivative`).
 """
 
 from __future__ import annotations
@@ -66,6 +66,8 @@ class ChangedDevices:
     """The loops of a device at an operating point with changes, each by its name.
 
     optimum  the stiffest wall of the device itself
+
+    All changes are built together for a trial, the arguments that derivatives need from one first step of FIRST.
     """
 
     def __init__(
@@ -93,6 +95,7 @@ class ChangedDevices:
         return self._known[key]
 
     def _loop_alone(self, key: Argument) -> Loop:
+        """The loop of one change: of a device built with others before, else built alone."""
         if key in self._built:
             together, place = self._built[key]
             return together[place].loop
@@ -118,7 +121,7 @@ class ChangedDevices:
                 # a difference of loops that are known to ten digits would have too few
                 table = table_of_points(built.point, coupled=False)
                 if table is not None:
-                    self._known.update(_read(table, own, self.optimum))
+                    self._known.update(_changed_loops(table, own, self.optimum))
 
     def _sets(self) -> Iterator[list[str]]:
         """Names of changes whose devices consist of the same parts, and which take arrays."""
@@ -131,7 +134,7 @@ class ChangedDevices:
                 yield [name]
 
     def _columns(self, keys: list[Argument]) -> Iterator[DesignColumn]:
-        """Each number that one of these changes, where it is as in the device but in the rows of its changes."""
+        """Each number that is changed, by its value in each row: the device's own unless the row changes it."""
         values: dict[KeyPath, list[float]] = {}
         places: dict[KeyPath, np.ndarray] = {}
         for row, (name, argument) in enumerate(keys):
@@ -144,8 +147,10 @@ class ChangedDevices:
             yield DesignColumn(dotted(steps, self._document), own, places[steps])
 
 
-def _read(loops: LoopTable, keys: Iterable[Argument], optimum: Optimum) -> Iterator[tuple[Argument, ChangedLoop]]:
-    """What is read of each loop of a table; nothing where it has no number."""
+def _changed_loops(
+    loops: LoopTable, keys: Iterable[Argument], optimum: Optimum
+) -> Iterator[tuple[Argument, ChangedLoop]]:
+    """The `ChangedLoop` of each loop of a table, with its key; nothing where its stiffness is not finite."""
     whole, split = loops.whole_delay[loops.computer], loops.split[loops.computer]
     stiffnesses = optimum.stiffnesses_to_first_order(loops)
     for n, key in enumerate(keys):
@@ -219,17 +224,21 @@ def _steps(first: float) -> Iterator[float]:
 
 
 def _extrapolate(quotient: Callable[[float], float], scale: float, factor: float) -> Derivative:
-    """The best result over the first steps; tried in turn until one is accurate enough."""
-    best = _table(quotient, FIRST[0] * scale, scale, factor)
+    """The most accurate derivative over the first steps of FIRST, tried in turn until one is accurate enough.
+
+    quotient  step h -> difference quotient D(h)
+    factor    as for `_richardson`
+    """
+    best = _richardson(quotient, FIRST[0] * scale, scale, factor)
     for first in FIRST[1:]:
         if best.error * scale <= POOR:
             break
         with suppress(ValueError):  # a large step may leave the range where a small one did not
-            best = min(best, _table(quotient, first * scale, scale, factor), key=lambda slope: slope.error)
+            best = min(best, _richardson(quotient, first * scale, scale, factor), key=lambda slope: slope.error)
     return best
 
 
-def _table(quotient: Callable[[float], float], first: float, scale: float, factor: float) -> Derivative:
+def _richardson(quotient: Callable[[float], float], first: float, scale: float, factor: float) -> Derivative:
     """Richardson's table of D(h), D(h/2), ..., whose error falls by `factor` at the first halving; its best.
 
     Where it ends in rounding, of which the last quotient is a sample, no entry is better than this rounding over

@@ -7,9 +7,7 @@ outwards to both sides on a grid, to where there is no such device; the charts o
 The crossing of the goal next to the device's own value is refined. Every value that is returned has been charted
 exactly; a sensitivity, the slope at the device's own value, would only tell where to look.
 
-What each number of a device would have to be for a wanted largest stiffness: the result.
-
-The largest stiffness of a device with one number changed, by its exact chart: for many values at once.
+`Goal` is the result; `ChangedStiffness` charts a device with one number changed, for many values at once.
 """
 
 from __future__ import annotations
@@ -62,6 +60,9 @@ class _Search:
 
     value = own exp(t), or typical size times t where it is 0; t = 0 is the device itself.
 
+    path, steps      of the number in the device file, as text and step by step
+    own, size        its value in the device; |own|, or a typical size where that is 0
+    lowest, highest  values that the schema allows
     samples  t -> ln(K_max / goal), -inf where no wall is stable, nan where there is no device
     jumps    brackets in which the goal is jumped over
     """
@@ -76,6 +77,7 @@ class _Search:
     jumps: set[tuple[float, float]] = field(default_factory=set)
 
     def value(self, t: float) -> float:
+        """Value of the number at t."""
         return self.size * t if self.own == 0.0 else self.own * float(np.exp(t))
 
     def grid(self, first: int) -> Iterator[float]:
@@ -105,15 +107,15 @@ class _Search:
 
     @property
     def reached(self) -> float | None:
-        """The nearest place at which the goal is reached; None where none is known, or nothing matters."""
+        """The nearest t at which the goal is reached; None where none is known, or the number has no influence."""
         if self.alike:
             return None
         return min((t for t in self.samples if self._error(t) <= EXACT), key=abs, default=None)
 
     @property
     def alike(self) -> bool:
-        """Whether the largest stiffness is the same at all places that are known."""
-        known = [level for level in self.samples.values() if level == level]
+        """Whether the largest stiffness is the same at all t that are known."""
+        known = [level for level in self.samples.values() if not isnan(level)]
         return all(level == known[0] or abs(level - known[0]) <= ALIKE for level in known)
 
     def jumps_between(self, a: float, b: float) -> bool:
@@ -122,15 +124,17 @@ class _Search:
         return width <= NARROWEST or (width <= NARROW and not abs(self.samples[a] - self.samples[b]) < JUMP)
 
     def inside(self, a: float, b: float, tries: int) -> float:
-        """Where to look next in a bracket: where a straight line through its ends crosses, or in the middle, which
-        is certain to narrow it."""
+        """The t to try next in a bracket a, b: where a straight line through its ends crosses 0, or in the middle,
+        which is certain to narrow it: at every third of `tries`, and after STRAIGHT."""
         f, g = self.samples[a], self.samples[b]
         if not isfinite(f * g) or tries % 3 == 2 or tries > STRAIGHT:
             return 0.5 * (a + b)
         t = a - f * (b - a) / (g - f)
-        return min(max(t, min(a, b) + 1e-3 * abs(b - a)), max(a, b) - 1e-3 * abs(b - a))
+        inner = 1e-3 * abs(b - a)  # not at an end, which is known
+        return min(max(t, min(a, b) + inner), max(a, b) - inner)
 
     def _error(self, t: float) -> float:
+        """Relative distance of the largest stiffness at t from the goal, |ln(K_max / goal)|."""
         return abs(self.samples[t])
 
 
@@ -174,13 +178,13 @@ def numbers_for_goal(
     charts = ChangedStiffness(
         device, at, {one.path: tuple(steps for steps, _ in moved_places(one.steps, 1.0)) for one in searches}
     )
-    found = _found(searches, charts, goal, progress)
+    found = _search_all(searches, charts, goal, progress)
     numbers = sorted([*found, *fixed], key=lambda one: _rank(one, goal))
     return Goal(goal, own, tuple(numbers)).about(at)
 
 
 def _rank(number: GoalNumber, goal: float) -> tuple[int, float]:
-    """Sorting key: the smallest change of those that reach the goal, the nearest miss of the others."""
+    """Sorting key: status, then of numbers that reach the goal the smallest change, of others the nearest miss."""
     K = number.stiffness_max
     missed = abs(log(K / goal)) if K > 0.0 else inf
     return ORDER.index(number.status), number.distance if number.status == REACHED else missed
@@ -200,20 +204,20 @@ def _level(stiffness: float, goal: float) -> float:
     return log(stiffness / goal) if stiffness > 0.0 else -inf if stiffness == 0.0 else nan
 
 
-def _found(
+def _search_all(
     searches: list[_Search], charts: ChangedStiffness, goal: float, progress: Progress | None
 ) -> list[GoalNumber]:
     """For each number the value with which the goal is reached: values are tried outwards, a few at a time, and
     each bracket is narrowed before going on."""
     left = searches
     for first in range(0, STEPS, AT_A_TIME):
-        _sample([(one, t) for one in left for t in one.grid(first)], charts, goal)
+        _chart_places([(one, t) for one in left for t in one.grid(first)], charts, goal)
         tries = 0
         while crossed := [(one, ends[0]) for one in left if (ends := one.brackets())]:
             for one, (a, b) in crossed:
                 if one.jumps_between(a, b):
                     one.jumps.add((a, b))
-            _sample(
+            _chart_places(
                 [(one, one.inside(*ends, tries)) for one, ends in crossed if ends not in one.jumps], charts, goal
             )
             tries += 1
@@ -221,17 +225,18 @@ def _found(
         if progress is not None:
             done = len(searches) if first + AT_A_TIME >= STEPS else len(searches) - len(left)
             progress("numbers", done, len(searches))
-    return [_number(one, charts, goal) for one in searches]
+    return [_goal_number(one, charts, goal) for one in searches]
 
 
-def _sample(places: list[tuple[_Search, float]], charts: ChangedStiffness, goal: float) -> None:
+def _chart_places(places: list[tuple[_Search, float]], charts: ChangedStiffness, goal: float) -> None:
+    """Chart each search at a t, and note ln(K_max / goal) there."""
     K = charts.stiffnesses([(one.path, one.value(t)) for one, t in places])
     for (one, t), stiffness in zip(places, K.tolist(), strict=True):
         one.samples[t] = _level(stiffness, goal)
 
 
-def _number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
-    """What a search came to."""
+def _goal_number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
+    """The result of a search: the value that reaches the goal, or the nearest to it and why none does."""
     known = {t: level for t, level in one.samples.items() if isfinite(level)}
     best = one.reached
     status: Status = REACHED if best is not None else OUT_OF_RANGE
@@ -251,7 +256,7 @@ def _number(one: _Search, charts: ChangedStiffness, goal: float) -> GoalNumber:
         edges = [end for bracket in one.jumps for end in bracket]
         clear = [t for t in known if t == 0.0 or all(abs(t - end) > NEAR_JUMP for end in edges)]
         best = min(clear, key=lambda t: (abs(known[t]), abs(t)), default=0.0)
-        ends = sorted(one.value(t) for t, level in one.samples.items() if level == level)
+        ends = sorted(one.value(t) for t, level in one.samples.items() if not isnan(level))
         refused = charts.refusals.get(one.path, "")
         reason = JUMPS if one.jumps else f"from {ends[0]:.4g} to {ends[-1]:.4g} it is not reached"
         reason += f"; beyond, {refused}" if refused and not one.jumps else ""
@@ -294,7 +299,7 @@ class GoalNumber(Documented):
 
     @property
     def distance(self) -> float:
-        """|ln factor|; inf where there is none."""
+        """Size of the change, |ln factor|; inf where there is none."""
         return abs(log(self.factor)) if isfinite(self.factor) and self.factor > 0.0 else float("inf")
 
 
@@ -317,7 +322,7 @@ class Goal(Result):
         return tuple(one for one in self.numbers if one.status == REACHED)
 
     def table(self) -> dict[str, list[Any]]:
-        """One number a row."""
+        """The numbers as columns, one number a row."""
         rows = [one.document() for one in self.numbers]
         return {column: [row[column] for row in rows] for column in keys_of(GoalNumber)}
 
@@ -370,6 +375,7 @@ class ChangedStiffness:
         return K
 
     def _alone(self, path: str, value: float) -> float:
+        """The largest stiffness with one change [N/m], as `stiffnesses`; where it is nan, `refusals` say why."""
         document = self.device.document
         settings = [(dotted(steps, document), value) for steps in self.places[path]]
         try:
@@ -388,7 +394,7 @@ class ChangedStiffness:
         return self._grouping.groups(list(self._columns(changes))) if changes else iter(())
 
     def _columns(self, changes: Sequence[Change]) -> Iterator[DesignColumn]:
-        """Each number that is changed somewhere: as in the device but in the rows of its own changes."""
+        """Each number that is changed, by its value in each row: the device's own unless the row changes it."""
         document = self.device.document
         for path in dict.fromkeys(path for path, _ in changes):
             rows = [n for n, (other, _) in enumerate(changes) if other == path]

@@ -1,4 +1,4 @@
-"""First-order change of the largest stiffness with any change of the loop.
+"""Change of the largest stiffness with any change of the loop, to first order.
 
 The stiffest wall is an extreme point of the stable set's edge. To first order it moves with the pieces of edge
 that meet in it, and each piece gives one equation for its motion dwall = (dK, dB),  n . dwall = dr:
@@ -181,7 +181,7 @@ class _Piece(NamedTuple):
 
 
 def _pieces(peak: Peak, pieces: list[_Piece], weights: Floats) -> EdgePieces:
-    """The pieces of edge that meet at the peak, with their shares in its derivative."""
+    """The pieces of edge that meet at the peak, with their weights: dK of the wall per dr of each."""
     return EdgePieces(
         kind=np.array([one.kind for one in pieces]),
         angle=np.array([one.angle for one in pieces]),
@@ -207,9 +207,12 @@ def _line(tracer: Tracer, angle: float, peak: Peak) -> _Piece:
 
 
 def _crossing(peak: Peak, kind: Kind, pieces: list[_Piece], period: float) -> Optimum:
+    """The wall where two pieces of edge meet. Raises NoAnswerError where they touch without crossing."""
     normals = np.array([one.normal for one in pieces])
     scaled = normals * np.array([1.0 / period, 1.0])  # K T and B have one unit
-    if np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]) > 1e9:
+    if (
+        np.linalg.cond(scaled / np.linalg.norm(scaled, axis=1)[:, None]) > 1e9
+    ):  # parallel, as far as rounding tells
         raise NoAnswerError("two pieces of the edge touch at the largest stiffness, which then has no derivative")
     return Optimum(peak, kind, _pieces(peak, pieces, np.linalg.solve(normals.T, np.array([1.0, 0.0]))))
 
@@ -253,7 +256,7 @@ def second_peak_stiffness(chart: StabilityChart) -> float:
 
 
 def _cut_at_axis(ring: Floats) -> Floats:
-    """The ring's points (k, 2) with those added where it crosses B = 0."""
+    """The points of a ring (k, 2), K and B, with those added where it crosses B = 0."""
     following = np.roll(ring, -1, axis=0)
     crosses = np.flatnonzero(ring[:, 1] * following[:, 1] < 0.0)
     share = ring[crosses, 1] / (ring[crosses, 1] - following[crosses, 1])

@@ -1,6 +1,6 @@
 """Results of a sensitivity analysis: of each number, of numbers scaled together, and the stiffest wall.
 
-Numbers of a device file as what a sensitivity is by: which have a derivative.
+`number_obstacle`: which numbers of a device file have no derivative.
 """
 
 from __future__ import annotations
@@ -69,11 +69,13 @@ class Group(Documented):
 
 
 def _peak_wall(peak: Peak | None) -> dict[str, float | None]:
+    """What a document says of the stiffest wall; None where there is none."""
     stiffness, damping = (None, None) if peak is None else (peak.stiffness, peak.damping)
     return {"stiffness_max_N_per_m": stiffness, "damping_at_stiffness_max_Ns_per_m": damping}
 
 
 def _reasons(left_out: dict[str, str]) -> list[dict[str, str]]:
+    """What a document says of the numbers left out."""
     return [{"path": path, "reason": reason} for path, reason in left_out.items()]
 
 
@@ -114,6 +116,7 @@ class Sensitivities(Result):
         return f"Sensitivities of {stiffest}\n  per cent for one per cent: {first or 'none'}"
 
     def _entries(self) -> list[dict[str, Any]]:
+        """The sensitivities by key and unit, one dictionary for each number."""
         stiffness = nan if self.peak is None else self.peak.stiffness
         return [
             {

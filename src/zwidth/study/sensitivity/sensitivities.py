@@ -6,10 +6,9 @@ The stiffest wall is not searched again for each number: to first order it moves
 (`optimum`). The device is built again with the number slightly larger and smaller, together for all numbers
 (`changed_devices`), and the motion of the edge is differenced (`changed_devices`).
 
-Sensitivities of a measured device: to delay, sampling period, filters and the operator's numbers.
-
-What a number of the computer alone changes needs nothing beyond the response. A later command, and another
-sampling period, are held anew (`loop.measured.measured_port.changed_port`): there the device's fitted modes stand
+A measured device has sensitivities to delay, sampling period, filters and the operator's numbers. What a number of
+the computer alone changes needs nothing beyond the response. A later command, and another sampling period, are
+held anew (`loop.measured.measured_port.changed_port`): there the device's fitted modes stand
 for what half the sampling rate hides. Masses, springs and dampers of the device itself are in the response as a
 whole.
 """
@@ -283,7 +282,7 @@ def measured_sensitivities(
     angles = tuple(turn * f for f in chart.frequencies_at_stiffness_max_nominal)
     peak = Peak(chart.stiffness_max_nominal, chart.damping_at_stiffness_max_nominal, angles)
     numbers = []
-    varied = list(_numbers(device))
+    varied = list(_varied_numbers(device))
     for steps, value in varied:
         numbers.append(_sensitivity(device, response, port, operator, steps, value, chart.stiffness_max_nominal))
         if progress is not None:
@@ -295,7 +294,7 @@ def measured_sensitivities(
     return Sensitivities(peak, None, tuple(order), (), left_out, nan)
 
 
-def _numbers(device: Device) -> Iterator[tuple[tuple[Any, ...], float]]:
+def _varied_numbers(device: Device) -> Iterator[tuple[tuple[Any, ...], float]]:
     """Steps and value of the numbers of the computer and the operator; the delay also where none is given."""
     given = False
     for steps, value in address.number_paths(device.document):
@@ -315,18 +314,25 @@ def _sensitivity(
     value: float,
     largest: float,
 ) -> Sensitivity:
-    """The sensitivity to one number; with the reason where there is none."""
+    """The sensitivity of a measured device to one number; with the reason where there is none.
+
+    port     of the response, with the handle if the operator holds it
+    steps    to the number in the device file;   value  of it
+    largest  the largest stiffness now [N/m]
+    """
     path, unit = dotted(steps, device.document), key_unit(steps)
     if steps not in DELAYS and (reason := number_obstacle(steps, value)):
         return Sensitivity(path, value, unit, nan, nan, nan, "", reason)
     T = port.period
-    scale = abs(value) if value and steps not in DELAYS else (T if steps == DELAYS[1] else 1.0)
+    in_seconds = steps == DELAYS[1]
+    scale = abs(value) if value and steps not in DELAYS else (T if in_seconds else 1.0)
 
     def stiffness(change: float) -> float:
-        controller, changed, holder = _changed(device, port, operator, steps, value, change)
+        controller, changed, holder = _with_number_changed(device, port, operator, steps, value, change)
         return _largest(response, changed, controller, holder)
 
     step = STEP * scale
+    # whether the number can only become larger
     lowest = (steps in DELAYS and port.model.delay < STEP) or (value == 0.0 and steps not in DELAYS)
     slope, error, bend = _relative_slope(stiffness, step, largest, one_sided=lowest)
     if not bend * scale < ABRUPT * (1.0 + abs(slope) * scale):
@@ -339,7 +345,7 @@ def _sensitivity(
     return Sensitivity(path, value, unit, slope * value, slope * largest, error * value, side)
 
 
-def _changed(
+def _with_number_changed(
     device: Device,
     port: MeasuredPort,
     operator: Operator | None,
@@ -363,7 +369,7 @@ def _changed(
     elif steps in DELAYS:
         changed = changed_port(port, change / (T if steps == DELAYS[1] else 1.0))
     else:
-        controller, holder = _built(device, steps, value + change, operator)
+        controller, holder = _computer_and_operator(device, steps, value + change, operator)
     return controller, changed, holder
 
 
@@ -392,14 +398,14 @@ def _relative_slope(
 
 
 def _largest(response: Response, port: MeasuredPort, controller: Controller, operator: Operator | None) -> float:
-    """Largest stiffness [N/m] of a changed port, nominal: what is certain moves with the error as well."""
+    """Largest nominal stiffness [N/m] of a changed port; the certain one moves with the error as well."""
     return measured_chart(response_of_port(response, port, operator), controller).stiffness_max_nominal
 
 
-def _built(
+def _computer_and_operator(
     device: Device, steps: tuple[Any, ...], value: float, operator: Operator | None
 ) -> tuple[Controller, Operator | None]:
-    """Computer and operator with another number in the file."""
+    """Computer and operator of a device with another value of one number in its file."""
     document = address.apply(device.document, [(dotted(steps, device.document), value)])
     checked, _ = check(document, device.label)
     holder = operator if checked.operator is None else build.operator(checked.operator)

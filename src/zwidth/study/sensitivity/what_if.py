@@ -111,6 +111,7 @@ Change = tuple[str, str, str, Callable[[], Loop]]
 
 
 def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> Variant:
+    """The variant of a change, see `Change`, with its chart or the reason why it has none."""
     if obstacle:
         return Variant(key, label, None, None, obstacle)
     try:
@@ -121,14 +122,14 @@ def _variant(key: str, label: str, obstacle: str, make: Callable[[], Loop]) -> V
 
 
 def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
-    """One change at a time of the device or its computer."""
+    """Each single change of the device or its computer, see `Change`."""
     controller, plant = point.computer, point.plant
     alone = point.ungripped_plant  # the device's own damping, without the operator's
 
-    def computed(**changes: Any) -> Callable[[], Loop]:
+    def with_computer(**changes: Any) -> Callable[[], Loop]:
         return lambda: Loop(plant, replace(controller, **changes))
 
-    def only(applies: object, obstacle: str) -> str:
+    def unless(applies: object, obstacle: str) -> str:
         return "" if applies else obstacle
 
     flexible, damped = alone.stiffness.any(), alone.damping.any()
@@ -136,7 +137,7 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     usual = usual_filter(controller.sampling_period)
     own = "structural damping" if flexible else "friction"
 
-    obstacle = only(
+    obstacle = unless(
         flexible, f"its {'drives are' if point.mechanism is not None else 'structure is'} rigid already"
     )
     bends = point.mechanism is not None and bool(point.mechanism.flexible)
@@ -145,18 +146,19 @@ def _changes(device: Device, point: OperatingPoint) -> Iterator[Change]:
     yield "rigid-drives", name, obstacle, lambda: point.in_model("rigid").loop
     faster = half_period(device, point)
     yield "half-period", "half the sampling period", _no_estimate(faster), lambda: Loop(plant, faster)
-    yield "no-delay", "no delay", only(delay != 0.0, "the device has no delay"), computed(delay=0.0)
-    obstacle = only(delay != 1.0, "the device has one sample of delay")
-    yield "one-sample", "one sample of delay", obstacle, computed(delay=1.0)
-    obstacle = only(low_pass is not None, "the device has no velocity filter")
-    yield "no-filter", "without the velocity filter", obstacle, computed(velocity_filter=None)
-    obstacle = only(low_pass is None, "the device has a velocity filter")
+    obstacle = unless(delay != 0.0, "the device has no delay")
+    yield "no-delay", "no delay", obstacle, with_computer(delay=0.0)
+    obstacle = unless(delay != 1.0, "the device has one sample of delay")
+    yield "one-sample", "one sample of delay", obstacle, with_computer(delay=1.0)
+    obstacle = unless(low_pass is not None, "the device has no velocity filter")
+    yield "no-filter", "without the velocity filter", obstacle, with_computer(velocity_filter=None)
+    obstacle = unless(low_pass is None, "the device has a velocity filter")
     label = f"velocity through a Butterworth filter of order 2 at {usual.cutoff_Hz:.4g} Hz"
-    yield "with-filter", label, obstacle, computed(velocity_filter=usual)
+    yield "with-filter", label, obstacle, with_computer(velocity_filter=usual)
     twice = replace(alone, damping=2.0 * alone.damping)
-    obstacle = only(damped, f"the device has no {own}")
+    obstacle = unless(damped, f"the device has no {own}")
     yield "twice-damping", f"twice the {own}", obstacle, lambda: Loop(point.attach_operator(twice), controller)
-    obstacle = only(not _collocated(plant), "the sensor reads where the wall acts already")
+    obstacle = unless(not _collocated(plant), "the sensor reads where the wall acts already")
     collocated = replace(plant, sensor=plant.actuator)
     yield "collocated", "sensor at the actuator", obstacle, lambda: Loop(collocated, controller)
 
@@ -179,12 +181,15 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
         return "the device as described is this model" if reduces_to_itself(name) else ""
 
     def reduces_to_itself(name: Model) -> bool:
+        """Whether the device as described is this model."""
         try:
             return point.in_model(name).ungripped_plant is full
         except (ModelError, LoadError):
             return False
 
-    def of(name: Model, *, lossless: bool = False) -> Callable[[], Loop]:
+    def loop_in(name: Model, *, lossless: bool = False) -> Callable[[], Loop]:
+        """Function that makes the loop in a model, without damping if `lossless`."""
+
         def make() -> Loop:
             reduced = point.in_model(name)
             if not lossless:
@@ -196,12 +201,13 @@ def _models(point: OperatingPoint) -> Iterator[Change]:
         return make
 
     given = "full model, all flexible coordinates" if point.mechanism is not None else "plant as given"
-    yield "model-full", given, "", of("full")
-    yield "model-two-mass", f"two masses{damped}", same("two-mass"), of("two-mass")
-    yield "model-motor-mass", f"motor mass{damped}", "", of("motor-mass")
-    yield "model-motor-mass-undamped", "motor mass without damping", undamped_only, of("motor-mass", lossless=True)
+    yield "model-full", given, "", loop_in("full")
+    yield "model-two-mass", f"two masses{damped}", same("two-mass"), loop_in("two-mass")
+    yield "model-motor-mass", f"motor mass{damped}", "", loop_in("motor-mass")
+    lossless_loop = loop_in("motor-mass", lossless=True)
+    yield "model-motor-mass-undamped", "motor mass without damping", undamped_only, lossless_loop
     rigid = "" if damped else same("rigid")
-    yield "model-rigid-undamped", "rigid without damping", rigid, of("rigid", lossless=True)
+    yield "model-rigid-undamped", "rigid without damping", rigid, loop_in("rigid", lossless=True)
 
 
 def _no_estimate(controller: Controller) -> str:

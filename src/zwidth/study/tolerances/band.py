@@ -4,7 +4,7 @@ At one damping each device has intervals of stable stiffness. Sorted together, t
 how many devices are stable, and so where at least k of them are: exact over the drawn devices, at each damping.
 Between two dampings the band is drawn straight.
 
-Where the stable walls of each drawn device begin and end, on lines of equal damping, as a job.
+`EdgeJob`: where the stable walls of each drawn device begin and end, on lines of equal damping.
 """
 
 from __future__ import annotations
@@ -76,6 +76,8 @@ class Coverage:
 
     dampings   (d,) ascending [N s/m]
     intervals  (members, d, n, 2) of stable stiffness [N/m]; 0, 0 or nan where there are none
+
+    Of each damping `_ends` are the sorted ends of all intervals [N/m], `_depths` the devices stable above each.
     """
 
     def __init__(self, dampings: Floats, intervals: Floats) -> None:
@@ -122,6 +124,7 @@ class Coverage:
         return max(self._reached(members), default=-1)
 
     def _reached(self, members: int) -> list[int]:
+        """Indices of the dampings at which so many devices have a wall in common."""
         return [d for d in range(len(self.dampings)) if (self._depths[d] >= members).any()]
 
 
@@ -227,7 +230,7 @@ class EdgeJob:
 
     @cached_property
     def measures(self) -> tuple[str, ...]:
-        """Ends of the intervals, line after line."""
+        """Names of the ends of the intervals, line after line."""
         return tuple(
             f"{end}_{n}_at_{d}"
             for d in range(len(self.dampings))
@@ -271,13 +274,14 @@ class EdgeJob:
             yield first + row, self._remembered(first + row, found)
 
     def _remembered(self, number: int, found: Outlines) -> Outlines:
+        """Keep the outlines of a device, of the first MOST_KNOWN ones; return them."""
         if len(self.known) < MOST_KNOWN:
             self.known[number] = found
         return found
 
 
 def _outlines(point: OperatingPoint) -> Outlines:
-    """The outlines of a device's stable set."""
+    """The outlines of the stable set of a device at its operating point, or why it has none."""
     try:
         if point.charted_by_response:
             return Outlines(chart_at(point, decay=False).regions)

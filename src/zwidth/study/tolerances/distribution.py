@@ -140,12 +140,12 @@ class NumberLimits:
 
     @property
     def lowest(self) -> float:
-        """Least value that is allowed."""
+        """Least value that is allowed, the next number where the limit itself is not."""
         return nextafter(self.least, inf) if self.without_least else self.least
 
     @property
     def highest(self) -> float:
-        """Largest value that is allowed."""
+        """Largest value that is allowed, the number before where the limit itself is not."""
         return nextafter(self.most, -inf) if self.without_most else self.most
 
 
@@ -183,7 +183,7 @@ def finite(*values: float | None) -> bool:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How a number differs from one produced device to the next.
+    """How a number of the device file differs from one produced device to the next.
 
     key           path of the number, as it was written
     path          the same path in full: by it random numbers are told apart
@@ -222,7 +222,7 @@ class Tolerance:
         }
 
     def narrower(self, share: float) -> Tolerance:
-        """The same with a share of its width: of the spread, and of the way to both ends."""
+        """The tolerance with a share of its width: of the spread, and of the way from the middle to both ends."""
         one = self.distribution
         low, high = one.narrowed([one.low, one.high], share).tolist()
         return replace(self, distribution=replace(one, low=low, high=high, spread=share * one.spread))

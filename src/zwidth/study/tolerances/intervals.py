@@ -15,6 +15,7 @@ from zwidth.result import Documented, entry
 
 OUTSIDE: Final = 0.5 * (1.0 - CONFIDENCE)  # on either side of one
 SPAN: Final = 1.959963984540054  # standard deviations of a normal distribution within it
+ROUNDING: Final = 1e-9  # by which share * count may exceed the whole number that is meant
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Interval(Documented):
 
 
 def under(name: str) -> Callable[[Interval | None], dict[str, float | None]]:
-    """Function that spreads an interval in a document: NAME, NAME_low and NAME_high; None where there is none."""
+    """Function: interval -> its entries of a document, NAME, NAME_low and NAME_high; all None for no interval."""
     keys = (name, f"{name}_low", f"{name}_high")
     return lambda one: dict(zip(keys, (None,) * 3 if one is None else (one.value, one.low, one.high), strict=True))
 
@@ -70,7 +71,7 @@ def quantile_ranks(share: float, count: int) -> tuple[int, int, int]:
     """
     from scipy.stats import binom
 
-    estimate = min(max(ceil(share * count - 1e-9), 1), count)
+    estimate = min(max(ceil(share * count - ROUNDING), 1), count)
     # P(fewer than l below) <= 0.025, P(u or more below) <= 0.025
     below = binom.cdf(np.arange(-1, count + 1), count, share)  # [j] = P(at most j - 1)
     low = int(np.flatnonzero(below[: count + 1] <= OUTSIDE)[-1])
@@ -109,7 +110,7 @@ def count_bounds(share: float, count: int) -> tuple[int | None, int, int]:
     possible = np.flatnonzero(high >= share)
     return (
         int(k[certain[0]]) if len(certain) else None,
-        min(max(ceil(share * count - 1e-9), 1), count),
+        min(max(ceil(share * count - ROUNDING), 1), count),
         int(k[possible[0]]),
     )
 

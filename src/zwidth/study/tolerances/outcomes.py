@@ -131,7 +131,7 @@ def all_indices(columns: Sequence[Column], cells: CellValues, keys: Sequence[str
 
 
 def _outcomes(columns: Sequence[Column], cells: CellValues) -> Iterator[tuple[str, str, Floats, str]]:
-    """Name, meaning and value (devices,) of each outcome; or why it has no indices."""
+    """Name, meaning and value (devices,) of each outcome, and why it has no indices; "" where it has."""
     names = [one.name for one in columns]
     order = sorted(range(len(columns)), key=lambda n: names[n] != WALL_IS_STABLE.name)
     for n in order:
@@ -210,7 +210,7 @@ def sampled_shares(count: int, samples: int, seed: int) -> Floats:
     """Shares 0..1 (samples * (count + 2), count) of the devices that indices of `count` tolerances need."""
     from SALib.sample import sobol
 
-    problem = _problem([str(n) for n in range(count)])
+    problem = _salib_problem([str(n) for n in range(count)])
     return np.asarray(sobol.sample(problem, samples, calc_second_order=False, scramble=True, seed=seed))
 
 
@@ -228,7 +228,7 @@ def indices_of(name: str, of: str, outcome: Floats, keys: Sequence[str], seed: i
         warnings.simplefilter("ignore", UserWarning)  # of resamples that happen to be constant
         # SALib takes a seed of 0 for none, and would then draw from numpy's shared stream
         found = sobol.analyze(
-            _problem(keys),
+            _salib_problem(keys),
             np.asarray(outcome, dtype=np.float64),
             calc_second_order=False,
             num_resamples=RESAMPLES,
@@ -247,5 +247,6 @@ def indices_of(name: str, of: str, outcome: Floats, keys: Sequence[str], seed: i
     return Indices(name, of, each)
 
 
-def _problem(keys: Sequence[str]) -> dict[str, Any]:
+def _salib_problem(keys: Sequence[str]) -> dict[str, Any]:
+    """What SALib takes: each tolerance as a share 0..1."""
     return {"num_vars": len(keys), "names": list(keys), "bounds": [[0.0, 1.0]] * len(keys)}

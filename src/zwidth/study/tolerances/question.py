@@ -1,8 +1,8 @@
 """`ToleranceQuestion`: a device, its tolerances, and what is asked of the devices that are produced.
 
-Is the wanted wall stable? As a measure of many devices at once: 1 where it is, 0 where it is not.
+`wall_is_stable`: whether the wanted wall is stable, as a measure of many devices at once.
 
-From the arguments of `tolerance` to a `ToleranceQuestion`: the same checks as of a study file.
+`question_over`: a question from the arguments of `tolerance`, by the same checks as of a study file.
 """
 
 from __future__ import annotations
@@ -86,11 +86,11 @@ class ToleranceQuestion:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """What is computed of each device: the study's measures, the largest stiffness, and the wanted wall."""
+        """Columns to compute of each device: the largest stiffness, the study's measures, and `WALL_IS_STABLE`."""
         own = self.study.columns
         stiffest = column_named(STIFFEST)
         if self.study.turns:
-            stiffest = replace(stiffest, measure=stiffest.measure.about_moments())
+            stiffest = replace(stiffest, measure=stiffest.measure.about_moments())  # in N m/rad
         missing = () if STIFFEST in [one.name for one in own] else (stiffest,)
         return (*missing, *own, *((WALL_IS_STABLE,) if self.has_wall else ()))
 
@@ -128,6 +128,7 @@ def question_of(
         own["draw"] = document["draw"]  # the schema reports it
 
     def further(device: Device | None, faults: TableFaults) -> None:
+        """Note the tolerances, and add the faults of tolerances, wall and [draw]."""
         found.extend(tolerances_of(document, device, faults))
         faults += wall_faults(document)
         faults += draw_faults(draw)
@@ -194,6 +195,7 @@ def check_size(question: ToleranceQuestion) -> None:
     """Raises TooLarge where the devices would not fit into memory, before any of them is drawn."""
     count = len(question.tolerances)
     numbers = sum(1 + len(one.ties) for one in question.tolerances)
+    # drawn, once more with each tolerance narrower; Sobol's two matrices, and one for each tolerance
     devices = question.samples * (1.0 + count) + question.index_samples * (count + 2.0)
     check_memory(
         devices * (PER_VALUE * len(question.columns) + PER_NUMBER * numbers) + PER_CHART * question.samples,
@@ -214,6 +216,7 @@ def wall_is_stable(point: OperatingPoint, wanted: WantedWall | WantedWalls) -> M
     known = np.where(radii < 1.0 - NEAR, 1.0, np.where(radii > 1.0 + NEAR, 0.0, np.nan))
 
     def alone(at: tuple[int, ...]) -> float:
+        """1 or 0 by the verdict on the wall of one point, given by its index. Raises ChartError if undecided."""
         verdict = int(check_at(point[at], [K[at]], [B[at]]).verdict[0])
         if verdict == UNDECIDED:
             raise ChartError("the wall lies on the stability limit, as far as rounding tells")
@@ -274,7 +277,7 @@ def question_over(
     document: dict[str, Any] = {
         "device": device.label,
         **({"measures": names} if names else {}),
-        "tolerance": _tables(tolerances),
+        "tolerance": _tolerance_tables(tolerances),
         **given,
         **({"draw": drawn} if drawn else {}),
     }
@@ -292,7 +295,7 @@ def question_over(
     return question_with(study if angles is None else replace(study, at=angles), found, drawn)
 
 
-def _tables(tolerances: Any) -> list[dict[str, Any]]:
+def _tolerance_tables(tolerances: Any) -> list[dict[str, Any]]:
     """The [[tolerance]] tables of the argument. Raises TypeError, ValueError."""
     if not isinstance(tolerances, Mapping):
         raise wrong_type("tolerances", "a dictionary of paths and distributions", tolerances)
@@ -313,7 +316,7 @@ def _tables(tolerances: Any) -> list[dict[str, Any]]:
 
 
 def _fault(path: KeyPath, message: str, keys: list[str]) -> Fault:
-    """A fault of the document, under the name of the argument that it came from."""
+    """The fault at a path of the document, under the argument that it came from; `keys` of the tolerances."""
     first, *rest = path
     if first == "draw" and rest:
         first, *rest = rest

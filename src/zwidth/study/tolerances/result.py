@@ -120,7 +120,7 @@ class ToleranceStudy(Result):
 
     @property
     def undecided(self) -> int:
-        """Number of devices that render the wanted wall, or any wall, stably or not: rounding does not tell."""
+        """Number of devices of which rounding leaves open whether the wanted wall, or any wall, is stable."""
         return self.outcomes.get(STATUS[UNDECIDED], 0)
 
     @property
@@ -153,7 +153,7 @@ class ToleranceStudy(Result):
 
     @property
     def reason(self) -> str | None:
-        """Why nothing is certain: no drawn device could be asked, with the first reason; None where one could."""
+        """Why there are no results: no drawn device has an answer; with the first reason. None where one has."""
         if any(name in ASKED for name in self.outcomes):
             return None
         status = ", ".join(f"{count} {name}" for name, count in self.outcomes.items())
@@ -235,7 +235,8 @@ class ToleranceStudy(Result):
 NARROWER: Final = 0.5  # width that a tolerance is tried with, of its own
 
 
-def _narrower(key: str) -> dict[str, Any]:
+def _key_and_width(key: str) -> dict[str, Any]:
+    """What a document says of the tolerance: its path, and the share of its width that was tried."""
     return {"key": key, "width": NARROWER}
 
 
@@ -249,7 +250,7 @@ class Tightened(Documented):
     rival  difference from the best of all narrower tolerances, 0 of the best itself; with it two are told apart
     """
 
-    key: str = field(metadata=entry(value=_narrower, spread=True))
+    key: str = field(metadata=entry(value=_key_and_width, spread=True))
     share: Interval = field(metadata=entry(value=under("probability"), spread=True))
     gain: Interval = field(metadata=entry(value=under("gain"), spread=True))
     rival: Interval
@@ -268,7 +269,7 @@ class Tightened(Documented):
 
 
 def tightened_axes(tolerances: Sequence[Tolerance], values: Sequence[Floats]) -> list[Axis]:
-    """Axes of the drawn devices, once for each tolerance, with this one half as wide, by the same random numbers.
+    """Axes of the n drawn devices, repeated for each tolerance with this one half as wide: the same draws.
 
     values  (n,) of each tolerance, of the drawn devices
     """

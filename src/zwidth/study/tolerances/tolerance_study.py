@@ -142,27 +142,30 @@ def run_tolerances(
 def answer(question: ToleranceQuestion, compute: Compute) -> ToleranceStudy:
     """Answer a question with a function that computes jobs. Raises what `sweep_job` and that function raise."""
     values = drawn_values(question.tolerances, question.seed, question.samples)
-    job, cells, indices = _measured(question, values, compute)
+    job, cells, indices = _measure_drawn(question, values, compute)
     found = ToleranceStudy(question=question, job=job, cells=cells, indices=tuple(indices))
     if found.reason is not None:
         return found
     bands, uncharted = _bands(question, values, compute)
     narrower = _tightened(question, values, cells, compute)
-    middle = _middle(question, compute)
+    middle = _outcome_in_middle(question, compute)
     return replace(found, bands=bands, uncharted=uncharted, tightened=narrower, middle=middle)
 
 
 def _axes(question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]]) -> list[Axis]:
-    """The axes of devices with these values of their tolerances."""
+    """The axes of devices, from the values (devices,) of the number of each tolerance."""
     return [one.axis(own) for one, own in zip(question.tolerances, values, strict=True)]
 
 
-def _measured(
+def _measure_drawn(
     question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], compute: Compute
 ) -> tuple[SweepJob, CellValues, list[Indices]]:
-    """The drawn devices and their measures; and the indices, from devices of their own in the same job."""
+    """The job of the drawn devices, their measures, and the indices: of devices of their own, computed with them.
+
+    values  (samples,) of each tolerance, of the drawn devices
+    """
     count, keys = question.samples, [one.key for one in question.tolerances]
-    laid = np.empty((0, len(keys)))
+    laid = np.empty((0, len(keys)))  # shares of the devices for the indices
     if question.index_samples:
         laid = sampled_shares(len(keys), question.index_samples, question.seed)
     both = [
@@ -181,7 +184,7 @@ def _measured(
 def _tightened(
     question: ToleranceQuestion, values: Sequence[np.ndarray[Any, Any]], cells: CellValues, compute: Compute
 ) -> tuple[Tightened, ...]:
-    """What each narrower tolerance does for the wanted wall; () where none is wanted, or all devices render it."""
+    """What half the width of each tolerance does for the wanted wall; () for no wall, or one that all render."""
     before = stable_marks(question.columns, cells) if question.has_wall else np.ones(1, dtype=bool)
     if before.all():
         return ()
@@ -192,7 +195,7 @@ def _tightened(
     return tightened([one.key for one in question.tolerances], before, after)
 
 
-def _middle(question: ToleranceQuestion, compute: Compute) -> str:
+def _outcome_in_middle(question: ToleranceQuestion, compute: Compute) -> str:
     """The outcome of the device in the middle of all tolerances, to which they lead as they are tightened."""
     axes = _axes(question, [np.array([one.distribution.middle]) for one in question.tolerances])
     columns = [one for one in question.columns if one.name in (STIFFNESS, WALL_IS_STABLE.name)]
@@ -225,7 +228,7 @@ def _bands(
                 high=coverage.largest(possible)[0],
             )
         )
-    return _tried(question, bands, compute), uncharted
+    return _with_tried_walls(question, bands, compute), uncharted
 
 
 def _coverage(
@@ -241,7 +244,7 @@ def _coverage(
     job = sweep_job(question.study_of(_axes(question, values), [WALL_IS_STABLE] if question.has_wall else []))
     first = EdgeJob(job, np.empty(0))
     top = ABOVE * highest_damping(first, TRIED) or 1.0
-    dampings, intervals = np.empty(0), np.empty((question.samples, 0, MOST_INTERVALS, 2))
+    dampings, intervals = np.empty(0), np.empty((question.samples, 0, MOST_INTERVALS, 2))  # as of `Coverage`
     wanted, rounds, n = np.linspace(0.0, top, LINES + 1), 0, 0
     while True:
         edges = compute(f"edges-{n}", replace(first, dampings=wanted), "computing charts of devices")
@@ -259,8 +262,8 @@ def _coverage(
             return coverage, int((edges.status[:, 0] != OK).sum())
 
 
-def _tried(question: ToleranceQuestion, bands: Sequence[Band], compute: Compute) -> tuple[Band, ...]:
-    """The bands with the stiffest wall of each tried on devices drawn anew."""
+def _with_tried_walls(question: ToleranceQuestion, bands: Sequence[Band], compute: Compute) -> tuple[Band, ...]:
+    """The bands, the stiffest and the certain wall of each with the share of devices drawn anew that render it."""
     walls = [wall for band in bands for wall in (band.stiffest, band.certain) if wall is not None]
     if not walls:
         return tuple(bands)

@@ -1,12 +1,8 @@
 """From the [[tolerance]] tables of a study file to tolerances, or to what is wrong with them.
 
-Messages about distributions that reach beyond what a device can have, with what to write instead.
-
-How far a number of the device file can go before the device can no longer be built.
-
 The device format says of some numbers alone how large they may be; others must agree with what stands beside
 them: a mass matrix is positive definite, a filter cuts off below half the sampling frequency. So devices are built
-with the least and the largest value that is drawn, before any is computed.
+with the least and the largest value that is drawn, before any is computed, and messages say what to write instead.
 """
 
 from __future__ import annotations
@@ -145,7 +141,8 @@ def _tolerance(
 def _cut_at_obstacles(law: Distribution, path: str, faults_at: FaultsOf) -> Distribution:
     """The distribution, cut off besides where the number alone is too small or too large for any device.
 
-    path  of the number in full
+    path       of the number in full
+    faults_at  value of the number -> faults of the device with it
     """
     if law.kind not in WITH_TAILS or faults_at(law.middle):
         return law
@@ -287,7 +284,10 @@ def _limits(steps: KeyPath) -> NumberLimits:
 def _limit(
     kind: dict[str, Any], none: float, without: Sequence[str], within: Sequence[str], sign: int = 1
 ) -> tuple[float, int]:
-    """A limit that a subschema sets, and `sign` where the limit itself is not allowed, else 0."""
+    """A limit that a subschema sets, or `none`; and `sign` where the limit itself is not allowed, else 0.
+
+    without, within  keys of a limit that is not allowed itself, and of one that is
+    """
     for key in without:
         if key in kind:
             return float(kind[key]), sign
@@ -310,7 +310,7 @@ def beyond_faults(
     value      of the number in the device file; None: it has none
     width_key  the first of the keys of its table that give the width
     """
-    by_ends = width_key == "low" and not law.spread
+    by_ends = width_key == "low" and not law.spread  # low and high are all that is drawn
     # what is advised about low has nothing to do with high, nor with the middle between them
     inside = [value] if value is not None and law.low <= value <= law.high else []
     starts = [law.middle, *inside, law.low, law.high] if by_ends else [law.middle]
@@ -323,7 +323,7 @@ def beyond_faults(
         return [((width_key,), f"{leads}; with {law.middle:.6g}, {_in_words(fault, path)}; {advice}")]
     found = [one for end in (law.low, law.high) if (one := obstacle(faults_at, start, end)) is not None]
     if not by_ends:
-        advice = _narrower(law, width_key, [one.last for one in found], faults_at) if found else ""
+        advice = _narrower_advice(law, width_key, [one.last for one in found], faults_at) if found else ""
         return [((width_key,), f"{leads}; {_at_end(one, path)}; {advice}") for one in found[:1]]
     faults: TableFaults = []
     for one in found:
@@ -335,20 +335,24 @@ def beyond_faults(
 
 
 def _at_end(one: Obstacle, path: str) -> str:
+    """What is wrong at the end of a distribution, in words; with the value there where other numbers matter."""
     words = _in_words(one.faults[0], path)
     return words if one.is_of(path) else f"with {one.end:.6g}, {words}"
 
 
 def _in_words(fault: Fault, path: str) -> str:
-    """A fault without the advice that it gives about a single device."""
+    """A fault without the advice that it gives about a single device; "it" for the number at the path in full."""
     first = fault.message.split("; ")[0]
     if first.count("(") > first.count(")"):
         first = first[: first.rindex(" (")]
     return f"{'it' if fault.key == path else fault.key} {first}"
 
 
-def _narrower(law: Distribution, width_key: str, ends: Sequence[float], faults_at: FaultsOf) -> str:
-    """What to write for a distribution that stays between `ends`, the farthest values that a device can have."""
+def _narrower_advice(law: Distribution, width_key: str, ends: Sequence[float], faults_at: FaultsOf) -> str:
+    """Advice: the width of a distribution that stays between `ends`, the farthest values that a device can have.
+
+    faults_at  value of the number -> faults of the device with it
+    """
     middle = law.middle
     if law.kind == "lognormal":
         shown, reach = "cut_at_deviations", min(abs(log(end / middle)) for end in ends) / law.spread
@@ -359,6 +363,7 @@ def _narrower(law: Distribution, width_key: str, ends: Sequence[float], faults_a
         reach *= 100.0 / abs(middle) if shown.endswith("_percent") else 1.0
 
     def ends_at(width: float) -> tuple[float, float]:
+        """Ends of the distribution with a width, in the unit of `shown`."""
         if law.kind == "lognormal":
             return middle * exp(-width * law.spread), middle * exp(width * law.spread)
         way = abs(middle) * width / 100.0 if shown.endswith("_percent") else width * (law.spread or 1.0)

@@ -15,9 +15,8 @@ is
 
 At each sample nothing is left to chance: all walls of the rectangle are stable there, by the exact edge.
 
-Limits of damping of a cell's bands of stiffnesses, and the samples at which they are tightest.
-
-Samples of a cell: postures in it and directions of some sectors.
+`Limits` are those of a cell's bands of stiffness, `Tightest` the samples at which they are tightest. A sample is a
+posture in the cell with a direction of some sectors (`Sampler`).
 """
 
 from __future__ import annotations
@@ -149,7 +148,7 @@ class _Slot:
         self.sampler = Sampler(question.sectors, tuple(sectors), random)
 
     def walls(self) -> tuple[float, Floats]:
-        """Largest stiffness, and ranges (levels, 2) of damping. Raises _Failed."""
+        """Largest stiffness [N/m], ranges (levels, 2) of damping [N s/m]. Raises _Failed where nothing is safe."""
         question = self.question
         for halvings in range(HALVINGS + 1):
             samples, coarse = self._lattice(halvings)
@@ -166,7 +165,7 @@ class _Slot:
             tightest = Tightest(self.sampler, samples, intervals, limits.centre)
             self._search(tightest, limits, bands)
             self._attack(tightest, limits, bands)
-            self._try(tightest, limits, bands)
+            self._try_eigenvalues(tightest, limits, bands)
         ranges = np.array([_with_margin(low, high, question.margin) for low, high in limits.ranges.tolist()])
         if not (ranges[0, 0] < ranges[0, 1]):
             raise _Failed(NO_VALUE, NOTHING_COMMON)
@@ -200,7 +199,7 @@ class _Slot:
         return edges
 
     def _points(self, samples: CellSamples) -> list[OperatingPoint]:
-        """The loops at n samples, with each hand. Raises _Failed where a posture cannot be had."""
+        """The operating points (n,) at n samples, one for each hand. Raises _Failed where a posture is missing."""
         question, grid = self.question, self.question.grid
         directions = self.sampler.along(samples) @ grid.axes
         where: Floats | Posture | None = grid.positions(self.cell, samples.posture)
@@ -214,7 +213,7 @@ class _Slot:
         return points
 
     def _top(self, edges: LoopEdgeChords) -> float:
-        """Largest stiffness up to which every band has a range of damping that is stable in all samples."""
+        """Largest stiffness [N/m] up to which every band has a range of damping that is stable in all samples."""
         largest = edges.largest_stiffness
         levels = largest * np.arange(SEARCHED + 1) / SEARCHED
         if largest > 0.0:
@@ -235,7 +234,7 @@ class _Slot:
         return np.column_stack([np.maximum(low, NOTHING * top), high])
 
     def _search(self, tightest: Tightest, limits: Limits, bands: Floats) -> None:
-        """Go on from the tightest samples of each limit to tighter ones. Raises _Failed as `_edges` does."""
+        """Tighten the limits by samples ever closer to the tightest (step 3). Raises _Failed as `_edges` does."""
         step = STEP
         for _ in range(TURNS):
             tried = self.sampler.around_each(tightest.near(step), step, EACH)
@@ -245,7 +244,8 @@ class _Slot:
             step *= SHRINK
 
     def _attack(self, tightest: Tightest, limits: Limits, bands: Floats) -> None:
-        """Look for samples that the limits do not hold at. Raises _Failed where they are found without end."""
+        """Move the limits by random samples and some beside the tightest (step 4), until they hold at all of QUIET
+        rounds. Raises _Failed where there is no end of it."""
         quiet, half, random = 0, ROUND // 2, self.sampler.random
         for _ in range(ROUNDS):
             near = tightest.near(NEARBY)
@@ -259,8 +259,9 @@ class _Slot:
                 return
         raise _Failed(UNDECIDED, DIFFERENT)
 
-    def _try(self, tightest: Tightest, limits: Limits, bands: Floats) -> None:
-        """Search for unstable walls, by eigenvalues. Raises _Failed where they are found without end."""
+    def _try_eigenvalues(self, tightest: Tightest, limits: Limits, bands: Floats) -> None:
+        """Move the limits by unstable walls, searched by eigenvalues (step 5), until none is found. Raises _Failed
+        where there is no end of it."""
         for _ in range(TRIALS):
             unstable = self._unstable(tightest, limits, bands)
             if not len(unstable):
@@ -303,7 +304,7 @@ class _Slot:
         return samples[best[radius[best] > 1.0 + ROUNDING]]
 
     def _radii(self, samples: CellSamples, K: Floats, B: Floats) -> Floats:
-        """Largest root (n,) of a wall at each sample, the largest over the hands; 0 where kernels do not know it:
+        """Largest root (n,) of the wall K, B (n,) at each sample, over all hands; 0 where kernels do not know it:
         there the limits are those of the edges."""
         radii = [np.nan_to_num(radii_at_points(point, K, B), nan=0.0) for point in self._points(samples)]
         return np.asarray(np.max(radii, axis=0))
@@ -338,7 +339,7 @@ class Tightest:
         self.sampler = sampler
         self.damping = np.full((sampler.groups, 2 * intervals.shape[1]), -np.inf)
         self.samples = samples[np.zeros(self.damping.size, dtype=np.int64)]
-        self.spread = np.zeros(self.damping.shape[1])
+        self.spread = np.zeros(self.damping.shape[1])  # by how much each limit differs within the cell
         self.take(samples, intervals, centre)
 
     def take(self, samples: CellSamples, intervals: Floats, centre: Floats) -> None:
@@ -383,6 +384,8 @@ class Tightest:
 class Limits:
     """Limits of damping of each band, with what they are narrowed by.
 
+    centre     (bands,)    damping in the middle of the range [N s/m]; nan where nothing is left
+    extreme    (bands, 2)  tightest lowest and highest damping of the samples; narrowing (bands, 2) of both
     intervals  (N, bands, GAPS, 2)  stable ones at the lattice's samples
     coarse     (N,)  which samples belong to the lattice of every second point
     """
@@ -418,13 +421,16 @@ class Limits:
 
     @property
     def ranges(self) -> Floats:
-        """(bands, 2) damping [N s/m]; NONE where nothing is left."""
+        """Ranges of damping (bands, 2), narrowed [N s/m]; NONE where nothing is left."""
         low, high = (self.extreme + self.narrowing * (1.0, -1.0)).T
         left = ~np.isnan(self.centre) & (low < high)
         return np.where(left[:, None], np.column_stack([low, high]), NONE)
 
     def tighten(self, intervals: Floats) -> None:
-        """Take the limits of further samples where they are tighter, what they are narrowed by as before."""
+        """Take the limits of further samples where they are tighter; what they are narrowed by stays.
+
+        intervals  (N, bands, GAPS, 2)  stable ones at the samples
+        """
         for j in np.flatnonzero(~np.isnan(self.centre)):
             own = around(intervals[:, j], self.centre[j])
             if np.isnan(own).any():  # no stable interval holds the middle: nothing is left of this band
@@ -444,7 +450,7 @@ class Limits:
 
 
 def around(intervals: Floats, damping: float) -> Floats:
-    """Of each sample's intervals (N, GAPS, 2) the one (N, 2) that holds this damping; nan where none does."""
+    """Of each sample's intervals (N, GAPS, 2) the one (N, 2) that holds a damping [N s/m]; nan where none does."""
     inside = (intervals[..., 0] < damping) & (damping < intervals[..., 1])
     out = np.full((len(intervals), 2), np.nan)
     rows, gap = np.nonzero(inside)
@@ -541,7 +547,7 @@ class Sampler:
         return CellSamples(postures[p], s, directions[u]), even[0][p] & even[1][u]
 
     def anywhere(self, count: int) -> CellSamples:
-        """Random samples; a BORDER of their coordinates lies on the border of the cell."""
+        """`count` random samples; the share BORDER of their coordinates lies on the border of the cell."""
         d = self.sectors.dimensions
         sectors = np.array(self.own)[self.random.integers(len(self.own), size=count)]
         posture = self.random.random((count, d))
@@ -549,7 +555,7 @@ class Sampler:
         return CellSamples(posture, sectors, self.random.random((count, d - 1)))
 
     def beside(self, samples: CellSamples, size: float | Floats) -> CellSamples:
-        """Random samples about so far (n, 1) from these: as a share of the cell, and of a face of directions.
+        """Random samples beside these, about `size` (n, 1) away, a share of the cell and of a face of directions.
 
         Where all directions are asked for, a sample goes on from one sector to the next. A single sector ends at
         its border.

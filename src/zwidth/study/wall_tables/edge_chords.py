@@ -1,11 +1,10 @@
 """Edges of many loops' stable sets as chords, from the compiled stages of a chart.
 
-Intervals of damping in which all walls of a band of stiffnesses are stable.
-
-A rectangle of walls [K_low, K_high] x (B_low, B_high) that no edge of the stable set enters is stable as a whole
-or not at all: the number of roots outside the circle changes at an edge only. So the edges that lie in the band,
-seen along B, leave gaps, and one wall in each gap tells whether the gap is stable. A wall lies in the set if a
-ray from it crosses the edge an odd number of times.
+They give the intervals of damping in which all walls of a band of stiffnesses are stable. A rectangle of walls
+[K_low, K_high] x (B_low, B_high) that no edge of the stable set enters is stable as a whole or not at all: the
+number of roots outside the circle changes at an edge only. So the edges that lie in the band, seen along B, leave
+gaps, and one wall in each gap tells whether the gap is stable. A wall lies in the set if a ray from it crosses the
+edge an odd number of times.
 """
 
 from __future__ import annotations
@@ -121,6 +120,7 @@ def _charted_alone(point: OperatingPoint) -> Floats:
 
 
 def _fill_all(loops: LoopTable, chords: Floats, counts: Ints, doubtful: Flags) -> None:
+    """Fill in `chords`, `counts` and `doubtful` of all loops, see `_fill_several`, on several threads."""
     own = local()
 
     def several(first: int, last: int) -> None:
@@ -238,6 +238,7 @@ def stable_damping_intervals(edges: LoopEdgeChords, bands: Floats) -> Floats:
     return out
 
 
+# Fill in `out`, what `stable_damping_intervals` returns; `room` (k, 2) is for the intervals that chords occupy.
 @compiled
 def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, out: Floats) -> None:
     for i in range(len(offsets) - 1):

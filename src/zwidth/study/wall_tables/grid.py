@@ -170,6 +170,7 @@ def _ends_in_space(
 
 
 def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:
+    """Raise WorkspaceError for numbers of cells that are not one, at least 1, for each dimension."""
     if cells is None:
         return
     if len(cells) != dimensions:
@@ -183,6 +184,7 @@ def _check_counts(cells: Sequence[int] | None, dimensions: int) -> None:
 
 
 def _check_plane_alone(ranges: Sequence[Sequence[float] | None]) -> None:
+    """Raise WorkspaceError for a range along z, which a plane has not."""
     if len(ranges) > 2 and ranges[2] is not None:
         raise WorkspaceError(
             "the handle moves in a plane, whose two axes have the ranges x and y", Advice("leave out {}", "z")
@@ -190,6 +192,7 @@ def _check_plane_alone(ranges: Sequence[Sequence[float] | None]) -> None:
 
 
 def _counts(lengths: Floats) -> tuple[int, ...]:
+    """Cells along axes of these lengths (d,) [m]: LONG_SIDE along the longest, of about that size along others."""
     long = LONG_SIDE[len(lengths)]
     return tuple(max(1, round(long * float(length / lengths.max()))) for length in lengths)
 

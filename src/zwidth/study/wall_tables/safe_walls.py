@@ -1,6 +1,6 @@
 """Safe walls over a device's workspace, for a haptic loop to clamp its gains by.
 
-The cells of a table of safe walls as a job, so that a long one is stored and continued.
+The cells of a table are a job (`SafeWallsJob`), so that a long one is stored and continued.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def compute_table(
 
 
 def hand_names(question: CellQuestion) -> tuple[str, ...]:
-    """What the hands are called, in their order; "none" for nobody."""
+    """Names of the hands, in their order; "none" for nobody."""
     return tuple(device.operator_name or NOBODY for device in question.devices)
 
 
@@ -194,7 +194,7 @@ def _all(values: Any, kind: type[Any]) -> bool:
 
 
 def _check_point(question: CellQuestion) -> None:
-    """Raise what is wrong with the device, its assembly or its model, before the cells have it as their status."""
+    """Raise the error about the device, its assembly or its model, before it becomes the status of all cells."""
     from zwidth.errors import PostureError
 
     for device in question.devices:

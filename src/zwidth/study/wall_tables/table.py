@@ -141,7 +141,7 @@ class SafeWalls(Result):
 
     @cached_property
     def rectangles(self) -> Floats:
-        """(cells, 3) stiffness, lowest and highest damping of each cell's rectangle; nan where there is none."""
+        """Stiffness, lowest and highest damping of each cell's rectangle (cells, 3); nan where there is none."""
         out = np.full((self.grid.count, 3), np.nan)
         for cell in np.flatnonzero(self.level):
             one = self.rectangle(int(cell))
@@ -264,7 +264,7 @@ def table_of_cells(
 ) -> SafeWalls:
     """The table from the values of its cells.
 
-    cells  as `job.SafeWallsJob` computes them
+    cells  as `safe_walls.SafeWallsJob` computes them
     span   as in `SafeWalls`
     """
     slots, levels, count = question.slots, question.levels, question.grid.count
@@ -299,7 +299,7 @@ def table_of_cells(
 
 
 def rounded(values: Floats, towards: float) -> Floats:
-    """Numbers of 32 bits, the nearest that are not on the other side of these than `towards`.
+    """The values as numbers of 32 bits, each rounded towards inf or -inf.
 
     >>> rounded(np.array([0.1]), np.inf) >= 0.1, rounded(np.array([0.1]), -np.inf) <= 0.1
     (array([ True]), array([ True]))
@@ -313,7 +313,7 @@ def _level(top: float, ranges: Floats, span: float | None) -> int:
     """How many bands the rectangle takes: with a span the most whose common range is as wide, else those whose
     rectangle has the largest area with B >= 0; 0 where there are none.
 
-    ranges  (levels, 2)
+    ranges  (levels, 2)  of damping [N s/m]
     """
     low, high = np.maximum.accumulate(ranges[:, 0]), np.minimum.accumulate(ranges[:, 1])
     with_range = np.cumprod(ranges[:, 0] <= ranges[:, 1]).astype(bool) & (low < high)
@@ -330,8 +330,8 @@ def _common_rectangle(top: Floats, ranges: Floats, level: Ints, span: float | No
     """The rectangle that is safe in all cells, chosen as in a cell but no stiffer than the rectangle of any; of
     zeros where there is none.
 
-    top     (cells,)
-    ranges  (cells, levels, 2)
+    top     (cells,)  largest stiffness of each [N/m]
+    ranges  (cells, levels, 2)  of damping in each band [N s/m]
     level   (cells,)  of the cells' rectangles
     """
     if not len(top):

@@ -34,7 +34,7 @@ class PlaneArea:
     """A part of a plane.
 
     shape  a shapely polygon or several, in the plane's coordinates [m]
-    area   [m²]
+    area   its area [m²]
     share  of the area that can be reached; nan where nothing can
     """
 

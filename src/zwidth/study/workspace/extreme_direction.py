@@ -5,13 +5,10 @@ plane, or space. Between the samples the extreme is refined, by golden sections 
 search on the sphere, for all points at once. Where a second extreme comes near the first in the samples, both are
 refined, since the samples do not tell which is the larger.
 
-The directions in which a handle can move, and a measure computed along many of them.
-
-The share of directions along which a requirement is met.
-
-In the plane the share of the circle's arc, on the sphere that of its surface. On a circle the ends of the arcs
-are bisected between samples. Arcs that lie between two samples are looked for where the parabola through
-three samples changes its sign. The sphere is cut into circles of latitude with the weights of Gauss and Legendre.
+`ShareOfDirections`: the share of directions along which a requirement is met, in the plane of the circle's arc, on
+the sphere of its surface. On a circle the ends of the arcs are bisected between samples. Arcs that lie between two
+samples are looked for where the parabola through three samples changes its sign. The sphere is cut into circles of
+latitude with the weights of Gauss and Legendre.
 """
 
 from __future__ import annotations
@@ -134,24 +131,26 @@ class _Goal:
         return np.where(none.any(axis=0) if self.strict else everywhere, kind, OK).astype(np.uint8)
 
     def notes(self, shape: tuple[int, ...]) -> tuple[Note, ...]:
-        """A note for each reason, with the points' leading axes."""
+        """A note for each reason, with the index of its first point in an array of this shape."""
         return tuple(
             Note(status, reason, len(places), tuple(int(i) for i in np.unravel_index(min(places), shape)))
             for (status, reason), places in self.points_by_reason.items()
         )
 
 
-SearchResult = tuple[Floats, Floats, NDArray[np.uint8]]
+SearchResult = tuple[Floats, Floats, NDArray[np.uint8]]  # values (n,), directions (n, 3), status (n,)
 
 
-def _in_line(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+def _extreme_on_line(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+    """The extreme over the two ways along a line, at points `indices` (n,) of a search; see `_SEARCH`."""
     components = np.array([[1.0], [-1.0]]) if search.one_sided else np.array([[1.0]])
     f, status = _sampled(search, indices, components, goal, which)
     best = f.argmin(axis=0)
     return _search_result(search, indices, goal.sign * f.min(axis=0), components[best], status)
 
 
-def _in_plane(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+def _extreme_on_circle(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+    """The extreme over a circle, sampled and refined by `_golden`, at points `indices` (n,); see `_SEARCH`."""
     count = 2 * IN_PLANE if search.one_sided else IN_PLANE
     step = float(np.pi / IN_PLANE)
     angles: Floats = np.asarray(step * np.arange(count), dtype=np.float64)
@@ -175,7 +174,8 @@ def _in_plane(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) 
     angle, value = _golden(cost, start - step, start + step)
     best_angle: Floats = angles[k]
     best = lowest.copy()
-    for rows in (slice(0, int(keep[: len(n)].sum())), slice(int(keep[: len(n)].sum()), len(place))):
+    split = int(keep[: len(n)].sum())
+    for rows in (slice(0, split), slice(split, len(place))):
         better = value[rows] < best[place[rows]]
         best[place[rows][better]] = value[rows][better]
         best_angle[place[rows][better]] = angle[rows][better]
@@ -183,7 +183,7 @@ def _in_plane(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) 
 
 
 def _parabola_minimum(f: Floats) -> Floats:
-    """How low each local minimum (s, n) lies by the parabola through its neighbours; inf where there is none."""
+    """Value of each local minimum of samples f (s, n), by the parabola through its neighbours; inf elsewhere."""
     left, right = np.roll(f, 1, axis=0), np.roll(f, -1, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         vertex = f - 0.125 * (left - right) ** 2 / (left - 2.0 * f + right)
@@ -191,7 +191,10 @@ def _parabola_minimum(f: Floats) -> Floats:
 
 
 def _golden(cost, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: ignore[no-untyped-def]
-    """Argument and value of the minimum of each function between its bounds, by golden sections."""
+    """Argument and value (n,) of the minimum of n functions between bounds (n,), by golden sections.
+
+    cost  arguments (n,) -> values (n,)
+    """
     a, b = low.copy(), high.copy()
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
     at_c, at_d = cost(c), cost(d)
@@ -207,10 +210,11 @@ def _golden(cost, low: Floats, high: Floats) -> tuple[Floats, Floats]:  # type: 
     return np.where(left, c, d), np.where(left, at_c, at_d)
 
 
-def _on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+def _extreme_on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints) -> SearchResult:
+    """The extreme over a sphere, sampled and refined by `_compass`, at points `indices` (n,); see `_SEARCH`."""
     points = sphere(2 * ON_SPHERE)
     points = points if search.one_sided else points[:ON_SPHERE]
-    reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))
+    reach = float(np.sqrt(2.0 * np.pi / ON_SPHERE))  # rad, about the distance of two samples
     f, status = _sampled(search, indices, points, goal, which)
     k, n = f.argmin(axis=0), np.arange(len(indices))
     lowest = f[k, n]
@@ -223,7 +227,7 @@ def _on_sphere(search: DirectionSearch, indices: Ints, goal: _Goal, which: Ints)
     value = np.concatenate([lowest, second.min(axis=0)[also]])
     keep = np.isfinite(value)
     start, place, value = start[keep], place[keep], value[keep]
-    end, value = _compass(search, indices[place], start, value, goal, 0.6 * reach)
+    end, value = _compass(search, indices[place], start, value, goal, 0.6 * reach)  # half way, and a little more
     best, best_point = lowest.copy(), points[k].copy()
     split = int(keep[: len(n)].sum())
     for rows in (slice(0, split), slice(split, len(place))):
@@ -282,6 +286,7 @@ def sphere(count: int) -> Floats:
 
 
 def _unit_vectors(angle: Floats) -> Floats:
+    """Unit vectors (..., 2) at angles (...) [rad]."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
@@ -313,7 +318,9 @@ def _search_result(
     return np.where(none, np.nan, values), np.where(none[:, None], np.nan, u), status
 
 
-_SEARCH: Final = {1: _in_line, 2: _in_plane, 3: _on_sphere}
+# Dimensions of the search -> function of search, indices (n,) of its points, goal, and `which` (k,): the number of
+# each point of the search among all points, by which the goal keeps reasons.
+_SEARCH: Final = {1: _extreme_on_line, 2: _extreme_on_circle, 3: _extreme_on_sphere}
 
 
 STILL: Final = 1e-9  # share of the fastest motion; along slower directions the handle counts as fixed
@@ -352,7 +359,7 @@ class DirectionSearch:
         )
 
     def directions(self, which: Ints, components: Floats) -> Floats:
-        """Unit vectors (k, 3) in the base frame."""
+        """Unit vectors (k, 3) in the base frame, of components (k, r) in the bases of points `which` (k,)."""
         u = np.einsum("kir,kr->ki", self.basis[which], components)
         return np.asarray(u / np.linalg.norm(u, axis=-1, keepdims=True))
 
@@ -397,7 +404,7 @@ POINTS_AT_ONCE: Final = 2048  # points at once
 
 @dataclass(frozen=True)
 class ShareOfDirections:
-    """Function of an operating point: the share of its directions along which a requirement is met."""
+    """Operating point -> share of its directions along which a requirement is met: the function of a `Measure`."""
 
     requirement: Requirement
 
@@ -444,35 +451,42 @@ def share_of_directions(requirement: Requirement, point: OperatingPoint) -> Floa
     return np.asarray(share.reshape(point.shape))
 
 
-def _of_line(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+def _share_of_line(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+    """Share (n,) of the two ways along a line that meet a requirement, at points `indices` (n,) of a search."""
     ways = (np.ones((len(indices), 1)), -np.ones((len(indices), 1)))
     return np.asarray(
         np.mean([requirement.met(search.evaluate_along(indices, way).values) for way in ways], axis=0)
     )
 
 
-def _of_circle(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
-    return _of_latitude(requirement, search, indices, 0.0, whole=search.one_sided)
+def _share_of_circle(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+    """Share (n,) of the directions in a plane that meet a requirement, at points `indices` (n,) of a search."""
+    return _share_of_latitude(requirement, search, indices, 0.0, whole=search.one_sided)
 
 
-def _of_sphere(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+def _share_of_sphere(requirement: Requirement, search: DirectionSearch, indices: Ints) -> Floats:
+    """Share (n,) of the directions in space that meet a requirement, at points `indices` (n,) of a search."""
     height, weight = np.polynomial.legendre.leggauss(LATITUDES * (2 if search.one_sided else 1))
     if not search.one_sided:  # the other half is the same
         height = 0.5 * (height + 1.0)
-    parts = [_of_latitude(requirement, search, indices, z, whole=True) for z in height.tolist()]
+    parts = [_share_of_latitude(requirement, search, indices, z, whole=True) for z in height.tolist()]
     return np.asarray(0.5 * weight @ np.array(parts))
 
 
-def _of_latitude(
+def _share_of_latitude(
     requirement: Requirement, search: DirectionSearch, indices: Ints, height: float, *, whole: bool
 ) -> Floats:
-    """The share of a circle (or of its half, which the other half repeats) that meets the requirement."""
+    """Share (n,) of a circle, or of half of it if not `whole`, that meets the requirement, at points `indices`.
+
+    height  of the circle of latitude on the unit sphere, -1 to 1; 0 in the plane
+    """
     turn, radius = (2.0 * np.pi if whole else np.pi), np.sqrt(1.0 - height * height)
     count = 2 * SAMPLES if whole else SAMPLES
     step = turn / count
     third = (height,) if search.basis.shape[2] == 3 else ()
 
     def margin(which: Ints, angle: Floats) -> Floats:
+        """Margin (k,) of the requirement at angles (k,) [rad], of points by their places (k,) in `indices`."""
         parts = [radius * np.cos(angle), radius * np.sin(angle), *(np.full(len(angle), z) for z in third)]
         values = search.evaluate_along(indices[which], np.stack(parts, axis=-1)).values
         return np.where(np.isnan(values), -np.inf, requirement.margin(values))
@@ -509,7 +523,12 @@ def _unsampled_crossings(m: Floats) -> tuple[Ints, Ints, Floats]:
 
 
 def _met_share(margin, mark: Floats, met: Flags, turn: float) -> Floats:  # type: ignore[no-untyped-def]
-    """The share of the turn between marks (s, n) that is met; where it ends between two, that is bisected."""
+    """Share (n,) of the turn that meets the requirement: between marks that do; its ends are bisected between two.
+
+    margin  index of points and angles -> margin of the requirement
+    mark    (s, n)  angles, ascending [rad];   met  (s, n)  whether it is met there
+    turn    angle of the whole [rad]
+    """
     after, after_met = np.roll(mark, -1, axis=0), np.roll(met, -1, axis=0)
     after[-1] += turn
     length = np.where(met & after_met, after - mark, 0.0).sum(axis=0)
@@ -527,4 +546,4 @@ def _met_share(margin, mark: Floats, met: Flags, turn: float) -> Floats:  # type
     return np.asarray(length / turn)
 
 
-_SHARES: Final = {1: _of_line, 2: _of_circle, 3: _of_sphere}
+_SHARES: Final = {1: _share_of_line, 2: _share_of_circle, 3: _share_of_sphere}

@@ -1,7 +1,6 @@
 """Maps: measures all over a plane of the workspace.
 
-The exact edge of the reachable set on a map's plane, where the links' lengths alone decide it.
-
+`reach_outline`: the exact edge of the reachable set on a map's plane, where the links' lengths alone decide it.
 Every chain of links from the base to the handle allows a shell about its base (`model.posture_batch`). For many
 mechanisms whose joints all turn freely, the handle reaches every point that lies in all shells. That is checked
 against every cell of the map; where it holds, the edge consists of exact arcs of circles.
@@ -125,6 +124,7 @@ class MapJob:
 
     @cached_property
     def _positions(self) -> Floats:
+        """Handle positions (cells, 3) [m]."""
         return self.plane.positions.reshape(-1, 3)
 
     def compute(self, first: int, last: int) -> CellValues:
@@ -148,6 +148,7 @@ class MapJob:
         return CellValues(np.concatenate(values, axis=1), np.stack(status, axis=1), tuple(notes))
 
     def _columns(self, measure: Measure) -> tuple[str, ...]:
+        """Columns of one measure: its name, and the components of its extreme direction where it has one."""
         directed = isinstance(self.direction, str) and measure.along
         return (measure.name, *(f"{measure.name}_direction_{c}" for c in COMPONENTS if directed))
 
@@ -280,7 +281,7 @@ def map_dataset(job: MapJob, cells: Cells) -> xr.Dataset:
     column = 0
     for measure in job.requested_measures:
         width = len(job._columns(measure))
-        unit = measure.unit.replace("^r", f"^{len(mechanism.drives.names)}")
+        unit = measure.unit.replace("^r", f"^{len(mechanism.drives.names)}")  # r: number of drives
         attributes = {
             **unit_attributes(unit),
             "title": measure.title,
@@ -322,6 +323,7 @@ def reachable(dataset: xr.Dataset, name: str) -> Flags:
 
 
 def _flags() -> dict[str, Any]:
+    """Attributes of a variable of status: its values and their meanings."""
     meanings = " ".join(text.replace(" ", "_") for text in STATUS.values())
     return {"flag_values": np.array(list(STATUS), dtype=np.uint8), "flag_meanings": meanings}
 
@@ -336,6 +338,7 @@ def _sentence(note: Note, plane: PlaneGrid) -> str:
 
 
 def _check_reached(job: MapJob, cells: Cells) -> None:
+    """Raise WorkspaceError where the handle reaches no cell."""
     if not np.isin(cells.status, NO_POSTURE).all():
         return
     mechanism = job.device.mechanism
@@ -418,7 +421,10 @@ def reach_outline(dataset: xr.Dataset, name: str) -> Any:
 
 
 def _decided_by(table: Floats, dataset: xr.Dataset, name: str) -> bool:
-    """Whether the reached cells are exactly those that lie in all shells."""
+    """Whether the reached cells of a map are exactly those that lie in all shells.
+
+    table  (shells, 5)  of `shells_attribute`
+    """
     at, status = plane_positions(dataset), dataset[f"{name}_status"].values
     inside = np.ones(status.shape, dtype=np.bool_)
     unsure = status == SINGULAR
@@ -443,7 +449,7 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
         return known
     low, high = float(finite.min()), float(finite.max())
     for _ in range(LAYERS):
-        next_to, behind = _along(known, 1), _along(known, 2)
+        next_to, behind = _values_away(known, 1), _values_away(known, 2)
         with np.errstate(invalid="ignore"):
             straight = _mean(2.0 * next_to - behind)
         estimate = np.where(np.isnan(straight), _mean(next_to), straight)
@@ -451,8 +457,8 @@ def continued(values: Floats, status: NDArray[np.uint8]) -> Floats:
     return known
 
 
-def _along(values: Floats, steps: int) -> Floats:
-    """The values (8, ny, nx) a number of cells away along rows, columns and diagonals; nan outside the grid."""
+def _values_away(values: Floats, steps: int) -> Floats:
+    """For each cell the values (8, ny, nx) so many steps away along rows, columns and diagonals; nan outside."""
     padded = np.pad(values, steps, constant_values=np.nan)
     rows, columns = values.shape
     ways = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
@@ -481,7 +487,7 @@ def map_document(
     """
     names = measures_of(dataset)
     axes = dataset.attrs["plane_axes"]
-    each = {name: _measure(dataset, name, device) for name in names}
+    each = {name: _measure_document(dataset, name, device) for name in names}
     document = {
         "measure": names[0],
         "plane": dataset.attrs["plane"],
@@ -524,8 +530,8 @@ def why_no_cell(dataset: xr.Dataset) -> str | None:
     return "no cell has a value" + (f": {notes[0]}" if notes else "")
 
 
-def _measure(dataset: xr.Dataset, name: str, device: Device | None) -> dict[str, Any]:
-    """One measure of the document."""
+def _measure_document(dataset: xr.Dataset, name: str, device: Device | None) -> dict[str, Any]:
+    """One measure of a map by key and unit; `device` as for `map_document`."""
     attributes = dataset[name].attrs
     document = {
         "title": attributes["title"],
@@ -542,10 +548,11 @@ def _measure(dataset: xr.Dataset, name: str, device: Device | None) -> dict[str,
 
 
 def _notes(dataset: xr.Dataset, name: str) -> list[str]:
+    """Why cells have no value of a measure, a sentence for each reason."""
     return str(dataset[name].attrs["notes"]).splitlines()
 
 
 def _components(name: str, vectors: Sequence[Any] | np.ndarray, unit: str = "") -> dict[str, Any]:
-    """Columns of vectors (..., 3)."""
+    """Columns name_x, name_y, name_z of vectors (..., 3), with the unit's ending."""
     rows = np.reshape(vectors, (-1, 3))
     return {f"{name}_{axis}{unit}": rows[:, k] for k, axis in enumerate("xyz")}

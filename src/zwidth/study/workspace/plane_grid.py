@@ -107,7 +107,7 @@ def plane_of(
     first, second, names = _axes(axes, own)
     _check_intersection(np.cross(first, second), point, own, reach)
     sides = (("x", x, first), ("y", y, second))
-    ranges = [_range(name, given, axis, mechanism.workspace, reach) for name, given, axis in sides]
+    ranges = [_range_along(name, given, axis, mechanism.workspace, reach) for name, given, axis in sides]
     nx, ny = _counts(cells, ranges)
     normal = np.cross(first, second)
     return PlaneGrid(first, second, (point @ normal) * normal, _line(*ranges[0], nx), _line(*ranges[1], ny), names)
@@ -149,6 +149,7 @@ def reachable_set(mechanism: Mechanism, assembly: str | None) -> ReachableSet:
 
 
 def _short(value: float) -> str:
+    """A coordinate as text, of 4 digits, without a rounding error beside 0."""
     return f"{round(value, 9) + 0.0:.4g}"
 
 
@@ -163,6 +164,11 @@ def _reach_normal(reach: Floats) -> Floats | None:
 def _axes(
     requested_axes: str | Sequence[float] | None, reach_normal: Floats | None
 ) -> tuple[Floats, Floats, tuple[str, str]]:
+    """Unit vectors (3,) of the plane's axes, and their names. Raises WorkspaceError for axes that are none.
+
+    requested_axes  as for `plane_of`; None: axes of the base frame in the plane that the handle keeps, or others
+    reach_normal    (3,)  of that plane; None where the handle keeps none
+    """
     unit = np.eye(3)
     if requested_axes is None:
         for name, (a, b) in AXES.items():
@@ -191,20 +197,22 @@ def _axes(
 
 
 def _orthonormal(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors along a, and across it towards b. Raises WorkspaceError for a zero or parallel vector."""
     lengths = [float(np.linalg.norm(v / (np.abs(v).max() or 1.0))) for v in (a, b)]
     if not all(lengths):
         raise WorkspaceError(
-            f"an axis of the plane has length 0: {_vector(a)} and {_vector(b)}; give two vectors that are not zero"
+            f"an axis of the plane has length 0: {_text(a)} and {_text(b)}; give two vectors that are not zero"
         )
     first, other = (v / np.abs(v).max() / length for v, length in zip((a, b), lengths, strict=True))
     second = other - (first @ other) * first
     across = float(np.linalg.norm(second))
     if across < PARALLEL:
-        raise WorkspaceError(f"the plane's axes {_vector(a)} and {_vector(b)} are parallel; give two that are not")
+        raise WorkspaceError(f"the plane's axes {_text(a)} and {_text(b)} are parallel; give two that are not")
     return first, second / across
 
 
-def _vector(v: Floats) -> str:
+def _text(v: Floats) -> str:
+    """A vector as text."""
     return "(" + ", ".join(f"{c:.6g}" for c in v) + ")"
 
 
@@ -215,7 +223,7 @@ def _check_intersection(normal: Floats, point: Floats, own: Floats | None, reach
     known, k = reach.positions, int(np.argmax(np.abs(own)))
     aligned = bool(abs(own[k]) > 1.0 - PARALLEL**2)
     plane = next((n for n, axes in AXES.items() if aligned and k not in axes), "")
-    where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_vector(own)}"
+    where = f"the plane {'xyz'[k]} = {_short(known[0, k])} m" if aligned else f"the plane across {_text(own)}"
     if np.linalg.norm(np.cross(normal, own)) > PARALLEL:
         advice = Advice("ask for {}", "axes", plane) if plane else Advice("leave {} out", "axes")
         raise WorkspaceError(f"the handle cannot leave {where}, and meets the requested plane in a line", advice)
@@ -227,9 +235,13 @@ def _check_intersection(normal: Floats, point: Floats, own: Floats | None, reach
         )
 
 
-def _range(
+def _range_along(
     name: str, given: Sequence[float] | None, axis: Floats, bounds: Floats, reach: ReachableSet
 ) -> tuple[float, float]:
+    """Lowest and highest coordinate along a plane's axis (3,) [m]: as given, of the file, or of what is reached.
+
+    bounds  (3, 2)  of the file's workspace along the base frame's axes [m]; nan where it gives none
+    """
     if given is not None:
         low, high = (float(value) for value in given)
         if not (np.isfinite([low, high]).all() and low < high):
@@ -257,6 +269,7 @@ def rounded_outwards(low: float, high: float) -> tuple[float, float]:
 
 
 def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) -> tuple[int, int]:
+    """Points along both axes, as `plane_of` reads them. Raises WorkspaceError for too few or too many."""
     if cells is None:
         lengths = [high - low for low, high in ranges]
         if not min(lengths) > 0.0:
@@ -273,7 +286,7 @@ def _counts(cells: Sequence[int] | None, ranges: Sequence[tuple[float, float]]) 
 
 
 def _line(low: float, high: float, count: int) -> Floats:
-    """Equidistant points, symmetric about 0 if the ends are, rounded to short decimals such as -0.15.
+    """`count` equidistant coordinates [m], symmetric about 0 if the ends are, rounded to short decimals.
 
     >>> _line(-0.3, 0.3, 9).tolist()
     [-0.3, -0.225, -0.15, -0.075, 0.0, 0.075, 0.15, 0.225, 0.3]
