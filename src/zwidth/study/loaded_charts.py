@@ -253,7 +253,7 @@ def without_push(load: Load | None) -> Load | None:
 
 @dataclass(frozen=True)
 class _Pushes:
-    """The charts of one posture.
+    """The charts of a device in one posture under pushes of the hand.
 
     bare  the device without load;   here  its operating point
     load  whose push is replaced;    kept  what is left of it without one
@@ -300,7 +300,7 @@ class _Pushes:
         return PushedChart(push, status, chart, found, sideways, _hand_neglected(point, chart), surface, why)
 
     def _fixed_surface(self, device: Device, push: float, near: float) -> tuple[float, str]:
-        """The largest stiffness with surface and hand fixed, and "ok" or why there is none.
+        """Largest stiffness with surface and hand fixed [N/m], and "ok"; nan, and why there is none.
 
         near  the largest stiffness with the posture kept [N/m]
         """
@@ -362,7 +362,7 @@ def _balanced_stiffness(excess: Callable[[float], float], near: float) -> tuple[
 
 
 def _hand_neglected(point: OperatingPoint, chart: StabilityChart) -> float:
-    """The largest stiffness with the change of the hand's force left out; nan if there is none."""
+    """Largest stiffness with the change of the hand's force left out [N/m]; nan if there is none."""
     if point.load is None or point.load.hand == "neglected":
         return chart.stiffness_max
     try:

@@ -170,7 +170,7 @@ class JobSeries:
         return cells.in_memory()
 
     def _executor_in_time(self) -> Executor | None:
-        """Processes or the cluster; None while this process alone is faster."""
+        """Processes or the cluster, opened when first needed; None while this process alone is faster."""
         asked = self.cluster is not None or self.time_limit is not None
         several = (self.workers or cores()) > 1 and self._spent > PATIENCE
         if self._executor is None and (asked or several):

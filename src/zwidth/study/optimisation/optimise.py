@@ -240,7 +240,7 @@ class _Archive:
         )
 
     def _contacts(self, found: Optimisation) -> tuple[Contact, ...]:
-        """A wall of each design of the front, simulated."""
+        """A wall of each design of the front, simulated: see `simulate_front_contact`."""
         contacts, count = list[Contact](), len(found.front)
         for place in range(count):
             self._tell("simulating walls of the front", place, count)
@@ -342,7 +342,7 @@ def _was_written_for(path: Path, study: Study) -> bool:
 
 
 def _stem(study: Study) -> str:
-    """What the names of the files begin with: the name of the device's."""
+    """Beginning of the names of the designs' files: the name of the device's file."""
     return Path(study.device.label).name.removesuffix(".toml")
 
 

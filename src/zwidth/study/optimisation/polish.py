@@ -47,7 +47,7 @@ PROBES: Final = (1.0, 0.25, 0.0625)  # of that, tried at once; then the last of 
 
 @dataclass(frozen=True)
 class _Linear:
-    """What is known to first order round one design.
+    """Values and derivatives of objectives and demands at one design, from which others are estimated.
 
     shares      (f,)  its free variables
     objectives  of each, less being better: values (p,) at p points, and their derivatives (p, f)

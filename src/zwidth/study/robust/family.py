@@ -210,7 +210,7 @@ class Family:
         return from_document(document, self.device.label).at_point(self.operating_point).loop
 
     def _point_with_operator(self, document: dict[str, Any]) -> OperatingPoint | None:
-        """The point with a document's operator, the rest not read again; None if the operator has faults."""
+        """The operating point with a document's operator, all else as it is; None if the operator has faults."""
         table = document.get("operator")
         if table is None:
             return self.operating_point.without_operator

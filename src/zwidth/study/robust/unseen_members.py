@@ -435,7 +435,7 @@ def _climb(
 
 
 def _around(member: FamilyMember, free: Sequence[int], step: float) -> Iterator[FamilyMember]:
-    """The neighbours that a search tries if none of them is worse, at this step and all smaller ones."""
+    """The neighbours that a search tries next, at this step and all smaller ones, if none has a larger radius."""
     while step >= LAST_STEP:
         for k in free:
             yield _neighbour(member, k, -step)

@@ -109,7 +109,7 @@ def _stiffnesses(
     first: int,
     last: int,
 ) -> None:
-    """Fill in `out` for loops first to last - 1."""
+    """Fill in `out` (N,) with `stiffness_to_first_order` of loops first to last - 1 [N/m]."""
     for i in range(first, last):
         if loops.section_count[i] == 0:
             continue
@@ -122,7 +122,7 @@ def _stiffnesses(
 
 @compiled_lean
 def _read_piece(circle: CircleFactors, polynomials: Floats, pieces: EdgePieces, k: int) -> float:
-    """r of piece k for a loop; for the end of the curve its K."""
+    """r of piece k of the edge, see `EdgePieces`, for a loop; of an END of the curve its K [N/m]."""
     kind, angle, N = pieces.kind[k], pieces.angle[k], circle.sizes[DEGREE]
     if kind == CURVE:
         K, B, _, _ = wall_at(circle, angle)

@@ -115,7 +115,7 @@ class Distribution:
         return np.asarray(self.middle + share * (x - self.middle))
 
     def _ends(self) -> tuple[float, float]:
-        """Distribution function of the whole distribution at low and at high."""
+        """Shares of the whole distribution, before the cut, below low and below high."""
         from scipy.special import ndtr
 
         if self.kind == "lognormal":

@@ -237,7 +237,7 @@ def _coverage(
     counts: Sequence[int],
     compute: Compute,
 ) -> tuple[Coverage, int]:
-    """How many drawn devices are stable along lines of damping: even ones, then finer ones where it matters.
+    """How many drawn devices are stable along lines of damping: even ones, then finer ones (`refined_dampings`).
 
     Returns  the count of stable devices, and how many have no chart and count as not stable
     """

@@ -214,7 +214,8 @@ def _width_key(table: dict[str, Any]) -> str:
 def _with_tails(
     table: dict[str, Any], kind: str, key: str, value: float, limits: NumberLimits, faults: TableFaults
 ) -> Distribution | None:
-    """A normal or lognormal distribution, cut off where the number would not be valid."""
+    """A normal or lognormal distribution by the width in its table, cut off where the number is not valid; None
+    with a fault, which is added."""
     cut = float(table.get("cut_at_deviations", CUT))
     low, high = table.get("low"), table.get("high")
     if kind == "lognormal":
@@ -242,7 +243,7 @@ def _with_tails(
 
 
 def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: TableFaults) -> Distribution | None:
-    """A uniform or triangular distribution."""
+    """A uniform or triangular distribution by the width in its table; None with a fault, which is added."""
     low, high = table.get("low"), table.get("high")
     percent = table.get("plus_minus_percent")
     middle = value
@@ -262,7 +263,7 @@ def _bounded(table: dict[str, Any], kind: str, key: str, value: float, faults: T
 
 
 def _allowed(limits: NumberLimits) -> str:
-    """What values are allowed, in words."""
+    """The values that a number of the device file may have, in words."""
     words = []
     if limits.least > -inf:
         words.append(f"{'above' if limits.without_least else 'at least'} {limits.least:.6g}")

@@ -157,7 +157,7 @@ def _fill_several(
 
 @compiled_lean
 def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
-    """The chords of the rings of arcs; -1 where there are too many, or one is not finite."""
+    """Write the chords of the edge's rings to `out`; their number, -1 for too many, or one that is not finite."""
     arcs, n = memory.arcs, 0
     for k in range(memory.counts[ARCS]):
         following = arcs.next_arc[k]
@@ -180,7 +180,7 @@ def _fill_chords(memory: EdgeMemory, out: Floats) -> int:
 
 @compiled_lean
 def _add_curve(memory: EdgeMemory, k: int, out: Floats, n: int) -> int:
-    """PIECES chords for each interval between the nodes of a curve's arc; their number so far, -1 as above.
+    """Write PIECES chords for each interval between the nodes of arc k; the number so far, -1 as `_add_chord`.
 
     The interval is cut at equal steps of the angle, with t = tan(theta/2); its second differences tell how far the
     curve lies beside the chords.
@@ -213,7 +213,7 @@ def _add_curve(memory: EdgeMemory, k: int, out: Floats, n: int) -> int:
 
 @compiled_lean
 def _add_chord(out: Floats, n: int, x: float, y: float, u: float, v: float, sag_K: float, sag_B: float) -> int:
-    """One more chord; the number of chords, -1 where memory is full or an end is not finite."""
+    """Write chord n; the number of chords, -1 where memory is full or an end is not finite."""
     if n >= len(out) or not np.isfinite(x + y + u + v):
         return -1
     out[n, K0], out[n, B0], out[n, K1], out[n, B1], out[n, SAG_K], out[n, SAG_B] = x, y, u, v, sag_K, sag_B
@@ -259,7 +259,7 @@ def _fill_intervals(chords: Floats, offsets: Ints, bands: Floats, room: Floats, 
 
 @compiled_lean
 def _obstacles(chords: Floats, first: int, last: int, low: float, high: float, room: Floats) -> int:
-    """The intervals of damping that chords in the band occupy, ascending by their lower ends; their number."""
+    """Write to `room` the intervals of damping that chords in a band occupy, by ascending lower end; how many."""
     n = 0
     for c in range(first, last):
         x, y, u, v = chords[c, K0], chords[c, B0], chords[c, K1], chords[c, B1]
@@ -326,7 +326,7 @@ def common_interval(intervals: Floats) -> tuple[float, float]:
 
 @compiled
 def _common(intervals: Floats, room: Floats) -> tuple[float, float]:
-    """Cut the intervals that are left by those of one loop after the other."""
+    """The longest common interval: what is left is cut by the intervals of one loop after the other."""
     count, now = 1, 0
     room[0, 0, 0], room[0, 0, 1] = -np.inf, np.inf
     for i in range(len(intervals)):
