@@ -23,16 +23,17 @@ class Argument:
     sentence  what it is, beginning with a capital and without a full stop; its unit stands at the end, unless the
               sentence has it
     unit      "" for none
-    kind      a number, a whole one, one of `choices`, yes or no, several numbers or whole ones, or a text
+    kind      a number, a whole one, one of `choices`, yes or no (flag), several numbers (vector), several whole
+              ones (counts), or a text
     default   what is taken where it is left out; None: nothing, or what `left_out` says in words
     least, above, most, below  limits of a number: at least, more than, at most, less than
     choices   the texts that are allowed
     lengths, example  how many numbers a vector may have, and one that is allowed
     value     what stands for its value in a command line
     option    what the command line calls it, where that is not the name; with a slash what says yes and no
-    repeated  may the command line give it several times?
-    required  must the command line give it?
-    key       in a study file
+    repeated  whether the command line may give it several times
+    required  whether the command line must give it
+    key       its name in a study file; "" where none has it
     hint      what a message adds where the value is not allowed
     """
 
@@ -113,6 +114,7 @@ class Argument:
 
 
 def _quoted(value: Any) -> str:
+    """The value as a message repeats it: a float with ten digits, anything else cut short."""
     return f"{value:.10g}" if isinstance(value, float) else repr(value)[:LONGEST_QUOTE]
 
 
@@ -125,7 +127,7 @@ def by_name(*arguments: Argument) -> Arguments:
 
 
 def check_arguments(arguments: Arguments, **values: Any) -> None:
-    """Raise ArgumentError for the first value that is not allowed; None, where left out, is."""
+    """Raise ArgumentError for the first value that is not allowed; None stands for one that is left out."""
     for name, value in values.items():
         if value is not None:
             arguments[name].check(value)

@@ -27,7 +27,8 @@ def listening(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compiling(name: str) -> Iterator[None]:
-    """Report when the compilation of a kernel begins and ends; without a listener, log the first use once."""
+    """Report to the listeners when the compilation of the kernel `name` begins and ends; without any, warn
+    once."""
     if not _listeners and name.startswith("zwidth."):
         _log_first_use()
     for listener in _listeners:
@@ -39,6 +40,7 @@ def compiling(name: str) -> Iterator[None]:
 
 @cache
 def _log_first_use() -> None:
+    """Warn that kernels are being compiled; only the first call does, as the cache answers the others."""
     logging.getLogger("zwidth").warning(
         "zwidth: first use: compiling kernels for this processor, which takes up to a minute in all; "
         "the command `zwidth compile` does it beforehand"

@@ -114,6 +114,10 @@ def can_be_taken_apart() -> bool:
 
 
 def _kernel(function: Function, options: dict[str, Any]) -> Function:
+    """The function as a compiled kernel; itself where NUMBA_DISABLE_JIT is set.
+
+    options  of numba's compilation, beyond `OPTIONS`; with APART: never inlined
+    """
     if config.DISABLE_JIT:
         # 1/0 is inf in kernels, as of NumPy's numbers; Python's raise, and so would parts of its complex numbers
         function.__globals__.setdefault("complex", np.complex128)
@@ -131,7 +135,8 @@ class _PartLibrary(JITCodeLibrary):
 
     class _Unloaded:
         def set_env(self, name: str, environment: Any) -> None:
-            """Constants that Python would fetch: kernels have none, and nothing is loaded that could hold them."""
+            """Do nothing: kernels have no constants that Python would fetch, and no code is loaded to hold
+            them."""
 
     @property
     def codegen(self) -> Any:
@@ -139,9 +144,10 @@ class _PartLibrary(JITCodeLibrary):
         return self._Unloaded()
 
     def _optimize_final_module(self) -> None:
-        """Left to the kernel that Python calls."""
+        """Do nothing: optimising is left to the kernel that Python calls."""
 
     def _finalize_final_module(self) -> None:
+        """Check the module and call it final; numba would also load it here."""
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
@@ -201,6 +207,7 @@ class _PartCompiler(compiler.CompilerBase):
         self.state.flags = _Flags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
+        """Numba's passes for code without Python objects, which fill the library of this class."""
         self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         self.state.library.enable_object_caching()
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)]
@@ -219,7 +226,10 @@ class _EntryCompiler(_PartCompiler):
 
 
 class _Entry(registry.CPUDispatcher):
-    """A kernel as Python calls it."""
+    """A kernel as Python calls it.
+
+    kernel  the same as other kernels call it, to which calls from Python go first; None: there is none
+    """
 
     def __init__(
         self, function: Callable[..., Any], options: dict[str, Any], kernel: _Kernel | None = None
@@ -232,6 +242,7 @@ class _Entry(registry.CPUDispatcher):
         self._kernel = kernel
 
     def add_overload(self, result: Any) -> None:
+        """Register new machine code here, and at `kernel`, which then calls it without asking again."""
         super().add_overload(result)
         if self._kernel is not None:
             self._kernel._insert([kind._code for kind in result.signature.args], result.entry_point, False)
@@ -282,6 +293,7 @@ class _Kernel(TakesAddresses, registry.CPUDispatcher):
         return [] if self._entry is None else list(self._entry.overloads)
 
     def add_overload(self, result: Any) -> None:
+        """Keep a translation for other kernels, after a check that it returns no address of its own variables."""
         check_returned_address(self.py_func.__qualname__, result.signature.return_type)
         # not given to numba's own table of what Python may call: there is nothing to call
         self.overloads[tuple(result.signature.args)] = result

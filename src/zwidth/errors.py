@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from zwidth.device.faults import Fault
     from zwidth.study.robust.family import RangeFault
 
-Spelling = Callable[[str, str | None], str]
+Spelling = Callable[[str, str | None], str]  # an argument's name in Python, and its value or None -> its spelling
 
 
 def as_argument(name: str, value: str | None) -> str:
@@ -115,7 +115,7 @@ class FileError(ZwidthError, ValueError):
     """A file that is not read.
 
     lines    why not, one fault each; without the file's name where it says nothing of a line
-    missing  is there no such file?
+    missing  whether there is no such file
     """
 
     def __init__(self, *lines: str, missing: bool = False) -> None:

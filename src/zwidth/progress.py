@@ -35,7 +35,8 @@ def repeated(call: Callable[[], None]) -> Iterator[None]:
 def watched(progress: Progress | None, stage: str, done: Callable[[], int], of: int) -> Iterator[None]:
     """Report the progress of compiled code that runs inside this block, from a thread beside it.
 
-    done  reads the number of steps done from an array that the code fills without the interpreter's lock
+    stage  name of what is computed;   of  number of its steps
+    done   reads the number of steps done from an array that the code fills without the interpreter's lock
     """
     if progress is None:
         yield

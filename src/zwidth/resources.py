@@ -92,6 +92,7 @@ def _check_gpu() -> None:
 
 
 def _first_line(error: Exception) -> str:
+    """First line of an error's message; the name of its class where the message is empty."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0]
 
 
@@ -123,6 +124,7 @@ def in_chunks(kernel: Callable[[int, int], None], count: int) -> None:
 
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
+    """The pool of so many threads, made once."""
     return ThreadPoolExecutor(threads, thread_name_prefix="zwidth")
 
 

@@ -58,7 +58,7 @@ class Entry:
     before: str = ""
 
     def key(self, attribute: str) -> str:
-        """The key itself: name and unit."""
+        """Key in the document: name and unit, such as "damping_Ns_per_m"."""
         unit = self.unit.replace(" ", "").replace("^", "").replace("/", "_per_")
         return "_".join(filter(None, (self.name or attribute, unit)))
 
@@ -98,7 +98,7 @@ def entries_of(kind: type) -> dict[str, tuple[str, Entry]]:
 
 
 def keys_of(kind: type) -> list[str]:
-    """The keys themselves, of a document that leaves none out."""
+    """Keys of a class's document in their order, with those that are left out where they are empty."""
     return [key for key, _ in entries_of(kind).values()]
 
 
@@ -129,6 +129,7 @@ class Documented:
 
 
 def _plain(value: Any, lists: bool) -> Any:
+    """The value as plain data: a part as its document, a tuple as a list; with `lists` also an array as a list."""
     if isinstance(value, Documented):
         return value.document()
     if isinstance(value, tuple | list):

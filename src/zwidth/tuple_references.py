@@ -110,6 +110,7 @@ class _FieldType(AttributeTemplate):
     key = TupleReference
 
     def generic_resolve(self, reference: TupleReference, name: str) -> types.Type | None:
+        """Type of a field by its name, as a kernel gets it; None where the tuple has no such field."""
         if name not in reference.fields.fields:
             return None
         return handed_over(reference.fields[reference.fields.fields.index(name)])

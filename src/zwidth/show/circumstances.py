@@ -93,6 +93,7 @@ def wall_law_parts(controller: Controller, *, spell_out: bool = False) -> list[s
 
 
 def _filter(low_pass: FirstOrder | Butterworth) -> str:
+    """A low-pass filter in words: its order, and its time constant or cutoff frequency."""
     from zwidth.loop.controller import FirstOrder
 
     if isinstance(low_pass, FirstOrder):
@@ -102,11 +103,12 @@ def _filter(low_pass: FirstOrder | Butterworth) -> str:
 
 
 def _given(value: float, unit: str = "") -> str:
+    """A number of the device file as it was written there, with its unit."""
     return typed(as_written(value, unit))
 
 
 def value_text(value: Any) -> str:
-    """A member's value, in four digits where it is a number.
+    """A value of a family's member, in four digits where it is a number.
 
     >>> value_text(30004.0), value_text(0.74483), value_text("thesis-arm")
     ('30000', '0.7448', 'thesis-arm')

@@ -75,6 +75,7 @@ def new_folder(path: Path) -> Iterator[Path]:
 
 
 def _netcdf(draft: Path, dataset: xr.Dataset) -> None:
+    """Write the dataset as NetCDF 3, with uint8 as int16, in the variables and in their attributes."""
     signed = dataset.copy()
     for name, variable in dataset.variables.items():
         if variable.dtype == np.uint8:
@@ -88,6 +89,7 @@ def _netcdf(draft: Path, dataset: xr.Dataset) -> None:
 
 
 def _matlab(draft: Path, dataset: xr.Dataset) -> None:
+    """Write the dataset as a MAT file, with a header that does not change from day to day."""
     from scipy.io import savemat
 
     arrays: dict[str, Any] = {_matlab_name(str(name)): _cells(v.values) for name, v in dataset.variables.items()}
@@ -102,11 +104,12 @@ def _matlab(draft: Path, dataset: xr.Dataset) -> None:
 
 
 def _struct(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Attributes under names that MATLAB takes, which `savemat` writes as a struct."""
     return {_matlab_name(str(key)): value for key, value in attributes.items()}
 
 
 def _matlab_name(name: str) -> str:
-    """A name that MATLAB takes."""
+    """The name in letters, digits and _, a letter first. Raises OutputError for one too long for MATLAB."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     plain = plain if plain[:1].isalpha() else f"n_{plain}"
     if len(plain) > LONGEST_NAME:
@@ -115,7 +118,7 @@ def _matlab_name(name: str) -> str:
 
 
 def _cells(values: np.ndarray) -> np.ndarray:
-    """Texts as a cell array."""
+    """The array as MATLAB takes it: texts as objects, which become a cell array."""
     return values.astype(object) if values.dtype.kind in "UT" else values
 
 
@@ -129,7 +132,7 @@ Columns = Mapping[str, Sequence[Any]]
 def write_sweep_csv(path: Path, sweep: Sweep, renamed: Callable[[Any], Any] = dict) -> None:
     """Write a study's designs as a table, one a row, whole or not at all.
 
-    renamed  changes the names of the columns
+    renamed  gives the columns of a piece the names that they have in the file
     Raises   OutputError  where the file cannot be written
     """
     with replacing(path) as draft, open(draft, "w", encoding="utf-8", newline="\n") as file:
@@ -166,7 +169,7 @@ def write_sweep_zarr(path: Path, sweep: Sweep) -> None:
 
 
 def _write_columns(group: Any, sweep: Sweep) -> None:
-    """The values and status of each measure, over the study's axes."""
+    """Write the values and the status of each measure into the folder `group`, over the axes of the study."""
     sampling = sweep.job.sampling
     shape = sampling.shape
     dims = [axis.key for axis in sampling.axes] if sampling.kind == "grid" else [DESIGN]
@@ -188,35 +191,40 @@ def _write_columns(group: Any, sweep: Sweep) -> None:
 
 
 def _write_coordinates(group: Any, sweep: Sweep) -> None:
-    """The axes of a study whose designs are listed one after the other."""
+    """Write the designs' settings into the folder `group`: an array (designs,) for each axis, in chunks of CHUNK.
+
+    For designs that are listed one after the other; of a grid, the axes themselves are the coordinates.
+    """
     count = sweep.job.count
-    types = {name: column[1].dtype for name, column in _named(sweep, 0, min(count, CHUNK))}
+    types = {name: values.dtype for name, values, _ in _coordinates_of(sweep, 0, min(count, CHUNK))}
     # texts are as long as the longest: of listed values all are looked at
     for axis in sweep.job.sampling.axes:
         if axis.values and types[axis.key].kind == "U":
-            texts = [len(str(text)) for _, part in _blocks(sweep, axis.key) for text in part]
-            types[axis.key] = np.dtype(f"<U{max(texts)}")
+            lengths = [len(str(text)) for part in _blocks(sweep, axis.key) for text in part]
+            types[axis.key] = np.dtype(f"<U{max(lengths)}")
     arrays: dict[str, Any] = {}
     for first in range(0, count, CHUNK):
         last = min(first + CHUNK, count)
-        for name, column in _named(sweep, first, last):
+        for name, values, attributes in _coordinates_of(sweep, first, last):
             if name not in arrays:
-                attributes = column[2] if len(column) > 2 else {}
                 fill = np.nan if types[name].kind == "f" else None
                 shape, chunks = (count,), (min(CHUNK, count),)
                 arrays[name] = _array(group, name, shape, chunks, types[name], fill, [DESIGN], attributes)
-            arrays[name][first:last] = column[1]
+            arrays[name][first:last] = values
     group.attrs["coordinates"] = " ".join(name for name in arrays if name != DESIGN)
 
 
-def _named(sweep: Sweep, first: int, last: int) -> Iterator[tuple[str, tuple[Any, ...]]]:
+def _coordinates_of(sweep: Sweep, first: int, last: int) -> Iterator[tuple[str, Any, Mapping[str, Any]]]:
+    """Name, values (k,) and attributes of each coordinate of the designs from `first` to before `last`."""
     for name, column in coordinates(sweep, first, last).items():
-        yield name, (DESIGN, column) if name == DESIGN else column
+        _, values, *attributes = (DESIGN, column) if name == DESIGN else column
+        yield name, values, attributes[0] if attributes else {}
 
 
-def _blocks(sweep: Sweep, name: str) -> Iterator[tuple[int, Any]]:
+def _blocks(sweep: Sweep, name: str) -> Iterator[Any]:
+    """The values of one axis, CHUNK designs at a time."""
     for first in range(0, sweep.job.count, CHUNK):
-        yield first, coordinates(sweep, first, min(first + CHUNK, sweep.job.count))[name][1]
+        yield coordinates(sweep, first, min(first + CHUNK, sweep.job.count))[name][1]
 
 
 def _array(
@@ -229,6 +237,10 @@ def _array(
     dims: Sequence[str],
     attributes: Mapping[str, Any],
 ) -> Any:
+    """Make an array in the folder `group`, without writing any values; xarray reads the names of its axes.
+
+    fill  value of places that are not written; None: 0 or an empty text;   dims  names of the axes
+    """
     stated = {**attributes, "_ARRAY_DIMENSIONS": list(dims)}
     return group.create_array(
         name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill, attributes=stated, write_data=False
@@ -261,11 +273,12 @@ def _places(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[tuple[s
 
 
 def _lengths(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[int]:
+    """How many designs each chunk holds, in the order of `_places`."""
     return (prod(part.stop - part.start for part in place) for place in _places(shape, chunks))
 
 
 def _cut(pieces: Iterable[tuple[Any, Any]], lengths: Iterable[int]) -> Iterator[tuple[Any, Any]]:
-    """Consecutive rows of two arrays, given in pieces, in parts of other lengths."""
+    """Cut consecutive rows of two arrays, given in pieces, into parts of these lengths."""
     coming = iter(pieces)
     held: list[tuple[Any, Any]] = []
     for length in lengths:

@@ -34,7 +34,7 @@ def balance_rows(point: OperatingPoint, stiffness_max: float | None = None) -> I
 
 
 def balance_text(found: Equilibrium) -> str:
-    """Who pushes how hard."""
+    """The forces in balance in words: of the wall, and of the hand, with what of it acts across the direction."""
     turns = not np.any(found.screw[:3])
     force, unit = (found.hand_moment, "N m") if turns else (found.hand_force, "N")
     text = f"wall {amount(found.wall_force, 'N')}, hand {vector(force, unit)}"
@@ -53,7 +53,7 @@ def has_sideways_force(found: Equilibrium) -> bool:
 
 
 def drive_rows(point: OperatingPoint) -> Iterator[Row]:
-    """What each motor gives, and how far its drive is bent."""
+    """Rows on each motor: its torque, and how far its drive is bent."""
     found, drives, mechanism = point.equilibrium, point.drives, point.mechanism
     assert mechanism is not None
     slides = mechanism.links.joint[drives.joint] == PRISMATIC
@@ -75,11 +75,13 @@ def motor_torques(found: Equilibrium) -> list[float]:
 
 def path_sentences(path: LoadPath) -> list[str]:
     """What the charts under all pushes say."""
-    said = [_stiffness(path), _neglected(path), _fixed_surface(path), _sideways(path), *_unanswered(path)]
+    texts = _stiffness_text, _neglected_text, _fixed_surface_text, _sideways_text
+    said = [*(text(path) for text in texts), *_unanswered(path)]
     return [sentence for sentence in said if sentence]
 
 
-def _stiffness(path: LoadPath) -> str:
+def _stiffness_text(path: LoadPath) -> str:
+    """Sentence on the largest stiffness over the pushes; "" where no push has one."""
     values, pushes, free = path.stiffness_max, path.pushes, path.unpushed.stiffness_max
     have = np.isfinite(values)
     if not have.any():
@@ -99,10 +101,12 @@ def _stiffness(path: LoadPath) -> str:
 
 
 def _that_has_one(have: Flags) -> str:
+    """Words that limit a statement to pushes with a stable wall; "" where all have one."""
     return "" if have.all() else " that has one"
 
 
-def _sideways(path: LoadPath) -> str:
+def _sideways_text(path: LoadPath) -> str:
+    """Sentence on motions along the surface, which no wall holds: under which pushes one grows, and how fast."""
     rates, pushes = path.growth_rates, path.pushes
     known = np.isfinite(rates)
     if not known.any():
@@ -119,32 +123,39 @@ def _sideways(path: LoadPath) -> str:
     return f"Along the surface, where no wall acts, a motion grows under {where}: fastest under {doubles}."
 
 
-def _neglected(path: LoadPath) -> str:
+def _neglected_text(path: LoadPath) -> str:
+    """Sentence on how much it changes the stiffness to neglect the change of the hand's force; "" if it is."""
     off = _largest_difference(path, path.hand_neglected)
     if off is None or path.hand == "neglected":
         return ""
-    if off[0] < ROUNDING:
+    share, push = off
+    if share < ROUNDING:
         return "Whether the change of the hand's force is neglected makes no difference to these stiffnesses."
-    share, push = percent(off[0]), as_written(off[1], "N")
-    return f"Neglecting the change of the hand's force changes it by {share} at most, under {push}."
+    most, under = percent(share), as_written(push, "N")
+    return f"Neglecting the change of the hand's force changes it by {most} at most, under {under}."
 
 
-def _fixed_surface(path: LoadPath) -> str:
+def _fixed_surface_text(path: LoadPath) -> str:
+    """Sentence on the largest stiffness on a fixed surface, into which the handle sinks, against a kept
+    posture."""
     sinks = "On a fixed surface, into which the handle sinks by F/K,"
     off = _largest_difference(path, path.fixed_surface)
     if off is None:
         pushed = [step for step in path.steps if step.push and step.stiffness_max == step.stiffness_max]
         reasons = sorted({step.fixed_surface_status for step in pushed})
         return f"{sinks} there is no answer: {'; '.join(reasons)}." if reasons else ""
-    if off[0] < ROUNDING:
+    share, push = off
+    if share < ROUNDING:
         return f"{sinks} the largest stiffness is the same."
-    share, push = percent(off[0]), as_written(off[1], "N")
-    return f"{sinks} it differs from that with the posture kept by {share} at most, under {push}."
+    most, under = percent(share), as_written(push, "N")
+    return f"{sinks} it differs from that with the posture kept by {most} at most, under {under}."
 
 
 def _largest_difference(path: LoadPath, others: Floats) -> tuple[float, float] | None:
-    """The largest relative difference of other largest stiffnesses from the path's, and under which push; None
-    where no push has both."""
+    """The largest relative difference of other largest stiffnesses (pushes,) from the path's, and its push [N].
+
+    None where no push has both
+    """
     values, pushes = path.stiffness_max, path.pushes
     both = np.isfinite(values) & np.isfinite(others) & (pushes != 0.0)
     if not both.any():

@@ -123,7 +123,7 @@ def joint_points(mechanism: Mechanism, points_of_links: LinkPoints) -> Floats:
 
 
 def _link_places(mechanism: Mechanism, points_of_links: LinkPoints, link: int) -> list[Place]:
-    """A link's joint, then out to each place that it carries and back: a link may branch."""
+    """A link's joint, then to each place that it carries and back to the joint: a link may branch."""
     links, closures = mechanism.links, mechanism.closures
     start: Place = (link, np.zeros(3))
     places: list[Place] = [(link, links.tip[link])]
@@ -148,11 +148,12 @@ def _axis_places(mechanism: Mechanism, link: int) -> list[Place]:
 
 
 def _points(points_of_links: LinkPoints, places: list[Place]) -> Floats:
-    """The places (k, 3) in the base frame."""
+    """The places (k, 3) in the base frame [m]."""
     return np.array([_point(points_of_links, place) for place in places]).reshape(-1, 3)
 
 
 def _point(points_of_links: LinkPoints, place: Place) -> Floats:
+    """A place (3,) in the base frame [m]."""
     link, local = place
     return local if link < 0 else points_of_links.of(link, local)
 
@@ -175,7 +176,7 @@ def _groups(names: list[str]) -> list[tuple[str, int, bool]]:
 
 
 def _is_free(mechanism: Mechanism, entry: int) -> bool:
-    """Whether an entry belongs to a free link, which has six of them and no joint that holds it."""
+    """Whether an entry belongs to a free link, whose six entries share its name; no joint has more than three."""
     names = [name.partition("/")[0] for name in mechanism.links.names]
     return names.count(names[entry]) > 3
 
@@ -208,6 +209,7 @@ def mode_strokes(mechanism: Mechanism, posture: Posture, count: int | None = Non
     known: dict[tuple[int, bytes], Floats] = {}
 
     def rates(places: Sequence[Place]) -> Floats:
+        """Motion (k, 3, n) of these places; 0 with the coordinates that move no link."""
         found = np.zeros((len(places), 3, motions.count + unmoving))
         for k, (link, local) in enumerate(places):
             key = (link, local.tobytes())  # strokes go through a joint many times

@@ -67,6 +67,7 @@ def _is_vector(value: Any) -> bool:
 
 
 def _cell(value: Any) -> str:
+    """A value as a cell of CSV, in quotation marks where it has a comma, a quotation mark or a line's end."""
     text = "" if value is None else value if isinstance(value, str) else repr(value)
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text
 
@@ -96,6 +97,10 @@ def destination(file: str | os.PathLike[str], kinds: Collection[str]) -> Path:
 
 
 def _check_place(path: Path, name: str) -> None:
+    """Raise OutputError for a place that cannot be written: a folder, a device, a file without permission.
+
+    name  as it was typed
+    """
     if path.suffix.lower() in FOLDERS and path.exists():
         raise OutputError(f"{printable(name)}: exists already; remove it, or name another")
     if path.is_dir():
@@ -143,10 +148,12 @@ def printable(text: str) -> str:
 
 
 def _beside(path: Path) -> Path:
+    """A hidden name that nothing has yet, in the folder of `path` and with its ending."""
     return path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}")
 
 
 def _failed(name: str, error: Exception) -> OutputError:
+    """The error for a file that the system refuses to write."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return OutputError(
         f"{printable(name)}: cannot be written: {reason[:1].lower() + reason[1:]}; name another file"

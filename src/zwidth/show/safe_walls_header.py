@@ -103,6 +103,7 @@ _TEMPLATES: Final = Path(__file__).parent / "safe_walls"
 
 
 def _fields(table: SafeWalls) -> dict[str, str]:
+    """Text for each @KEY@ of the header's template."""
     grid, question = table.grid, table.question
     d = grid.dimensions
     loop = table.device.controller
@@ -114,17 +115,17 @@ def _fields(table: SafeWalls) -> dict[str, str]:
         "TIMING": _timing(loop),
         "MARGIN": f"{question.margin:g}",
         "BYTES": str(table.size),
-        "WHERE": _where(table),
-        "DIRECTION": _direction(table),
+        "WHERE": _position_comment(table),
+        "DIRECTION": _direction_comment(table),
         "DIMENSIONS": str(d),
         "CELLS": f"{grid.count}UL",
         "TABLES": f"{question.slots}UL",
         "LEVELS": f"{table.levels}UL",
         "PARTS": f"{table.sectors.parts}UL",
         "OUTSIDE": ", ".join(map(_double, (table.outside.stiffness, table.outside.low, table.outside.high))),
-        "TOO_LARGE": _too_large(max(table.top.size, low.size) * 4),
+        "TOO_LARGE": _size_check(max(table.top.size, low.size) * 4),
         "MOST_BYTES": f"{ADDRESSES - BESIDE}UL",
-        "GRID": "" if d == 0 else _grid(table),
+        "GRID": "" if d == 0 else _grid_arrays(table),
         "CELL": _ONE_CELL if d == 0 else _CELL,
         "SECTOR": _SECTOR if question.slots > 1 else _NO_SECTOR,
         "LEVEL": _array("unsigned char", "zwidth_level", [f"{int(one)}U" for one in table.level]),
@@ -139,7 +140,8 @@ def _timing(controller: Controller) -> str:
     return _comment(", ".join([controller.timing_text, *wall_law_parts(controller, spell_out=True)]))
 
 
-def _where(table: SafeWalls) -> str:
+def _position_comment(table: SafeWalls) -> str:
+    """Sentences on the position that the program reads: coordinates, their cells, and where they lie."""
     grid = table.grid
     if not grid.dimensions:
         return "They hold everywhere: the position is not read and may be a null pointer."
@@ -157,10 +159,12 @@ def _where(table: SafeWalls) -> str:
 
 
 def _named(table: SafeWalls) -> Iterable[tuple[str, Any]]:
+    """Name and unit vector (3,) of each axis of the table."""
     return zip(table.grid.names, table.grid.axes, strict=True)
 
 
-def _direction(table: SafeWalls) -> str:
+def _direction_comment(table: SafeWalls) -> str:
+    """Sentence on the direction that the program reads."""
     if table.question.slots == 1:
         return "The direction is not read and may be a null pointer: the range holds along every direction."
     return (
@@ -170,13 +174,15 @@ def _direction(table: SafeWalls) -> str:
     )
 
 
-def _too_large(size: int) -> str:
+def _size_check(size: int) -> str:
+    """An #error for 8-bit boards where an array takes more bytes than their compilers allow; else ""."""
     if size <= AVR_REACH:
         return ""
     return '#error "a table of more than 32767 bytes is beyond what 8-bit boards read; export fewer cells"\n'
 
 
-def _grid(table: SafeWalls) -> str:
+def _grid_arrays(table: SafeWalls) -> str:
+    """Arrays of the grid in C: lowest coordinates [m], cells per metre, and numbers of cells, along each axis."""
     grid = table.grid
     per_metre = [1.0 / float(step) for step in grid.step]
     return (
@@ -188,7 +194,7 @@ def _grid(table: SafeWalls) -> str:
 
 
 def _array(kind: str, name: str, values: Iterable[str]) -> str:
-    """A table in the board's program memory."""
+    """A constant array of these values in C, in the board's program memory."""
     listed = list(values)
     lines, line = [], ""
     for value in listed:
@@ -207,10 +213,12 @@ def _single(value: float) -> str:
 
 
 def _double(value: float) -> str:
+    """A number of 64 bits in C."""
     return _with_point(repr(float(value)))
 
 
 def _with_point(text: str) -> str:
+    """A number that C reads as a floating-point one."""
     return text if any(mark in text for mark in ".e") else f"{text}.0"
 
 

@@ -211,7 +211,7 @@ def _share_below(samples: Floats, frequency: float) -> float:
 
 
 def _late_frequency(velocity: Floats, rate: float) -> float:
-    """Dominant in the second half [Hz], or in all where nothing moves by then; nan where nothing does."""
+    """Dominant frequency in the second half [Hz], or of all if nothing moves by then; nan if nothing ever does."""
     late = dominant_frequency(velocity[len(velocity) // 2 :], 1.0 / rate)
     return late if late > 0.0 else dominant_frequency(velocity, 1.0 / rate)
 
@@ -238,7 +238,7 @@ def _velocity(time: Floats, position: Floats, rate: float) -> Floats:
 
 
 def _faded(signal: Floats) -> Floats:
-    """The signal with a raised cosine at both ends."""
+    """The signal with its first and last FADE seconds, a quarter of it at most, raised and lowered by a cosine."""
     count = min(int(FADE * RATE), len(signal) // 4)
     rise = np.sin(0.5 * np.pi * (np.arange(count) + 0.5) / max(count, 1)) ** 2
     shaped = signal.copy()

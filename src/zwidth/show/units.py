@@ -122,6 +122,7 @@ def radius(value: float) -> str:
 
 
 def _rounded(value: float, digits: int) -> str:
+    """The value in so many digits, as a power of ten where it is very large or small; a dash for nan."""
     if isnan(value):
         return UNKNOWN
     if not isfinite(value):
@@ -138,6 +139,7 @@ def _rounded(value: float, digits: int) -> str:
 
 
 def _unbroken(unit: str) -> str:
+    """The unit after a no-break space, with such in it; "" for none."""
     return (SPACE + unit.replace(" ", SPACE)) if unit else ""
 
 
@@ -309,6 +311,7 @@ def keys_of_moments(value: Any, table: str = "") -> Any:
 
 
 def _key(key: Any) -> Any:
+    """The key with the unit of a moment about an axis in place of that of a force; keys of lengths stay."""
     if not isinstance(key, str) or "." in key or KEPT.fullmatch(key):  # a dotted path is of the device file
         return key
     if key in NAMES:

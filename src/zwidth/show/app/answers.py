@@ -72,11 +72,13 @@ class PageAnswers:
         self.report(pack_frame({"id": asked.id, "kind": "progress", "stage": stage, "done": done, "of": of}, {}))
 
     def _translated(self, request: Computed | FileRequest) -> Any:
+        """Context in which errors are explained in words about the request's device and model."""
         state: State | None = getattr(request, "state", None)
         name, model = (state.device, state.model) if state else ("", None)
         return translate_errors(Question(name, model=model))
 
     def _contents(self, request: Computed | FileRequest) -> Contents:
+        """Head and arrays that answer a request, by its class. Raises BadInput for one that has no answer."""
         from zwidth.show.app import layers, studies
 
         opened = self.opened

@@ -31,7 +31,13 @@ Send = Callable[[bytes], Awaitable[None]]
 
 
 class Lane:
-    """One computing process and the requests that wait for it."""
+    """One computing process and the requests that wait for it.
+
+    pool      gives processes that are ready to compute
+    send      sends a frame to the page
+    files     name -> file that the page has sent, which a process must have before it answers
+    confirms  whether the page confirms the views that it has drawn
+    """
 
     def __init__(self, pool: SparePool, send: Send, files: dict[str, FileRequest], confirms: bool) -> None:
         self.pool, self.send, self.files = pool, send, files
@@ -78,6 +84,7 @@ class Lane:
             await self.pool.give_back(process)
 
     async def _lose_patience(self, kind: str) -> None:
+        """End the process once it has computed for PATIENCE, if a newer request of this kind waits then."""
         loop = asyncio.get_running_loop()
         while (left := self._since + PATIENCE - loop.time()) > 0.0:
             await asyncio.sleep(left)  # meanwhile the next computation may have begun, and has its own time
@@ -87,11 +94,13 @@ class Lane:
             await self._drop_process()
 
     async def _drop_process(self) -> None:
+        """End the process; the next request takes another."""
         process, self.process = self.process, None
         if process is not None:
             await process.end()
 
     async def _run(self) -> None:
+        """Compute what waits, one request after another; a view once fewer than IN_FLIGHT are on their way."""
         while True:
             await self._news.wait()
             if not self._waiting:
@@ -133,6 +142,7 @@ class Lane:
         return False
 
     async def _send_files(self) -> None:
+        """Give the process those of the page's files that it does not have."""
         assert self.process is not None
         for name, file in self.files.items():
             mark = f"{name}:{file.id}"
@@ -191,6 +201,7 @@ class Connection:
         await asyncio.gather(self.view.end(), self.beside.end())
 
     async def _take_file(self, request: FileRequest) -> None:
+        """Keep a file that the page has sent, and confirm it; refuse one too many, too long or of another kind."""
         sentence = ""
         if len(request.text) > LARGEST_FILE:
             sentence = f"{request.name} has {len(request.text):,} characters; at most {LARGEST_FILE:,} are read"
@@ -205,6 +216,7 @@ class Connection:
         await self._send(pack_frame({"id": request.id, "kind": "file", "ok": True, "name": request.name}, {}))
 
     async def _refuse(self, message: str, sentences: list[str]) -> None:
+        """Answer a message that is not computed with its faults, under its id and kind where they can be read."""
         number, kind = 0, "request"
         with suppress(ValueError, RecursionError, AttributeError):
             content = json.loads(message[:LARGEST_REQUEST])
@@ -212,6 +224,7 @@ class Connection:
         await self._send(failure(number, kind, sentences, "bad input"))
 
     async def _send(self, frame: bytes) -> None:
+        """Send a frame; both lanes do, one after the other."""
         async with self._lock:
             await self.send(frame)
 
@@ -222,10 +235,11 @@ def failure(number: int, kind: str, sentences: list[str], status: str) -> bytes:
 
 
 def _check_constant(name: str) -> Any:
+    """Raise ValueError for NaN or an infinity, which the JSON parser passes on."""
     raise ValueError(f"numbers must be finite, got {name}")
 
 
 def _sentence(fault: Any) -> str:
-    """What pydantic found, as one sentence with the place."""
+    """A fault of a request that pydantic found, as one sentence with the path of the key."""
     place = ".".join(str(step) for step in fault["loc"][1:] if not str(step).startswith("function"))
     return f"{place or 'the request'}: {fault['msg'][:1].lower()}{fault['msg'][1:]}"

@@ -55,5 +55,6 @@ def unpack_frame(message: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]
 
 
 def _as_sent(values: NDArray[Any]) -> tuple[str, NDArray[Any]]:
+    """Name of the type in JavaScript, and the array as it is sent: contiguous, lowest byte first."""
     kind, stored = TYPES[values.dtype.kind]
     return kind, np.ascontiguousarray(values, dtype=stored)

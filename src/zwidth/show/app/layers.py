@@ -49,9 +49,11 @@ def impedance(point: OperatingPoint, wall: Wall) -> Contents:
 
 
 def nyquist(point: OperatingPoint, wall: Wall) -> Contents:
-    """The open loop L = P (K + B w) over the upper half of the unit circle, (k, 3) with angles; the wall is stable
-    where it goes round -1 as often as it must. With every passive operator P fills a disk at each frequency, and
-    so does L: rows (real, imaginary, radius, frequency). In any passive hand it is stable if no disk holds -1.
+    """The open loop L = P (K + B w) over the upper half of the unit circle, rows (real, imaginary, f [Hz]).
+
+    The wall is stable where L goes round -1 as often as it must. With a passive operator, whoever it is, P lies in
+    a disk at each frequency, and so does L: `disks`, rows (real, imaginary, radius, f [Hz]), of the device held by
+    nobody. The wall is stable in any passive hand if no disk holds -1; `no_disks` says why there are none.
     """
     loop = point.loop
     angles = np.geomspace(LOWEST, np.pi - LOWEST, ANGLES)
@@ -83,7 +85,7 @@ def eigenvalues_of(point: OperatingPoint, wall: Wall) -> Contents:
 
 Contents = tuple[dict[str, Any], dict[str, Any]]
 
-Layer = Callable[[OperatingPoint, Any, State, Device], Contents]
+Layer = Callable[[OperatingPoint, Any, State, Device], Contents]  # of a point, its chart, the state and its device
 
 DECAY_LEVELS: Final = (0.25, 0.5, 0.75)  # of the way from radius 1 to the fastest decay
 DAMPINGS: Final = 161  # at which the line of a published condition is computed
@@ -124,8 +126,8 @@ def opened_device(opened: OpenedDevices, state: State) -> Contents:
 def page_view(opened: OpenedDevices, state: State, layers: Sequence[str], nearest: bool = False) -> Contents:
     """The layers that the page shows of one state. A layer that has no answer says why; the others stand.
 
-    Without a chart there is no view, but of a device whose file leaves out numbers that a chart needs: that one's
-    geometry is shown.
+    Raises what the chart raises, but not where the device's file leaves out numbers that a chart needs: its
+    geometry is shown then.
 
     nearest  take an answered position where the handle cannot be at that of the state: `position` of the head
     """
@@ -177,6 +179,7 @@ def _point(
 
 
 def _chart(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """Numbers of the chart and of the wall's verdict, the outlines of the stable walls and their edge."""
     numbers = {
         "stiffness_max": chart.stiffness_max,
         "damping_at_stiffness_max": chart.damping_at_stiffness_max,
@@ -243,6 +246,8 @@ def _models(point: OperatingPoint, chart: Chart, state: State, device: Device) -
 
 
 def _with_model(device: Device, state: State, model: str) -> Callable[[], Chart]:
+    """Function that computes the chart of the state with this model."""
+
     def chart() -> Chart:
         if device.mechanism is None:
             return device.at(model=model).chart(decay=False)
@@ -258,6 +263,7 @@ def _hands(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
     now = device.operator_name
 
     def held(name: str) -> Callable[[], Chart]:
+        """Function that computes the chart with this operator."""
         other = state.model_copy(update={"operator": name, "hand": None})
 
         def chart() -> Chart:
@@ -276,6 +282,7 @@ def _hands(point: OperatingPoint, chart: Chart, state: State, device: Device) ->
 
 
 def _several(wanted: Mapping[str, Callable[[], Chart]]) -> Contents:
+    """Largest stiffness and outlines of several charts by their names; one that has none says why."""
     head: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
     for name, compute in wanted.items():
@@ -312,7 +319,7 @@ def _guarantees(point: OperatingPoint, chart: Chart, state: State, device: Devic
 def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
     """The published conditions, each as its largest stiffness over damping."""
     compared = point.bounds()
-    top = 1.2 * max(chart.damping_max, chart.box[3], 1e-12)
+    top = 1.2 * max(chart.damping_max, chart.box[3], 1e-12)  # a fifth beyond the chart, and never 0
     dampings = np.linspace(0.0, top, DAMPINGS)
     head, arrays = [], {"damping": dampings}
     for n, one in enumerate(compared.bounds):
@@ -334,6 +341,7 @@ def _bounds(point: OperatingPoint, chart: Chart, state: State, device: Device) -
 
 
 def _chain(point: OperatingPoint) -> MassChain | None:
+    """The plant as a row of masses; None where it is none, or a measured response."""
     return None if point.response is not None else as_chain(point.ungripped_plant)
 
 
@@ -399,7 +407,7 @@ def scene_rates(point: OperatingPoint) -> Contents:
 
 
 def _face(draw: Callable[[OperatingPoint, Wall], Contents]) -> Layer:
-    """One of the other faces of the state's wall."""
+    """Layer of another picture of the state's wall; without a wall, or of a response, it raises ValueError."""
 
     def face(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
         if state.wall is None:
@@ -412,13 +420,18 @@ def _face(draw: Callable[[OperatingPoint, Wall], Contents]) -> Layer:
 
 
 def _touch(point: OperatingPoint, chart: Chart, state: State, device: Device) -> Contents:
+    """What the page needs to simulate the wall under the mouse. Raises ValueError about an axis."""
     if point.turns:
         raise ValueError(f"the mouse {ABOUT_AN_AXIS}")
     return touch_blocks(point)
 
 
 def touch_blocks(point: OperatingPoint, start_position: float = 0.0, start_velocity: float = 0.0) -> Contents:
-    """The blocks of `touch_step` for the page, held by the point's hand. Raises ValueError: not covered."""
+    """Blocks of `touch_step`, with which the page simulates the device held by the point's hand.
+
+    start_position, start_velocity  [m], [m/s]
+    Raises  ValueError  where the step does not cover the device
+    """
     from zwidth.contact.touch_step import arm_spring, touch_numbers
 
     made = touch_numbers(point.loop, start_position=start_position, start_velocity=start_velocity)

@@ -73,6 +73,7 @@ class OpenedDevices:
         )
 
     def _operator(self, state: State) -> Operator | str | None:
+        """The state's operator: of its own numbers or bundled; "none": nobody, None: that of the device file."""
         if state.hand is not None:
             hand = state.hand
             grasp = None if hand.grasp_stiffness is None else hand.grasp_damping

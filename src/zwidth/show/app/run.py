@@ -28,12 +28,16 @@ TRIED: int = 20  # ports, from the wanted one on
 def serve(
     start: dict[str, Any], host: str, port: int, token: str, browser: bool, say: Callable[..., None]
 ) -> None:
-    """Serve the page until ctrl-C. Raises BadInput where no port can be had."""
+    """Serve the page until ctrl-C. Raises BadInput where no port can be had.
+
+    start  what a page opens first, as `start_of` returns it;   say  prints lines
+    """
     listening = listen(host, port)
     settings = Settings(host, listening.getsockname()[1], token, start)
     server = make_server(settings)
 
     def announce() -> None:
+        """Print where the page is, and open it."""
         say(*announcement(settings))
         if browser:
             webbrowser.open(page_address(settings))
@@ -135,7 +139,7 @@ def start_of(device: str | None, settings: Sequence[str]) -> dict[str, Any]:
 
 
 def start_of_device(device: Device) -> dict[str, Any]:
-    """The same for a device in memory: its file is written from its document."""
+    """State and files that a page begins with, of a device in memory: its file is written from its document."""
     import tomlkit
 
     file = f"{device.name[:80]}.toml".replace("/", "-").replace("\\", "-")

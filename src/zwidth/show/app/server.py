@@ -101,6 +101,7 @@ def make_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        """Make processes ready when the server starts; end them and the pages when it ends."""
         app.state.received = received
         preparing = asyncio.ensure_future(pool.prepare())
         yield
@@ -169,6 +170,7 @@ def _add_reports(app: FastAPI, settings: Settings) -> None:
 
     @app.post("/reports")
     async def keep_report(request: Request, token: str | None = None) -> Response:
+        """Keep a report that the page sends, and answer with the name that it is opened by."""
         if not _from_own_page(request, settings, token):
             return PlainTextResponse("only the workbench's own page may send a report\n", 403)
         content = bytearray()
@@ -213,6 +215,7 @@ def _add_socket(
 
     @app.websocket("/socket")
     async def socket(websocket: WebSocket, token: str | None = None) -> None:
+        """Serve one page, from its first message until it is gone."""
         if not _from_own_page(websocket, settings, token) or len(open_pages) >= MOST_PAGES:
             await websocket.close(code=1008)
             return

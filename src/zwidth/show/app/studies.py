@@ -151,7 +151,10 @@ def _made_by_wall(contact: ContactSimulation) -> Floats:
 
 
 def measured_points(opened: OpenedDevices, request: PointsRequest) -> Contents:
-    """The measured points of a file, and the device's verdict on each."""
+    """The measured points of a file, and the device's verdict on each.
+
+    walls, spread  rows (K, B) and (lowest B, highest B, lowest K, highest K), in N/m and N s/m
+    """
     from zwidth.study.boundary.points_file import read_points
 
     if request.file not in opened.texts:
@@ -187,6 +190,7 @@ def kept_figure(opened: OpenedDevices, request: ExportRequest) -> bytes:
 
 
 def _axes() -> Any:
+    """The axes of a new figure of zwidth's style."""
     from zwidth.show.figures.style import figure
 
     return figure()[1]
@@ -257,6 +261,7 @@ def python_lines(state: State, point: OperatingPoint) -> str:
 
 
 def _place(state: State) -> list[tuple[str, Any]]:
+    """Name and value of the arguments of `Device.at` that say where the device stands; None: left out."""
     return [
         ("position", state.position),
         ("direction", state.direction),

@@ -16,7 +16,7 @@ from zwidth.show.app.run import listen, make_server, page_address, start_of_devi
 from zwidth.show.app.server import Settings
 
 HEIGHT: Final = 760  # css px of the page in a notebook
-LONGEST_START: Final = 20.0  # s
+LONGEST_START: Final = 20.0  # s that the server is waited for
 LONGEST_END: Final = 10.0  # s
 
 

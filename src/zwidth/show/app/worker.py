@@ -62,6 +62,7 @@ class ComputeProcess:
         self._ready = asyncio.ensure_future(self._until_ready())
 
     async def _until_ready(self) -> None:
+        """Wait for the message that it has started. Raises ComputeLost."""
         kind, _ = await self._read()
         if kind != READY:
             raise ComputeLost("a process could not be started")
@@ -111,6 +112,7 @@ class ComputeProcess:
                 return
 
     def _send(self, data: bytes) -> None:
+        """Write one message to the process: its length, then its bytes. Raises ComputeLost."""
         assert self.process is not None
         assert self.process.stdin is not None
         try:
@@ -119,6 +121,7 @@ class ComputeProcess:
             raise ComputeLost(str(error)) from None
 
     async def _read(self) -> tuple[bytes, bytes]:
+        """Read one message of the process: READY, PROGRESS or ANSWER, and its content. Raises ComputeLost."""
         assert self.process is not None
         assert self.process.stdout is not None
         try:
@@ -197,6 +200,7 @@ def compute_answers() -> None:
     warnings.filterwarnings("ignore")  # implausible numbers are part of an answer, see `answers`
 
     def send(kind: bytes, content: bytes = b"") -> None:
+        """Write one message to the server: its length, its kind, its content."""
         sent.write((len(content) + 1).to_bytes(LENGTH, "little") + kind + content)
         sent.flush()
 

@@ -85,6 +85,7 @@ def answer_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
 
 
 def _rendered(pages: Sequence[Any]) -> str:
+    """The text of pages as rich lays them out: as wide as the terminal, or 110 columns in a file or pipe."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else 110
@@ -101,7 +102,7 @@ ROUNDING: Final = 1e-9  # m, that a position may be projected by without a word
 def heading(question: Question, device: Device, *, linear: bool = True) -> str:
     """Two lines: the device and its posture; the computer. And where something is left out, one that says what.
 
-    linear  does the answer leave out the nonlinear parts?
+    linear  whether the answer leaves out the nonlinear parts
     """
     facts = question.linear_circumstances(device)
     kind = "[response]" if device.response is not None else "[plant]"

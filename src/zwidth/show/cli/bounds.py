@@ -79,6 +79,7 @@ class BoundsCommand(Command):
 
 
 def _exact(comparison: BoundsComparison) -> Iterator[tuple[str, str]]:
+    """Rows on the exact answer: the largest stiffness at the damping compared, and of all dampings."""
     if comparison.chart is None:
         yield "exact", f"undecided: {comparison.undecided}"
         return
@@ -88,6 +89,10 @@ def _exact(comparison: BoundsComparison) -> Iterator[tuple[str, str]]:
 
 
 def _row(comparison: BoundsComparison, bound: Bound, unmet: list[str]) -> tuple[str, ...]:
+    """Cells of one condition in the table of `pages`.
+
+    unmet  assumptions that the device does not meet; a cell names those of this condition by their numbers from 1
+    """
     ratio = comparison.ratio(bound)
     return (
         bound.name,
@@ -107,4 +112,5 @@ def _stiffness(value: float) -> str:
 
 
 def _needs(bound: Bound) -> str:
+    """What a condition needs and the device lacks, in words."""
     return ", ".join(LACKED.get(name, name) for name in bound.lacking)

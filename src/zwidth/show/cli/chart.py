@@ -110,6 +110,7 @@ class ChartCommand(Command):
 
 
 def _rows(chart: Chart) -> Iterator[tuple[str, str]]:
+    """Rows for people on every chart: largest stiffness and damping, area, fastest decay, what no wall affects."""
     found = " found" if getattr(chart, "doubt", "") else ""
     yield f"largest stiffness{found}", _stiffest(chart)
     yield f"largest damping{found}", _most_damped(chart)
@@ -158,6 +159,7 @@ def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iter
 
 
 def _most_damped(chart: Chart) -> str:
+    """The largest damping [N s/m]; why, where it is 0 although walls are stable."""
     damping = amount(chart.damping_max, "N s/m")
     if chart.damping_max > 0.0 or not chart.regions:
         return damping
@@ -165,6 +167,7 @@ def _most_damped(chart: Chart) -> str:
 
 
 def _stiffest(chart: Chart) -> str:
+    """The largest stiffness [N/m], its damping and the frequencies of its limit; "none" without a stable wall."""
     if chart.stiffness_max != chart.stiffness_max:
         return "none"
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
@@ -229,6 +232,6 @@ def _nominal(chart: MeasuredChart) -> str:
 
 
 def stretch_text(stretch: UnusableRange) -> str:
-    """A stretch in words."""
+    """A range of frequencies that cannot be used, in words: from where to where, and why."""
     where = "; the edge of the stable walls runs through it" if stretch.on_edge else ""
     return f"{amount(stretch.low, 'Hz')} to {amount(stretch.high, 'Hz')}: {stretch.reason}{where}"

@@ -70,6 +70,10 @@ class CheckCommand(Command):
 
 
 def _walls(points: str | None, stiffness: float | None, damping: float | None) -> Walls:
+    """The walls (K [N/m], B [N s/m]) to judge: those of the file `points`, else the one of both numbers.
+
+    Raises  click.UsageError  where the options give neither, or both
+    """
     context = click.get_current_context()
     if points is not None:
         if stiffness is not None or damping is not None:

@@ -90,13 +90,13 @@ class Command:
     options           click's decorators of its own options
     outputs           endings that --output takes;   output_help  what they are
     keys              of its answer, beside the circumstances: null where there is no answer
-    linear            does the answer leave out the nonlinear parts?
-    may_be_undecided  may double precision leave it undecided? Then the answer has the key `decided`
-    takes_responses   does it answer for a measured response, too?
-    answers_by_fit    does it do so by a plant fitted to the response?
+    linear            whether the answer leaves out the nonlinear parts
+    may_be_undecided  whether double precision may leave it undecided; the answer then has the key `decided`
+    takes_responses   whether it answers for a measured response, too
+    answers_by_fit    whether it does so by a plant fitted to the response
     no_response       why it does not, where it does not
-    takes_loads       does it answer for a device under load?
-    has_device        is it about a device that is read? Not where it writes a new one
+    takes_loads       whether it answers for a device under load
+    has_device        whether it is about a device that is read; not where it writes a new one
     """
 
     name: ClassVar[str]
@@ -246,6 +246,7 @@ class Command:
         return self.has_device and case.question.is_about_moments(case.device)
 
     def _answer(self, case: CommandLine) -> Answer:
+        """`answer`, in the units that are spoken already; what cannot be answered becomes nulls with a reason."""
         if self.has_device and not self.takes_responses and case.device.response is not None:
             case.question.point(case.device)  # refuses options that need a model for a [response]
             none = self.unanswered(case, NoAnswerError(self.no_response))
@@ -280,6 +281,7 @@ class Command:
         spoken = self.spoken(case, document)
 
         def pages() -> Iterator[Any]:
+            """Heading, the sentence on a fit, the pages of the command, and the files written."""
             if first := self.heading(case):
                 yield first
             if isinstance(fit := document.get("fit"), dict) and self.answers_by_fit:
@@ -290,6 +292,7 @@ class Command:
         return Answer(spoken, lambda: self._list_pages(case, pages), reason)
 
     def _list_pages(self, case: CommandLine, pages: Callable[[], Iterable[Any]]) -> list[Any]:
+        """The pages, made in the units of what is rendered: they are built only when they are printed."""
         with speaking_of_moments(self.is_about_moments(case)):
             return list(pages())
 

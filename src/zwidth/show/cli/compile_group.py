@@ -81,7 +81,7 @@ def measured_response(period: float = 0.001, mass: float = 0.1, friction: float 
 
 
 def compile_environments() -> None:
-    """Every virtual environment by name: one function each, which simulations reach by its address."""
+    """Compile the function of every virtual environment, which simulations reach by its address."""
     from zwidth.contact.environments import ENVIRONMENTS
 
     for environment in ENVIRONMENTS.values():
@@ -89,7 +89,7 @@ def compile_environments() -> None:
 
 
 def run_estimators() -> None:
-    """Velocity estimates of recorded positions and single modes, from Python only; modes with fixed feedback."""
+    """Run kernels that only Python calls: velocity estimates of recorded positions, and single modes."""
     from zwidth.loop.estimators import BackwardDifference, Foaw, Levant
     from zwidth.loop.estimators.kernels import velocity_of
     from zwidth.loop.hold import modal_row, mode_growth
@@ -101,7 +101,7 @@ def run_estimators() -> None:
 
 
 def identify_friction_of_a_step() -> None:
-    """Friction of a short record: a mass that a square wave moves to and fro."""
+    """Fit a short record as identification of friction does: a mass that a square wave moves to and fro."""
     import numpy as np
 
     from zwidth.identify.joint.fit import JointNumbers, Windows, predict
@@ -118,7 +118,7 @@ def identify_friction_of_a_step() -> None:
 
 
 def margins_of_chords() -> None:
-    """The stiffest wall with margins of edges that compiled stages left in doubt."""
+    """Find the stiffest wall with margins by the stage for edges that compiled stages left in doubt."""
     import numpy as np
 
     from zwidth.chart.wall_margins import stiffness_with_chords

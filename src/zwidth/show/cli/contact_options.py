@@ -40,6 +40,7 @@ class ParameterType(ParamType):
     name = "setting"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:
+        """Name and value, taken apart from NAME=VALUE; fails for what is no number."""
         if isinstance(value, tuple):
             return value
         name, _, text = value.partition("=")

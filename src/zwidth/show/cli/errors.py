@@ -90,7 +90,7 @@ def translate_errors(question: Question) -> Iterator[None]:
 
 
 def explain(error: Exception) -> tuple[list[str], int]:
-    """The lines for standard error, and the exit code."""
+    """The lines for standard error, and the exit code, of any error that a command raises."""
     match error:
         case DeviceError():
             return [str(_as_typed(fault)) for fault in error.faults], BAD_INPUT
@@ -113,7 +113,7 @@ def explain(error: Exception) -> tuple[list[str], int]:
 
 
 def _as_typed(fault: Fault) -> Fault:
-    """A fault of the settings is one of the option that gives them."""
+    """The fault; one of the settings as a fault of the option --set, which gives them."""
     return replace(fault, file="--set") if fault.file == SETTINGS else fault
 
 
@@ -127,6 +127,7 @@ def _usage(error: click.ClickException) -> str:
 
 
 def _internal(error: Exception) -> list[str]:
+    """Lines on an error of zwidth itself: what it is and to report it; with ZWIDTH_DEBUG the traceback."""
     if os.environ.get(DEBUG):
         return traceback.format_exception(error)
     text = printable(" ".join(str(error).split()))[:300]

@@ -126,7 +126,7 @@ def _journal(case: CommandLine) -> Path | None:
 
 @contextmanager
 def _report_kept_work(file: Path | None) -> Iterator[None]:
-    """Says where the work is when it is interrupted."""
+    """Say which file keeps the finished work if this block is interrupted; None: none does."""
     try:
         yield
     except KeyboardInterrupt:
@@ -136,7 +136,7 @@ def _report_kept_work(file: Path | None) -> Iterator[None]:
 
 
 MATTERS: Final = 0.01  # of the range of stable dampings: what moves an edge by less is not named
-AGREES: Final = 1e-3
+AGREES: Final = 1e-3  # largest `deviation` of edges that agree, see `_difference`
 BEHAVIOUR_WORDS: Final = {
     "growing": "a vibration that grows",
     "limit cycle": "a vibration that keeps its size",
@@ -149,7 +149,7 @@ BEHAVIOUR_WORDS: Final = {
 
 
 def point_rows(experiment: Experiment) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows for people."""
+    """Headings and rows of the table of measured points."""
     many, doubts = any(p.trials > 1 for p in experiment.points), any(p.unsure for p in experiment.points)
     rows = []
     for p in experiment.points:
@@ -212,7 +212,10 @@ def experiment_sentences(experiment: Experiment) -> Iterator[tuple[str, str]]:
 
 
 def _doubt(tips: list[bool], *, single: bool) -> str:
-    """Sentence on the unsure points, each a tip or not."""
+    """Sentence on the unsure points.
+
+    tips    of each: whether it is a tip, not an edge;   single  whether each was measured by one trial only
+    """
     counts = [(len(tips) - sum(tips), "edge"), (sum(tips), "tip")]
     which = " and ".join(f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count)
     text = (
@@ -228,7 +231,7 @@ def explanation(experiment: Experiment) -> list[str]:
 
 
 def _difference(experiment: Experiment) -> str:
-    """The largest distance from the exact edge, and what happens beyond: of the range of dampings, or of a tip."""
+    """Sentence on the point farthest from its exact edge or tip, and on the motion of walls beyond it."""
     compared = experiment.compared_points
     if not compared:
         return "no measured edge has an exact one beside it"
@@ -248,7 +251,7 @@ def _difference(experiment: Experiment) -> str:
 
 
 def _gaps(points: list[MeasuredPoint]) -> str:
-    """The largest distances of edges and of tips."""
+    """The largest distance from the exact edges [N s/m], and that from the exact tips [N/m]."""
     edges = [abs(p.damping - p.exact) for p in points if p.edge != "tip"]
     tips = [abs(p.stiffness - p.exact) for p in points if p.edge == "tip"]
     gaps = [amount(max(edges), "N s/m")] if edges else []
@@ -257,7 +260,10 @@ def _gaps(points: list[MeasuredPoint]) -> str:
 
 
 def _cause(cause: Cause, width: float) -> str:
-    """Effect of one part: the edge without it."""
+    """Sentence on one part of the device: how the measured edges move without it.
+
+    width  of the range of stable dampings [N s/m], which says whether a move matters
+    """
     if not cause.comparisons or isnan(width):
         return f"without {cause.name} no edge could be compared"
     point, other = max(cause.comparisons, key=lambda pair: abs(pair[0].damping - pair[1]))
@@ -284,11 +290,12 @@ def own_point_sentences(comparison: PointsComparison) -> Iterator[str]:
 
 
 def _distances(points: Sequence[ComparedPoint]) -> list[float]:
-    """From the exact edge, along what was bisected; only where there is one [N s/m], of tips [N/m]."""
+    """Distances of points from the exact edge: of edges [N s/m], of tips [N/m]; none of a point without one."""
     return [abs(one.deviation) for one in points if not isnan(one.deviation)]
 
 
 def _edges(points: Sequence[ComparedPoint]) -> Iterator[str]:
+    """Sentences on points on an edge: how far they are from the exact one, and how many have none beside them."""
     beside = _distances([one for one in points if one.point.edge != "tip"])
     tips = _distances([one for one in points if one.point.edge == "tip"])
     for apart, name, unit in ((beside, "edge point", "N s/m"), (tips, "tip", "N/m")):
@@ -318,6 +325,7 @@ def _tried_walls(points: Sequence[ComparedPoint], verdict: str) -> Iterator[str]
 
 
 def _unclassified_points(points: Sequence[ComparedPoint]) -> Iterator[str]:
+    """Sentence on points without edge or verdict: how many lie inside the exact stable set, how far from it."""
     if not points:
         return
     inside = sum(one.exact_verdict == "stable" for one in points)

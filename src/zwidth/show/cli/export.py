@@ -221,6 +221,7 @@ def _check_sketch(name: str, device: Device) -> None:
 
 
 def _for_whom(table: SafeWalls) -> str:
+    """What the walls of a table hold for, in words: postures, directions, and who holds the device."""
     where = "in every posture of a cell, " if table.grid.dimensions else ""
     along = "in every direction, " if table.grid.dimensions else ""
     held = ", ".join("nobody" if hand == "none" else printable(hand) for hand in table.hands)
@@ -228,6 +229,7 @@ def _for_whom(table: SafeWalls) -> str:
 
 
 def _rows(table: SafeWalls) -> Iterator[tuple[str, str]]:
+    """Rows on a table of safe walls: cells, stiffness, walls safe in all cells, margin, directions, size."""
     grid, K = table.grid, table.rectangles[table.level > 0, 0]
     if grid.dimensions:
         cells = " x ".join(map(str, grid.counts))

@@ -77,6 +77,7 @@ class FeltCommand(Command):
 
 
 def _rows(felt_wall: FeltWall) -> Iterator[tuple[str, str]]:
+    """Rows on a felt wall: its verdict, what is felt at rest and in free motion, and the limit of that."""
     from zwidth.measures.felt import LIMIT_HEADINGS, LIMIT_WORDS
 
     wall = f"{amount(felt_wall.wall_stiffness, 'N/m')}, {amount(felt_wall.wall_damping, 'N s/m')}"

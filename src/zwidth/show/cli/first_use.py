@@ -64,7 +64,7 @@ class Progress:
         say(f"zwidth: first use: compiling {count} kernel{'s' * (count > 1)} for this processor, about {span}")
 
     def finish(self, name: str) -> None:
-        """One kernel is compiled."""
+        """Count the kernel `name` as compiled; say now and then what remains."""
         with self._lock:
             self.done += 1
             self.missing.pop(name, None)
@@ -74,7 +74,7 @@ class Progress:
                 say(f"zwidth: {self.done} compiled, {len(self.missing)} to go, about {span} left")
 
     def _remaining(self) -> float:
-        """By the known times, and by how fast this machine has been so far once there is something to go by."""
+        """Time that is left [s], by the known times; once a fifth is done, by how fast this machine was."""
         left = sum(self.missing.values())
         known = self._total - left
         return left * (monotonic() - self._began) / known if known > 0.2 * self._total else left / self._processes
@@ -89,6 +89,7 @@ def announce_compiling(command: str) -> Iterator[Callable[[], bool]]:
     progress: list[Progress] = []
 
     def listen(name: str, ended: bool) -> None:
+        """Announce the wait at the first kernel; count those that are compiled."""
         if not name.startswith("zwidth."):  # a user's environment: a fraction of a second
             return
         if not progress:
@@ -126,6 +127,7 @@ def compile_kernels() -> int:
 
 
 def _compile_group(group: int, progress: Progress) -> None:
+    """Compile one group of kernels in a process, and count them in `progress`. Raises RuntimeError."""
     command = [sys.executable, "-m", "zwidth.show.cli.compile_group", str(group)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

@@ -78,7 +78,7 @@ class GuaranteesCommand(Command):
             ["coupling", "stiffest"], [(name, _largest(one)) for name, one in coupled.regions.items()]
         )
         if coupled.limit is not None:
-            yield _limit(coupled.limit)
+            yield _limit_sentence(coupled.limit)
 
     def draw(self, case: CommandLine, result: Guarantees) -> Figure:
         from zwidth.show.figures.guarantees import draw_couplings, draw_guarantees
@@ -95,6 +95,7 @@ class GuaranteesCommand(Command):
 
 
 def _largest(region: Region) -> str:
+    """The stiffest wall of a region with its damping, and the warning on it; or why there is none."""
     if region.reason is not None:
         return f"none: {region.reason}"
     lacking = "" if region.warning is None else f"; {region.warning}"
@@ -102,7 +103,8 @@ def _largest(region: Region) -> str:
     return stiffest + lacking
 
 
-def _limit(limit: Coupling) -> str:
+def _limit_sentence(limit: Coupling) -> str:
+    """Sentence on the stiffest coupling with which the wall is stable with every passive operator."""
     if not limit.needed:
         return "the wall needs no coupling: it is stable with every passive operator"
     return (

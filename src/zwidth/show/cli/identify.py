@@ -54,13 +54,14 @@ class IdentifyCommand(Command):
 
     def about(self, command: Callback) -> Callback:
         if self.takes_point:
-            return _files(about_a_device(command, device=device_option))
+            return _with_files(about_a_device(command, device=device_option))
 
         @wraps(command)
         def with_device(device: str, settings: Any, **more: Any) -> int:
+            """Call the command with a `Question` about the device."""
             return command(Question(device, settings), **more)
 
-        return _files(device_option(with_settings_option(with_device)))
+        return _with_files(device_option(with_settings_option(with_device)))
 
     def for_click(self) -> click.Command:
         made = super().for_click()
@@ -161,8 +162,8 @@ class IdentifyCommand(Command):
         return self.circumstances(case) if self.takes_point else {"name": case.device.name}
 
 
-def _files(command: Callback) -> Callback:
-    """The records, of which there is one at least."""
+def _with_files(command: Callback) -> Callback:
+    """The command with the argument FILE..., the records, of which there is one at least."""
     return click.argument("files", metavar="FILE...", nargs=-1, required=True)(command)
 
 
@@ -174,10 +175,12 @@ _write = click.Option(
 
 
 def _explained(share: float) -> str:
+    """The share of the variance that a fit explains, in per cent."""
     return "over 99.9 %" if share > MOST_EXPLAINED else f"{typed(uncertain(100.0 * share))} %"
 
 
 def _row(estimate: Estimate) -> tuple[str, ...]:
+    """Cells of one identified number: name, value, interval, unit, and its path in the device file."""
     from zwidth.identify.identification import estimate_text, interval
 
     path = (estimate.path or estimate.within).removeprefix("mechanism.")

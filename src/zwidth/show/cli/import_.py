@@ -53,6 +53,7 @@ class ImportCommand(Command):
     def about(self, command: Callback) -> Callback:
         @wraps(command)
         def with_file(file: str, **more: Any) -> int:
+            """Call the command with a `Question` that has the file in place of a device."""
             return command(Question(file), **more)
 
         return click.argument("file", metavar="FILE", type=Text())(with_file)

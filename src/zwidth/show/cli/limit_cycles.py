@@ -122,7 +122,7 @@ class LimitCyclesCommand(Command):
 
 
 def _device_key(keys: tuple[str, str], case: CommandLine) -> str:
-    """Where the device's file has it."""
+    """That of the keys that the device's file has: keys of a [plant] and of a [mechanism]."""
     return keys[case.device.mechanism is not None]
 
 
@@ -140,6 +140,7 @@ def _plane(case: CommandLine) -> DevicePlane:
 
 
 def _circumstances(case: CommandLine, prediction: LimitCyclePrediction) -> Iterator[tuple[str, str]]:
+    """Rows above the cycles: the wall, the nonlinear parts, the range of motion, the walls without hunting."""
     wall = f"{amount(prediction.wall_stiffness, 'N/m')}, {amount(prediction.wall_damping, 'N s/m')}"
     yield "wall", f"{wall}: {prediction.verdict} if linear"
     yield "nonlinear parts", ", ".join(prediction.nonlinear)
@@ -153,6 +154,7 @@ def _circumstances(case: CommandLine, prediction: LimitCyclePrediction) -> Itera
 
 
 def _up_to(stiffness: float | None) -> str:
+    """Walls up to a stiffness [N/m], in words; None or 0: none."""
     return f"on walls up to {amount(stiffness, 'N/m')}" if stiffness else "on no wall"
 
 
@@ -167,6 +169,7 @@ def _headings(prediction: LimitCyclePrediction) -> list[str]:
 
 
 def _rows(prediction: LimitCyclePrediction) -> Iterator[tuple[str, ...]]:
+    """Cells of each cycle, below `_headings`."""
     for answer in prediction.answers:
         cycle = answer.cycle
         source = ["simulation" if answer.source == "simulation" else "prediction"]
@@ -201,12 +204,14 @@ def _kind(cycle: LimitCycle) -> str:
 
 
 def _vibration_text(simulated: SimulatedVibration) -> str:
+    """What a simulation ended in: rest, or a vibration with its amplitude and frequency."""
     if simulated.behaviour in ("converged", "decaying"):
         return "comes to rest"
     return f"{simulated.behaviour}, {amount(simulated.amplitude, 'm')} at {amount(simulated.frequency, 'Hz')}"
 
 
 def _remarks(prediction: LimitCyclePrediction) -> Iterator[str]:
+    """Sentences below the cycles: what a simulation says beside them, and what the prediction leaves out."""
     if prediction.small_start_vibration is not None:
         small = prediction.small_start_vibration
         yield f"simulated from {amount(small.start, 'm')}: {_vibration_text(small)}"

@@ -104,6 +104,7 @@ class LoadCommand(Command):
 
 
 def _bare(case: CommandLine) -> Device:
+    """The device without any load."""
     from zwidth.device.load import device_without_load
 
     return device_without_load(case.device)
@@ -126,7 +127,10 @@ def _unpushed(case: CommandLine) -> Device:
 
 
 def _chart_row(step: PushedChart, free: float) -> list[str]:
-    """free: the largest stiffness without a push."""
+    """Cells on the chart under one push.
+
+    free  largest stiffness without a push [N/m], from which the change counts
+    """
     chart = step.chart
     if chart is None or not chart.frequencies_at_stiffness_max:
         return [typed(as_written(step.push, "N")), "none", *[""] * 5]
@@ -143,6 +147,7 @@ def _chart_row(step: PushedChart, free: float) -> list[str]:
 
 
 def _balance_row(step: PushedChart) -> list[str]:
+    """Cells on the forces in balance under one push, and on the motion along the surface."""
     if step.wall_force != step.wall_force:
         return [typed(as_written(step.push, "N")), *[""] * 5]
     motion = step.sideways

@@ -68,7 +68,7 @@ def _warn(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """A warning as users want it: what zwidth says, on a line; arithmetic's own is for those who debug."""
+    """Say a UserWarning, as those of zwidth are, on one line; others, of arithmetic, with ZWIDTH_DEBUG alone."""
     if issubclass(category, UserWarning) or os.environ.get("ZWIDTH_DEBUG"):
         say(f"zwidth: warning: {message}")
 

@@ -193,7 +193,7 @@ class MapCommand(Command):
 
 
 def _measures(case: CommandLine) -> tuple[list[Measure], list[Requirement]]:
-    """What to map, the first of them shown; and the requirements."""
+    """The measures to map, those of requirements too, of which the first is drawn; and the requirements."""
     from zwidth.measures.catalogue import find_measure
     from zwidth.measures.user_measures import load_measures
     from zwidth.study.designs.column import parse_requirement
@@ -230,6 +230,7 @@ def _plane_option(name: str, value: str | None) -> str:
 
 
 def _plane(case: CommandLine) -> PlaneGrid:
+    """The plane and its cells that the options ask for. Raises as `Device.at` and `plane_of` do."""
     from zwidth.errors import EquilibriumError, PostureError, SidewaysForceError
     from zwidth.study.workspace.plane_grid import plane_of
 
@@ -255,7 +256,7 @@ def map_page(
     document  of the map, as `study.workspace.map_data.map_document` makes it
     """
     measures = document.get("measures") or {document["measure"]: document}
-    yield _heading(dataset, device, list(measures))
+    yield _map_heading(dataset, device, list(measures))
     for name, one in measures.items():
         yield f"\n{one['title']} ({name})"
         yield two_columns(list(_rows(dataset, name, one["overall"])))
@@ -265,9 +266,11 @@ def map_page(
     yield from map(printable, document["notes"])
 
 
-def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
-    """Three lines at most: the map and the device; the computer; what is left out. Of what matters to no measure,
-    the direction or the linearity, nothing is said."""
+def _map_heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
+    """The lines above a map, three at most: device, cells and plane; the computer; what the measures leave out.
+
+    names  of the measures mapped; the direction and what is not linear are told only if one of them depends on it
+    """
     about = dataset.attrs
     towards = about["direction"]
     way = f"along the {towards} direction of each cell" if isinstance(towards, str) else f"along {vector(towards)}"
@@ -288,6 +291,10 @@ def _heading(dataset: xr.Dataset, device: Device, names: list[str]) -> str:
 
 
 def _rows(dataset: xr.Dataset, name: str, overall: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Rows on one measure over the map: average, extremes and where they lie, uniformity, cells by status.
+
+    overall  numbers over all cells with a value, as the document has them
+    """
     import numpy as np
 
     values, status = dataset[name].values, dataset[f"{name}_status"].values
@@ -314,10 +321,12 @@ def _amount(value: float, unit: str) -> str:
 
 
 def _area_rows(area: CommonArea) -> Iterator[tuple[str, str]]:
+    """Rows on the area in which each requirement is met, and on that in which all are."""
     for requirement, region in zip(area.requirements, area.regions, strict=True):
         yield requirement.text, _area(region.area, region.share)
     yield "common area", _area(area.common.area, area.common.share)
 
 
 def _area(area: float, share: float) -> str:
+    """An area [m^2] in words, and its share of the reachable one."""
     return f"{typed(area_text(area))}, {typed(percent(share))} of the reachable area"

@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 
 SURFACES: Final = ("plane", "sphere", "box")
 WALL_OPTIONS: Final = ("stiffness", "damping", "no_pull", "two_sided", "hollow", "environment", "parameters")
-STRONGEST: Final = 1e6  # N
-FASTEST: Final = 1e3  # m/s
+STRONGEST: Final = 1e6  # N, largest push that is taken
+FASTEST: Final = 1e3  # m/s, largest velocity at the start that is taken
 
 
 def check_motion(options: Mapping[str, Any], question: Question) -> None:
@@ -61,6 +61,10 @@ def check_motion(options: Mapping[str, Any], question: Question) -> None:
 
 
 def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
+    """Raise click.UsageError for options of the wall that do not fit the surface, or each other.
+
+    surfaces  the option that gives the surface; none: ()
+    """
     environment, plane, two_sided = options["environment"], options["plane"], options["two_sided"]
     if not surfaces:
         alone = [name for name in WALL_OPTIONS if options[name] not in (None, False, ())]
@@ -86,6 +90,7 @@ def _check_wall(options: Mapping[str, Any], surfaces: Sequence[str]) -> None:
 
 
 def _check_sizes(options: Mapping[str, Any]) -> None:
+    """Raise click.UsageError for a push or velocity too large to be meant."""
     for name, most, unit in (("push", STRONGEST, "N"), ("start_velocity", FASTEST, "m/s")):
         value = options[name] or ()
         if any(abs(part) > most for part in value):
@@ -94,6 +99,7 @@ def _check_sizes(options: Mapping[str, Any]) -> None:
 
 
 def _check_question(options: Mapping[str, Any], question: Question) -> None:
+    """Raise click.UsageError for a model, an operator or a direction that a motion has no use for."""
     if question.model not in (None, "full"):
         raise usage_error(
             f"the whole mechanism moves, so that --model {question.model} does not apply; leave out --model"
@@ -112,7 +118,7 @@ def surface_option(options: Mapping[str, Any]) -> str:
 
 
 def surface_of(options: Mapping[str, Any], device: Device) -> Surface | None:
-    """What the handle meets. Numbers in a plane lie at the height of the device's reference.
+    """What the handle meets. Points given by two numbers lie at the height of the device's reference position.
 
     Raises  BadInput  for numbers that describe none
     """
@@ -314,12 +320,14 @@ def move_page(case: CommandLine, motion: MechanismMotion, document: Mapping[str,
 
 
 def _status(document: Mapping[str, Any]) -> str:
+    """Sentence on how long the motion lasted, or why it ended early."""
     if document["ended_because"] is None:
         return f"moved for {amount(document['duration_s'], 's')}"
     return f"ended early: {document['ended_because']}"
 
 
 def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
+    """Rows on what a motion was given: surface, start, push, gravity and simulated time."""
     yield "surface", _surface(motion, named=case["environment"] is not None)
     moving = f"with {vector(motion.start_velocity, 'm/s')}" if motion.start_velocity.any() else "at rest"
     yield "start", moving
@@ -333,7 +341,10 @@ def _circumstances(case: CommandLine, motion: MechanismMotion) -> Iterator[Row]:
 
 
 def _surface(motion: MechanismMotion, named: bool) -> str:
-    """The surface, and what is rendered there; named: by --environment."""
+    """The surface and what is rendered there, in words.
+
+    named  whether --environment names it; else it is a wall of stiffness and damping
+    """
     from zwidth.contact.mechanism.surfaces import Plane, Sphere
 
     surface, environment = motion.surface, motion.environment
@@ -357,6 +368,7 @@ def _surface(motion: MechanismMotion, named: bool) -> str:
 
 
 def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[Row]:
+    """Rows on a motion's numbers: contact, limits, where the handle ends, and how far it went."""
     import numpy as np
 
     if motion.surface is not None:
@@ -373,18 +385,21 @@ def _results(motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[R
 
 
 def _without_rounding(position: Any, size: float) -> Any:
+    """A position (3,) [m] with 0 for coordinates that are rounding of `size`, the largest of the motion [m]."""
     import numpy as np
 
     return np.where(np.abs(position) > ROUNDING_SHARE * size, position, 0.0)
 
 
 def _when(value: float, unit: str, course: Any, time: Any) -> str:
+    """A largest value with the time at which `course`, (samples,), is largest; times [s]."""
     if not value > 0.0:
         return amount(0.0, unit)
     return f"{amount(value, unit)}, after {amount(float(time[course.argmax()]), 's')}"
 
 
 def _limits(motion: MechanismMotion) -> str:
+    """How often each drive with a torque limit reached it."""
     limits = motion.mechanism.drives.torque_limit
     shares = [
         f"{printable(name)} {_share(share)}"
@@ -399,7 +414,10 @@ def _share(share: float) -> str:
 
 
 def _energies(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
-    """The motion and bending of the drives last, as in simulated contacts; what is not known, by difference."""
+    """Rows of the energy table: what each part gave; stored in the motion and in bending drives last.
+
+    What is not known is the difference: the dampers, or, where a motor's work is not known, motors and dampers.
+    """
     own = {"hand": book["hand"], "motors": book["motors"], "gravity": book["gravity"]}
     own["dry friction"] = book["friction"]
     if isnan(own["motors"]):
@@ -412,6 +430,7 @@ def _energies(book: Mapping[str, float]) -> Iterator[tuple[str, str, str]]:
 
 
 def _remarks(case: CommandLine, motion: MechanismMotion, document: Mapping[str, Any]) -> Iterator[str]:
+    """Sentences on what is worth a remark, such as a start inside the wall or a push without effect."""
     import numpy as np
 
     travel = float(np.max(np.ptp(motion.position, axis=0)))

@@ -80,7 +80,7 @@ class Question:
         return device.renders_moments(self.direction, self.axis, self.characteristic_length)
 
     def refuse_unsupported(self, device: Device) -> None:
-        """Raises BadInput for what directions computed together leave out."""
+        """Raise BadInput for parts of the device that directions computed together cannot include."""
         from zwidth.errors import SeveralDirectionsError
         from zwidth.loop.posed_device import check_several_directions
 
@@ -167,6 +167,7 @@ class Numbers(ParamType):
         return str(self.argument.value)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The numbers as a tuple; fails for a wrong count, or for one that is not finite."""
         if isinstance(value, tuple):
             return value
         one = self.argument
@@ -185,6 +186,7 @@ class PostureType(Numbers):
     """A handle's position, or the angles of driven joints by name."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Coordinates as a tuple, or angles [rad] by joint, of JOINT=RAD,...; fails for others."""
         if not isinstance(value, str) or "=" not in value:
             return super().convert(value, param, ctx)
         angles: dict[str, float] = {}
@@ -208,6 +210,7 @@ class Ranges(Numbers):
     """Pairs of numbers, of each the lower one first."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The numbers as a tuple; fails where the lower end of a pair is not below the upper one."""
         numbers = super().convert(value, param, ctx)
         if not all(low < high for low, high in zip(numbers[::2], numbers[1::2], strict=True)):
             ends = str(self.argument.value).split(",")
@@ -225,6 +228,7 @@ class Number(ParamType):
         self.argument = argument
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number; fails where the argument does not allow it."""
         number = value
         with suppress(ValueError):
             number = int(value) if self.argument.kind == "whole" else float(value)
@@ -293,7 +297,10 @@ def option_name(argument: Argument) -> str:
 
 
 def options_of(arguments: Arguments, **kinds: ParamType) -> tuple[Decorator, ...]:
-    """The options of a question's arguments; kinds: by name, how values are read that are no plain ones."""
+    """The options of a question's arguments, in their order.
+
+    kinds  by the argument's name: how its value is read, where not by its own kind
+    """
     return tuple(option(one, kinds.get(name)) for name, one in arguments.items())
 
 
@@ -318,10 +325,14 @@ def about_a_device(command: Callback, loads: bool = True, device: Decorator = DE
 
 
 def about_a_workspace(command: Callback) -> Callback:
-    """The same for a command about all postures, along one direction or the extreme ones; `extreme` is which."""
+    """The same as `about_a_device` for a command about all postures.
+
+    Its argument `extreme` is the word for the direction chosen in each cell, such as "worst"; None: one is given.
+    """
 
     @wraps(command)
     def with_extreme(question: Question, **more: Any) -> int:
+        """Call the command, with a direction given by a word moved to `extreme`."""
         direction: Any = question.direction
         extreme = direction if isinstance(direction, str) else None
         return command(replace(question, direction=None if extreme else direction), extreme=extreme, **more)
@@ -337,15 +348,19 @@ def about_a_workspace(command: Callback) -> Callback:
 
 
 def about_every_posture(command: Callback) -> Callback:
-    """The same for a command about all postures and all directions."""
+    """The same as `about_a_device` for a command about all postures and all directions, and without a load."""
     return _with_device_options(command, DEVICE_NAME, loads=False)
 
 
 def _with_device_options(command: Callback, device: Decorator, *where: Decorator, loads: bool = True) -> Callback:
-    """The device, the options `where`, those of a load, and those that every question about a device has."""
+    """Give a command the device and its options, and make a `Question` of them.
+
+    where  options of posture and direction;   loads  whether the command has those of a load
+    """
 
     @wraps(command)
     def with_arguments(device: str, **options: Any) -> int:
+        """Call the command with the options of the device as a `Question`, and the others as they are."""
         own = {name: options.pop(name) for name in (*PLACE, *DEVICE) if name in options}
         if loads:
             own |= {name: options.pop(name) for name in LOADS}

@@ -76,6 +76,7 @@ class PolarCommand(Command):
 
 
 def _rows(by_direction: ByDirection) -> Iterator[tuple[str, str]]:
+    """Rows on all directions of a plane: how many, the stiffest, the least stiff, and why some have no answer."""
     import numpy as np
 
     plane, count = by_direction.plane, len(by_direction.stiffness)

@@ -50,7 +50,7 @@ class _Bars:
         self._tasks: dict[str, Any] = {}
 
     def update(self, stage: str, done: int, of: int) -> None:
-        """Take what the computation says."""
+        """Take the stage that the computation is at: its name, steps done, and all its steps (0: not known)."""
         with self._lock:
             self._stage = stage, done, of
             if self._bar is not None:
@@ -75,6 +75,7 @@ class _Bars:
             self._bar.stop()
 
     def _draw(self) -> None:
+        """Show the stage in its bar; make one for a new stage."""
         stage, done, of = self._stage
         if stage not in self._tasks:
             self._tasks[stage] = self._bar.add_task(stage, total=of or None, completed=done)
@@ -92,7 +93,7 @@ class _Lines:
         self._lock = Lock()
 
     def update(self, stage: str, done: int, of: int) -> None:
-        """Take what the computation says; print a line if it is time."""
+        """Take the stage that the computation is at, as `_Bars.update`; print a line if it is time."""
         if stage != self._stage:
             self._began, self._first = monotonic(), done
         self._stage, self._done, self._of = stage, done, of
@@ -135,7 +136,7 @@ def stopped_in_a_kernel(error: BaseException) -> bool:
 
 
 def interrupted() -> int:
-    """Exit code and message of an interruption."""
+    """Say that the command was interrupted; returns its exit code."""
     say("zwidth: interrupted; nothing was left half-written")
     return INTERRUPTED
 

@@ -56,6 +56,7 @@ def open_store(job: Job, beside: Path | None, resume: str | None) -> Store | Non
 
 
 def _default_folder(beside: Path | None) -> Path:
+    """The folder that keeps finished work where no --resume names one: beside the file that is written."""
     assert beside is not None
     return beside.with_name(beside.name + ".progress")
 
@@ -111,6 +112,10 @@ def remove_series(case: CommandLine) -> None:
 
 @contextmanager
 def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Iterator[None]:
+    """Run inside this block, as `report_kept_work`.
+
+    folder  that keeps the finished work; None: none does;   begun  says whether there is any in it
+    """
     from zwidth.errors import CannotStart, ClusterEnded, ClusterError, StoreError, WorkerLost
 
     goes_on = (
@@ -139,5 +144,6 @@ def _kept_work_reported(folder: Path | None, begun: Callable[[], bool]) -> Itera
 
 
 def _unwritable(path: Path, error: OSError) -> str:
+    """Message of a folder that cannot be written, with what the system says."""
     reason = error.strerror or str(error)
     return f"{printable(str(path))}: cannot be written: {reason[:1].lower() + reason[1:]}; name another folder"

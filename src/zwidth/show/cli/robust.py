@@ -125,6 +125,7 @@ class RobustCommand(Command):
 
 
 def _ranges(texts: tuple[str, ...]) -> tuple[Range, ...]:
+    """The ranges of --range PATH=LOW,HIGH[,log]. Raises BadInput with every text that is none."""
     from zwidth.study.robust.family import Range
 
     ranges, lines = [], []
@@ -171,6 +172,7 @@ def _operators(single: str | None, names: str | None, file: str | None) -> tuple
 
 
 def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
+    """Rows on a family: walls stable for all, what is lost against the best member, and the members."""
     chart = study.chart
     frequencies = " and ".join(amount(frequency, "Hz") for frequency in chart.frequencies_at_stiffness_max)
     members = " and ".join(_member(study, member) for member in chart.members_at_stiffness_max)
@@ -201,7 +203,7 @@ def _rows(study: RobustStudy) -> Iterator[tuple[str, str]]:
             ),
         )
     if study.violation is not None:
-        yield "unseen members", _violation(study.violation)
+        yield "unseen members", _violation_text(study.violation)
     if chart.unobserved_modes:
         yield "not affected by a wall", ", ".join(listed_names(chart.unobserved_modes))
 
@@ -221,10 +223,12 @@ def _member(study: RobustStudy, member: int) -> str:
 
 
 def _share(share: float) -> str:
+    """A share of the edge in per cent; very small ones are only bounded."""
     return "under 0.01 %" if 0.0 < share < LEAST_SHARE else typed(percent(share))
 
 
 def _members_text(study: RobustStudy) -> str:
+    """How many members were charted, and what searching the ranges for worse ones found."""
     count, edge_change = len(study.members), f"{typed(uncertain(100 * study.area_change))} %"
     if study.violation is None:
         return (
@@ -245,7 +249,8 @@ def _members_text(study: RobustStudy) -> str:
     return f"{count} charted, {worse}"
 
 
-def _violation(violation: Violation) -> str:
+def _violation_text(violation: Violation) -> str:
+    """How many random members, not charted, make a wall unstable, and how much softer walls must be for them."""
     if not violation.violating:
         return f"none of {violation.unseen} random ones makes one of these walls unstable"
     less = typed(uncertain(100 * violation.worst_stiffness_share))

@@ -11,7 +11,7 @@ from zwidth.show.cli.options import example
 
 
 @click.command(epilog=example("zwidth schema > device.schema.json"))
-@click.option("--json", "as_json", is_flag=True, help="Makes no difference: the schema is JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print it on one line; without, indented.")
 def schema(as_json: bool) -> int:
     """Print the JSON Schema of a device file."""
     from zwidth.device.load import schema as device_schema

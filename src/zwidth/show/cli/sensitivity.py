@@ -26,6 +26,7 @@ PLACES: Final = {
     "end of the curve": ", at an end of the edge's curve",
     None: "",
 }
+RIVAL: Final = 0.9  # share of the largest stiffness from which another peak is named
 NO_WALL: Final = "no stable wall has K > 0 and B >= 0, so that there is no largest stiffness to change"
 
 
@@ -85,6 +86,7 @@ class SensitivityCommand(Command):
             yield from _goal_pages(result.goal, case["top"])
 
     def _sensitivities(self, case: CommandLine, result: Sensitivities) -> Iterator[Any]:
+        """Pages on the stiffest wall, and on the numbers that change it most; nothing without such a wall."""
         peak = result.peak
         if peak is None:
             return
@@ -112,7 +114,7 @@ class SensitivityCommand(Command):
 
 
 def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
-    """What each number would have to be, for people."""
+    """Pages on the numbers that reach the goal, of which `top` are shown; if none does, on the nearest one."""
     wanted = amount(goal.goal, "N/m")
     shown = goal.reached[:top]
     if shown:
@@ -131,12 +133,14 @@ def _goal_pages(goal: Goal, top: int) -> Iterator[Any]:
 
 
 def _goal_row(one: GoalNumber) -> tuple[str, str, str, str]:
+    """Cells of a number that reaches the goal: path, value now, value that it would need, ratio of the two."""
     unit = unit_text(one.unit)
     now, wanted = f"{typed(as_written(one.now))} {unit}".rstrip(), f"{typed(number(one.value))} {unit}".rstrip()
     return one.path, now, wanted, amount(one.factor) if one.factor == one.factor else ""
 
 
 def _row(sensitivities: Sensitivities, one: Sensitivity) -> tuple[str, str, str, str]:
+    """Cells of a number: path, value, logarithmic sensitivity, and the stiffness gained by 1 % more of it."""
     assert sensitivities.peak is not None
     gain = 0.01 * one.logarithmic * sensitivities.peak.stiffness
     return (
@@ -147,15 +151,18 @@ def _row(sensitivities: Sensitivities, one: Sensitivity) -> tuple[str, str, str,
     )
 
 
-def _remarks(sensitivities: Sensitivities, more: int) -> Iterator[str]:
-    """What the table does not show."""
+def _remarks(sensitivities: Sensitivities, unshown: int) -> Iterator[str]:
+    """Sentences below the table: a delay that is 0 now, other walls as stiff or nearly, and what is not shown.
+
+    unshown  how many numbers with a sensitivity, be it 0, the table leaves out
+    """
     late = next((n for n in sensitivities.numbers if n.path == "loop.delay_samples" and n.value == 0.0), None)
     if late is not None and late.derivative == late.derivative:
         yield f"a delay of 0.01 samples gives {amount(0.01 * late.derivative, 'N/m')}"
     if sensitivities.tie:
         yield "two walls are stiffest at once: these numbers are of one of them, and a change may lower the other"
-    elif sensitivities.peak is not None and sensitivities.second_peak > 0.9 * sensitivities.peak.stiffness:
+    elif sensitivities.peak is not None and sensitivities.second_peak > RIVAL * sensitivities.peak.stiffness:
         second = amount(sensitivities.second_peak, "N/m")
         yield f"another peak stands at {second}: it takes over once this one falls below it"
-    if more > 0:
-        yield f"{more} more; show them with --top N, or get all with --json or --output"
+    if unshown > 0:
+        yield f"{unshown} more; show them with --top N, or get all with --json or --output"

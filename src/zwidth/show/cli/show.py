@@ -82,7 +82,10 @@ class ShowCommand(Command):
 
 
 def _mechanism_pages(mechanism: Mechanism, result: Description, values: Mapping[str, Any]) -> Iterator[Any]:
-    """Dexterity and joints."""
+    """Tables of dexterity, of joints, and of links that bend.
+
+    values  the document as JSON has it
+    """
     units = _dexterity_units(mechanism, result)
     dynamic = ("dynamic manipulability", amount(values["dynamic_manipulability"], units[1]))
     yield two_columns(
@@ -98,7 +101,7 @@ def _mechanism_pages(mechanism: Mechanism, result: Description, values: Mapping[
 
 
 def _beam_table(beams: Sequence[BeamDescription]) -> Any:
-    """The links that bend."""
+    """Table of the links that bend."""
     rows = []
     for beam in beams:
         how = beam.method.replace("-", " ") + (f", {beam.modes}" if beam.method != "lumped" else "")
@@ -108,7 +111,7 @@ def _beam_table(beams: Sequence[BeamDescription]) -> Any:
 
 
 def _felt(values: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Masses and stiffness felt along the direction, and frequencies."""
+    """Rows on masses and stiffness felt along the direction, and on natural frequencies."""
     return [
         ("link side", amount(values["link_side_mass_kg"], "kg")),
         ("motor side", amount(values["motor_side_mass_kg"], "kg")),
@@ -138,7 +141,7 @@ def _joint_table(mechanism: Mechanism, joints: Mapping[str, Any]) -> Any:
 
 
 def _missing(device: Device) -> Iterator[Any]:
-    """What the file leaves out, and what for it is needed."""
+    """Table of the numbers that the file leaves out, and of the answers that need them."""
     from zwidth.device.plausibility import unknown_numbers
 
     unknown = unknown_numbers(device.document)

@@ -182,7 +182,8 @@ BEHAVIOUR_VERDICTS: Final = {
     "forced": "undecided: it follows the hand's tremor; leave out --tremor to see what the wall does by itself",
     "undecided": "undecided: this run does not tell; try a longer --duration",
 }
-NEAR_NYQUIST: Final = 0.9
+NEAR_NYQUIST: Final = 0.9  # share of half the sampling rate from which a vibration alternates between samples
+ENERGY_ERROR: Final = 1e-6  # of the largest energy, above which the imbalance is told
 
 
 def simulation_page(simulation: ContactSimulation, sound: Mapping[str, Any] | None) -> Iterator[Any]:
@@ -197,12 +198,14 @@ def simulation_page(simulation: ContactSimulation, sound: Mapping[str, Any] | No
 
 
 def _verdict(simulation: ContactSimulation) -> str:
+    """The verdict on a contact, in words."""
     if simulation.behaviour == "undecided" and simulation.range_exit is not None:
         return "undecided: the motion leaves the range of the handle before the run decides"
     return BEHAVIOUR_VERDICTS[simulation.behaviour]
 
 
 def _circumstances(simulation: ContactSimulation) -> Iterator[Row]:
+    """Rows on what a contact was given: environment, start, hand and simulated time."""
     place = f", at {amount(simulation.wall_position, 'm')}" if simulation.wall_position else ""
     yield "environment", f"{environment_words(simulation.environment, simulation.parameters)}{place}"
     yield "start", _start(simulation)
@@ -226,6 +229,7 @@ def _number(value: float, unit: str) -> str:
 
 
 def _start(simulation: ContactSimulation) -> str:
+    """Where the device starts, from the surface, and how fast, in words."""
     depth = simulation.start_position - simulation.wall_position
     where = f"{amount(abs(depth), 'm')} {'inside' if depth > 0.0 else 'outside'}" if depth else "at its position"
     beside = simulation.distance_from_path or 0.0
@@ -237,6 +241,7 @@ def _start(simulation: ContactSimulation) -> str:
 
 
 def _hand(hand: Hand) -> str:
+    """What the hand does, in words."""
     texts = []
     if hand.push:
         ramp = f", growing over {amount(hand.ramp, 's')}" if hand.ramp else ""
@@ -253,6 +258,7 @@ def _hand(hand: Hand) -> str:
 
 
 def _results(simulation: ContactSimulation) -> Iterator[Row]:
+    """Rows on a contact's numbers: amplitude, frequency, growth, contact, limit, passivity controller."""
     yield "amplitude at the end", amount(simulation.amplitude, "m")
     if isfinite(simulation.dominant_frequency):
         yield "dominant frequency", amount(simulation.dominant_frequency, "Hz")
@@ -275,6 +281,7 @@ def _results(simulation: ContactSimulation) -> Iterator[Row]:
 
 
 def _remarks(simulation: ContactSimulation) -> Iterator[str]:
+    """Sentences on what is worth a remark, such as a start inside the wall or a motion below an encoder step."""
     import numpy as np
 
     if simulation.environment.surface and simulation.starts_inside:
@@ -300,7 +307,7 @@ def _remarks(simulation: ContactSimulation) -> Iterator[str]:
         yield "the hand pushes harder than the force limit"
     if simulation.loop.plant.handle is None:
         yield "the plant names no handle: it is assumed to be at the sensor"
-    if simulation.response.imbalance > 1e-6:
+    if simulation.response.imbalance > ENERGY_ERROR:
         missing = typed(uncertain(100.0 * simulation.response.imbalance))
         yield f"the energies do not add up: the error is {missing} % of the largest"
 

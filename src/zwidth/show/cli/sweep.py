@@ -62,10 +62,14 @@ class StudyQuestion(Question):
 
 
 def about_a_study(command: Callback, *, bounds: bool = False) -> Callback:
-    """Give a command STUDY.toml, as a `StudyQuestion`; `bounds` as there."""
+    """Give a command STUDY.toml, as a `StudyQuestion`.
+
+    bounds  whether the study is read for an optimiser
+    """
 
     @wraps(command)
     def with_study(study: str, **more: Any) -> int:
+        """Call the command with a `StudyQuestion` about the file."""
         return command(StudyQuestion(study, bounds=bounds), **more)
 
     return click.argument("study", metavar="STUDY.toml", type=Text())(with_study)
@@ -234,6 +238,7 @@ def _lists_all(case: CommandLine) -> bool:
 
 
 def _heading(one: Column) -> str:
+    """Heading of a measure's column: its name and unit."""
     return f"{one.name} [{spoken_unit(one.unit)}]" if one.unit else one.name
 
 
@@ -246,7 +251,7 @@ def _design_texts(sweep: Sweep, design: int) -> list[str]:
 
 
 def _extremes(sweep: Sweep, column: int) -> Iterator[tuple[str, str]]:
-    """The extremes of one column, with their designs; and how many designs there are of each status."""
+    """Rows on one measure: its extremes with their designs, and how many designs there are of each status."""
     from zwidth.measures.definition import STATUS
     from zwidth.show.units import quantity
     from zwidth.study.designs.sweep import axis_value_text

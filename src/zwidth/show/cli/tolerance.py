@@ -102,6 +102,7 @@ class ToleranceCommand(Command):
     def about(self, command: Callback) -> Callback:
         @wraps(command)
         def with_study(study: str, samples: int | None, seed: int | None, **more: Any) -> int:
+            """Call the command with a `ToleranceFile`."""
             return command(ToleranceFile(study, samples=samples, seed=seed), **more)
 
         return click.argument("study", metavar="STUDY.toml", type=Text())(with_study)
@@ -191,7 +192,7 @@ class ToleranceCommand(Command):
 
 
 def _quantile_tables(result: ToleranceStudy) -> Iterator[Any]:
-    """The quantiles of all measures, each with its interval."""
+    """The table of the quantiles of all measures, each with its interval; none where no measure has any."""
     shares = [f"{100.0 * share:.6g} %" for share in result.question.quantiles]
     rows = [_quantile_row(one, result.question.samples) for one in result.quantiles if one.quantiles]
     if rows:
@@ -199,6 +200,10 @@ def _quantile_tables(result: ToleranceStudy) -> Iterator[Any]:
 
 
 def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:
+    """Cells on one measure: its name, and each quantile with its interval.
+
+    drawn  number of devices drawn
+    """
     texts = []
     for each in one.quantiles:
         interval = each.interval
@@ -216,7 +221,7 @@ def _quantile_row(one: MeasureQuantiles, drawn: int) -> list[str]:
 UNDECIDED: Final = "undecided"  # an outcome
 MUCH_CUT: Final = 0.01  # share of a distribution that is cut off, and said to be
 
-WORDS = {
+WORDS = {  # outcome of a drawn device -> sentence about such devices
     "failed": "could not be built",
     "out of reach": "do not get to the handle's position",
     "singular": "are singular there",
@@ -245,6 +250,7 @@ def tolerance_text(one: Tolerance) -> str:
 
 
 def _written(value: float) -> str:
+    """A number of a distribution, in four digits."""
     return f"{value:.4g}"
 
 
@@ -281,7 +287,10 @@ def wall_sentence(result: ToleranceStudy) -> str:
 
 
 def _undecided_sentence(result: ToleranceStudy, shown: str, share: Interval) -> str:
-    """The sentence of a wall that lies on the stability limit of some devices, as far as rounding tells."""
+    """Sentence on a wall that, as far as rounding tells, lies on the stability limit of some devices.
+
+    shown  the wall in words;   share  of the devices produced in which it is stable
+    """
     from zwidth.study.tolerances.outcomes import STABLE
 
     count, many = result.question.samples, result.undecided
@@ -324,6 +333,7 @@ def band_rows(result: ToleranceStudy) -> Iterator[list[str]]:
 
 
 def _tried(wall: BandWall | None) -> str:
+    """A wall, and the share of further devices, drawn after it was found, in which it is stable; None: "none"."""
     if wall is None:
         return "none"
     place = f"{amount(wall.stiffness, 'N/m')} at {amount(wall.damping, 'N s/m')}"
@@ -340,6 +350,7 @@ def index_rows(outcomes: Sequence[Indices]) -> Iterator[list[str]]:
 
 
 def _part(one: Index) -> str:
+    """The total index of a tolerance in per cent, with its interval; 0 where it cannot be told from 0."""
     low, high = number(100.0 * one.total.low), number(100.0 * one.total.high)
     if not one.total_is_certain:
         return typed(f"0, as far as can be told ({low} to {high} %)")
@@ -410,6 +421,7 @@ def _gain(gain: Interval) -> str:
 
 
 def _advice_without_wall(result: ToleranceStudy) -> str:
+    """Which tolerance has the largest part in the spread of the largest stiffness, where no wall is wanted."""
     if not result.middle_is_stable:
         return f"which tolerance to tighten first is not known, for {_middle_text(result)}"
     outcome = next((one for one in result.indices if one.name == "stiffness_max" and one.indices), None)

@@ -28,7 +28,8 @@ EDGE: Final = 0.03  # share of the view along its border that is kept free of nu
 STEPS: Final = 60  # places along a line that are tried for its number
 BESIDE: Final = (0.22, 0.06)  # where the numbers of small lines stand, as shares of the view
 SMALL: Final = 0.1  # share of the view below which a line's number stands beside it
-TEXT_SIZE: Final = 7.0
+TEXT_SIZE: Final = 7.0  # points
+OUTSIDE: Final = 9.0  # view widths away: a place that keeps no number from anywhere
 LETTERS: Final = 44  # of a line of the legend
 # Authors and year, or an equation of the thesis; what a source tells beyond stands in the table.
 SHORT_SOURCE: Final = re.compile(r".*?(\b\d{4}\b|eq\. [\d.]+(-[\d.]+)?( and [\d.]+)?)")
@@ -113,7 +114,10 @@ def _look(n: int, *, met: bool) -> dict[str, Any]:
 
 
 def _lines(bounds: Sequence[Bound], dampings: Floats, widest: float, numbers: Any) -> list[BoundLine]:
-    """The lines in view, each with the conditions that it is of."""
+    """The lines in view, each with the conditions that it is of.
+
+    widest   largest stiffness of the view [N/m];   numbers  iterator of the legend's numbers, one a condition
+    """
     lines: list[BoundLine] = []
     for bound in bounds:
         stiffness = bound.stiffness_max_at(dampings)
@@ -129,7 +133,7 @@ def _lines(bounds: Sequence[Bound], dampings: Floats, widest: float, numbers: An
 
 
 def _alike(one: Floats, other: Floats, scale: float) -> bool:
-    """Would the two lines all but lie over each other?"""
+    """Whether two lines of stiffness [N/m] all but lie over each other in a view as wide as `scale` [N/m]."""
     both = np.isfinite(one) == np.isfinite(other)
     return bool(np.all(both) and np.nanmax(np.abs(one - other), initial=0.0) < ALIKE * scale)
 
@@ -162,11 +166,12 @@ def _named(bound: Bound) -> str:
 
 
 def _filled(entries: list[Any], rows: int) -> list[Any]:
-    """As many entries as rows, the last of them empty."""
+    """The entries, with empty ones after them up to so many rows."""
     return entries + [_without_line("") for _ in range(rows - len(entries))]
 
 
 def _without_line(text: str) -> Line2D:
+    """A legend's entry of text alone."""
     return Line2D([], [], linestyle="none", label=text)
 
 
@@ -177,7 +182,10 @@ def _number_lines(
     dampings: Floats,
     top: tuple[float, float],
 ) -> None:
-    """Write each line's numbers on it, where it is farthest from the other lines and their numbers."""
+    """Write each line's numbers on it, where it is farthest from the other lines and their numbers.
+
+    dampings  (DAMPINGS,) of every line [N s/m];   top  largest stiffness and damping of the view [N/m], [N s/m]
+    """
     across = [np.column_stack([line.stiffness / top[0], dampings / top[1]]) for line in lines]
     small = [k for k, xy in enumerate(across) if np.nanmax(xy[np.isfinite(xy).all(axis=1)]) < SMALL]
     placed: list[Floats] = []
@@ -193,8 +201,9 @@ def _number_lines(
         places = (inside if len(inside) else across[k][np.isfinite(across[k]).all(axis=1)])[::-1]
         places = places[np.linspace(0, len(places) - 1, min(STEPS, len(places))).astype(int)]
         others = [other[np.isfinite(other).all(axis=1)] for n, other in enumerate(across) if n != k]
-        clear = np.minimum(_distance(places, np.vstack([*others, np.full((1, 2), 9.0)])), FAR)
-        clear += 2.0 * np.minimum(_distance(places, np.vstack([*placed, np.full((1, 2), 9.0)])), FAR)
+        clear = np.minimum(_distance(places, np.vstack([*others, np.full((1, 2), OUTSIDE)])), FAR)
+        # numbers, which are wider than lines, count twice
+        clear += 2.0 * np.minimum(_distance(places, np.vstack([*placed, np.full((1, 2), OUTSIDE)])), FAR)
         x, y = places[int(np.argmax(clear))]
         placed.append(np.array([[x, y]]))
         _write_number(ax, line.text, (x, y), top, looks[k]["color"])

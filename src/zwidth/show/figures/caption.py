@@ -23,8 +23,9 @@ from zwidth.show.units import as_written, point, way
 if TYPE_CHECKING:
     from zwidth.loop.controller import Controller
     from zwidth.loop.operating_point import OperatingPoint
+    from zwidth.study.designs.study import Study
 
-SIZE: Final = 6.5
+SIZE: Final = 6.5  # points
 FONT: Final = FontProperties(family=FAMILY, size=SIZE)
 COLOUR: Final = "#404040"
 LEADING: Final = 1.25  # of a line, in heights of its letters
@@ -125,8 +126,11 @@ def facts_of_members(members: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {"varied": varied} | ({"operator": None} if "operator" in varied else {})
 
 
-def facts_of_study(study: Any) -> dict[str, Any]:
-    """What all designs of a study have in common, and the numbers in which they differ."""
+def facts_of_study(study: Study) -> dict[str, Any]:
+    """Facts of a study for a caption: what all its designs share, and as `varied` the keys in which they differ.
+
+    Of a study with a task, whose designs are used at many positions, no position is a fact.
+    """
     device, keys = study.device, [axis.key for axis in study.sampling.axes]
     facts: dict[str, Any] = {"name": device.name, "model": study.model, "operator": device.operator_name}
     if device.mechanism is not None:
@@ -139,8 +143,8 @@ def facts_of_study(study: Any) -> dict[str, Any]:
         facts["position_m"] = None
         facts["direction"] = facts.get("direction") if task.directions is None else None
         facts["operator"] = ", ".join(task.operators) or facts["operator"]
-    varied_facts = {"at": "position_m"}
-    fixed = {key: value for key, value in facts.items() if key not in {varied_facts.get(k, k) for k in keys}}
+    varied = {"position_m" if key == "at" else key for key in keys}
+    fixed = {name: value for name, value in facts.items() if name not in varied}
     return fixed | {"varied": keys, "left_out": device.omissions(study.model)}
 
 
@@ -195,6 +199,7 @@ def _place(facts: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _direction(facts: Mapping[str, Any]) -> str:
+    """The rendered direction in words, or several with their law; "" where none is stated."""
     direction = facts.get("direction")
     if isinstance(direction, str):
         return f"along the {direction} direction of each cell"
@@ -213,6 +218,7 @@ def _direction(facts: Mapping[str, Any]) -> str:
 
 
 def _environment(facts: Mapping[str, Any]) -> str:
+    """The wall or environment with its parameters in words; "" where none is stated."""
     environment, values = facts.get("environment"), facts.get("parameters") or {}
     if environment in (None, "none"):
         return ""

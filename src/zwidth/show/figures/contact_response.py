@@ -138,7 +138,7 @@ class _Part:
 
 
 def _handle(response: TimeResponse) -> tuple[Floats, Floats]:
-    """Time and place of the handle, between samples where that was kept; not more of it than can be seen."""
+    """Time [s] and position of the handle [m], between samples where that was kept; not more than can be seen."""
     if not response.trail.size:
         return response.time, response.handle
     skip = 1 if len(response.time) > LONGEST_LINE else -(-len(response.trail) // (BETWEEN * LONGEST_LINE))
@@ -149,7 +149,10 @@ def _handle(response: TimeResponse) -> tuple[Floats, Floats]:
 def draw_line(
     ax: Axes, time: Floats, values: Floats, colour: str, text: str, *, held: bool = False, dashes: Any = "-"
 ) -> None:
-    """One signal; held: a value stays until the next one."""
+    """One signal over time [s].
+
+    held  whether a value stays until the next one, as of a zero-order hold
+    """
     how = "steps-post" if held else "default"
     ax.plot(time, values, color=colour, linestyle=dashes, label=text, drawstyle=how, linewidth=1.1)
 
@@ -179,7 +182,7 @@ def binned_extremes(time: Floats, values: Floats, bins: int = BINS) -> tuple[Flo
 
 
 def _draw_energies(ax: Axes, response: TimeResponse, run: _Part, draw: Callable[..., None]) -> None:
-    """Stored energy, and the largest entries of the energy ledger."""
+    """Draw the stored energy and the largest entries of the energy ledger [J] by `draw`, as lines or as bands."""
     draw(ax, run.time, run(response.stored), BLACK, "stored")
     size = np.abs(response.energies).max(axis=0)
     worth = [i for i in np.argsort(-size)[:LEDGER] if size[i] > WORTH * size.max()]
@@ -189,4 +192,5 @@ def _draw_energies(ax: Axes, response: TimeResponse, run: _Part, draw: Callable[
 
 
 def _across(ax: Axes, height: float, text: str) -> None:
+    """Draw a dotted line across the axes at a height, which the legend names by `text`."""
     ax.axhline(height, color=GREY, linewidth=0.7, linestyle=":", zorder=1.5, label=text)

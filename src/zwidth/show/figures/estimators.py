@@ -47,7 +47,10 @@ def _draw(
     period: float,
     value: Callable[[VelocityMethod, Floats], Floats],
 ) -> None:
-    """One line per method; those named first lie on top."""
+    """Draw a line for each method over frequency [Hz]; those named first lie on top.
+
+    value  of a method at frequencies (k,): what is drawn (k,)
+    """
     nyquist = 0.5 / period
     # even steps along the logarithmic axis, and a linear share for the lobes of long windows
     frequency = np.union1d(nyquist * np.geomspace(LOWEST, 1.0, 400), nyquist * np.linspace(LOWEST, 1.0, 800))

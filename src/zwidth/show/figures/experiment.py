@@ -90,6 +90,7 @@ def draw_experiment(
 def _draw(
     ax: Axes, points: Sequence[ErrorBarPoint], colour: str, marker: str, title: str, *, filled: bool
 ) -> None:
+    """Draw points as marks of one kind, with bars along what was bisected: of tips the stiffness."""
     if not points:
         return
     for upright in (True, False):
@@ -126,7 +127,7 @@ def _cross(ax: Axes, unsure: Sequence[ErrorBarPoint]) -> None:
 def _window(
     points: Sequence[ErrorBarPoint], others: Sequence[ErrorBarPoint], chart: StabilityChart | None
 ) -> Window:
-    """From K = 0 on: the points with their bars, and what of the chart lies there."""
+    """What is shown, K and B from and to: K >= 0, the points with their bars, and what of the chart lies there."""
     K, B = [0.0], [0.0]
     for p in (*points, *others):
         ends = [end for end in (p.low, p.high) if np.isfinite(end)]

@@ -86,7 +86,7 @@ def _draw_sets(ax: Axes, guarantees: Guarantees) -> None:
     by_name = {guarantee.name: guarantee for guarantee in guarantees.guarantees}
     for depth, (name, look) in enumerate(FILLS.items()):
         if name in by_name:
-            _area(ax, by_name[name], look, 1.0 + 0.1 * depth)
+            _draw_set(ax, by_name[name], look, 1.0 + 0.1 * depth)
     for name, (colour, dashes) in OUTLINES.items():
         if name in by_name:
             guarantee = by_name[name]
@@ -117,7 +117,7 @@ def draw_couplings(ax: Axes, couplings: Couplings) -> None:
     )
     rings = [ring for _, region, *_ in sets for ring in region.rings]
     for depth, (name, region, fill, hatch, edge) in enumerate(sets):
-        _patch(ax, region, _with_peak(name, region), (fill, hatch, edge), 1.0 + 0.1 * depth)
+        _draw_coupling_set(ax, region, _with_peak(name, region), (fill, hatch, edge), 1.0 + 0.1 * depth)
     walls = np.vstack([*rings, [[0.0, 0.0]]])
     k1 = float(walls[:, 0].max())
     b0, b1 = float(walls[:, 1].min()), float(walls[:, 1].max())
@@ -127,7 +127,11 @@ def draw_couplings(ax: Axes, couplings: Couplings) -> None:
     legend_above(ax, columns=1)
 
 
-def _area(ax: Axes, guarantee: Guarantee, look: tuple[str, str, Any, float], zorder: float) -> None:
+def _draw_set(ax: Axes, guarantee: Guarantee, look: tuple[str, str, Any, float], zorder: float) -> None:
+    """Draw the walls of one guarantee: filled at the height `zorder`, and their edge above all fills.
+
+    look  fill, colour and dashes of the edge, and height of the edge, as in FILLS
+    """
     fill, edge, dashes, above = look
     rings, text = guarantee.region.rings, _words(guarantee)
     if not rings:
@@ -140,7 +144,11 @@ def _area(ax: Axes, guarantee: Guarantee, look: tuple[str, str, Any, float], zor
     ax.add_patch(Polygon([[np.nan, np.nan]], facecolor=fill, label=text, **line))
 
 
-def _patch(ax: Axes, region: Region, text: str, look: tuple[str, str, str], zorder: float) -> None:
+def _draw_coupling_set(ax: Axes, region: Region, text: str, look: tuple[str, str, str], zorder: float) -> None:
+    """Draw the couplings of one set, named `text`.
+
+    look  fill, hatch and colour of the edge
+    """
     fill, hatch, edge = look
     if not region.rings:
         ax.plot([], [], color="none", label=text)
@@ -153,15 +161,18 @@ def _patch(ax: Axes, region: Region, text: str, look: tuple[str, str, str], zord
 
 
 def _words(guarantee: Guarantee) -> str:
+    """What a guarantee is called in the legend, with its largest stiffness."""
     return _with_peak(WORDS.get(guarantee.name, guarantee.name), guarantee.region)
 
 
 def _with_peak(words: str, region: Region) -> str:
+    """The words, with the largest stiffness of the region."""
     if region.reason is not None:
         return f"{words}: none"
     return f"{words}: {quantity(region.stiffness_max, 'N/m')}"
 
 
 def _box(guarantees: Guarantees) -> Window:
+    """What is shown: the chart with a little of what lies below K = 0 and B = 0; K and B, from and to."""
     K0, K1, B0, B1 = guarantees.chart.box
     return max(K0, -0.05 * K1), K1, max(B0, -0.2 * B1), B1

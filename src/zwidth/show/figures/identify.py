@@ -139,13 +139,14 @@ def draw_boundary(ax: Axes, identification: Identification) -> None:
 
 
 def _outline(ax: Axes, arcs: Sequence[dict[str, Any]], colour: str, dashes: Any, title: str) -> None:
+    """Draw the arcs of a boundary, as a document has them, in one line style; the legend names them once."""
     for n, arc in enumerate(arcs):
         walls = arc["stiffness_N_per_m"], arc["damping_Ns_per_m"]
         ax.plot(*walls, color=colour, linestyle=dashes, linewidth=1.0, label="" if n else title)
 
 
 def _window(K: np.ndarray, B: np.ndarray) -> tuple[float, float, float, float]:
-    """What is shown: the points, K = 0 and B = 0, and a margin."""
+    """What is shown: the points, K = 0 and B = 0, and a margin; K [N/m] and B [N s/m], from and to."""
     ends = []
     for values in (K, B):
         low, high = min(float(np.min(values)), 0.0), max(float(np.max(values)), 0.0)
@@ -356,7 +357,10 @@ def draw_identified_stiffness(ax: Axes, result: Identification) -> None:
 
 
 def _draw_spring(ax: Axes, curves: dict[str, np.ndarray], mine: np.ndarray, text: str) -> None:
-    """The fitted torque along each stroke."""
+    """Draw the fitted torque [N m] along each stroke of one drive.
+
+    mine  (k,) which rows of the curves are of this drive
+    """
     turns = np.flatnonzero(np.diff(curves["motion"][mine])) + 1
     angle, torque = curves["angle_rad"][mine], curves["fitted_torque_Nm"][mine]
     for number, (first, behind) in enumerate(pairwise([0, *turns.tolist(), len(angle)])):

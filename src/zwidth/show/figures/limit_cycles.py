@@ -86,9 +86,10 @@ def _mark(ax: Axes, cycle: LimitCycle, kind: str, marker: str, color: str) -> No
 
 
 def _scale_growth(ax: Axes, visible: Floats, *, crossings: bool) -> None:
-    """Linear where the growth rates that are seen differ little, else logarithmic on both sides of zero.
+    """Scale the axis of growth: linear where the rates in view differ little, else symmetrically logarithmic.
 
-    crossings  does the line cross zero, near which the rates are small?
+    visible    (k,) growth rates in view [1/s]
+    crossings  whether the line crosses zero, near which the rates are small
     """
     sizes = np.abs(visible)
     largest = float(np.max(sizes, initial=0.0)) or 1.0
@@ -103,7 +104,7 @@ def _scale_growth(ax: Axes, visible: Floats, *, crossings: bool) -> None:
 
 
 def _amplitude_range(balance: HarmonicBalance, cycles: Sequence[LimitCycle]) -> tuple[float, float]:
-    """Amplitudes that are drawn."""
+    """Smallest and largest amplitude that are drawn [m]."""
     at, farthest = balance.amplitude, BEYOND * balance.largest_motion
     amplitudes = [cycle.amplitude for cycle in cycles if cycle.within_range]
     swings = at[np.isfinite(balance.growth)]

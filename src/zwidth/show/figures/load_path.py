@@ -131,13 +131,14 @@ def draw_close_up(ax: Axes, path: LoadPath) -> None:
 
 
 def _few_ticks() -> Any:
+    """A locator of a few round ticks, for numbers with many digits."""
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(nbins=4, steps=[1, 2, 5, 10])  # of numbers with many digits
+    return MaxNLocator(nbins=4, steps=[1, 2, 5, 10])
 
 
 def _curves(chart: StabilityChart, low: float) -> Iterator[tuple[Floats, Floats]]:
-    """Pieces of a chart's edge with K above `low`, from its exact curve."""
+    """Pieces of a chart's edge from its exact curve, (K [N/m], B [N s/m]), nan in K far below `low`."""
     tracer, hertz = tracer_of(chart.loop), 1.0 / (2.0 * pi * chart.loop.period)
     for arc in chart.boundary:
         near = np.flatnonzero(arc.stiffness >= low)
@@ -165,6 +166,7 @@ def draw_stiffness(ax: Axes, path: LoadPath) -> None:
         return
 
     def shown(values: Floats) -> Floats:
+        """Stiffness [N/m] as a change [%] from that without a push; as it is where there is none."""
         return 100.0 * (values - free) / free if relative else values
 
     lines: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
@@ -203,7 +205,7 @@ def draw_growth(ax: Axes, path: LoadPath) -> None:
 
 
 def _reach(ax: Axes, least: float) -> None:
-    """Widen the upright axis to so much on both sides of zero: what is less is next to nothing, and looks so."""
+    """Widen the upright axis to `least` on both sides of zero: what is less is next to nothing, and looks so."""
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -least), max(high, least))
 
@@ -216,7 +218,10 @@ def _dots(ax: Axes, path: LoadPath, values: Floats) -> None:
 
 
 def _over_push(ax: Axes, path: LoadPath, values: Floats) -> None:
-    """The axis of the push, and crosses at its foot where there is no answer."""
+    """Name the axis of the push, and mark pushes without an answer by crosses at its foot.
+
+    values  (pushes,) nan: no answer
+    """
     reach = 1.06 * float(path.pushes[-1])
     ax.set_xlim(-reach, reach)
     for draw in (ax.axvline, ax.axhline):
@@ -232,18 +237,19 @@ def _over_push(ax: Axes, path: LoadPath, values: Floats) -> None:
 
 
 def _norm(path: LoadPath) -> BoundaryNorm:
-    """A band of colour for each push."""
+    """Norm that gives each push [N] a band of COLOURS."""
     pushes = path.pushes
     half = 0.5 * (pushes[1] - pushes[0])
     return BoundaryNorm(np.append(pushes - half, pushes[-1] + half), COLOURS.N)
 
 
 def _colour(step: PushedChart, path: LoadPath) -> Any:
+    """The colour of one push."""
     return COLOURS(_norm(path)(step.push))
 
 
 def _line(step: PushedChart, path: LoadPath) -> dict[str, Any]:
-    """The line of one push: the weaker it is the farther in front."""
+    """The line style of one push: the weaker it is the farther in front; dashed against the direction."""
     style: dict[str, Any] = {"color": _colour(step, path), "linewidth": 1.1}
     style["zorder"] = 3.0 - abs(step.push) / (1.0 + 2.0 * float(path.pushes[-1]))
     if step.push == 0.0:
@@ -252,7 +258,7 @@ def _line(step: PushedChart, path: LoadPath) -> dict[str, Any]:
 
 
 def _bar(made: Any, axes: Sequence[Axes], path: LoadPath) -> None:
-    """The colours of the pushes above the axes."""
+    """Add the colours of the pushes above the axes, with a few of the pushes named."""
     middle = len(path.steps) // 2
     every = -(-middle // (MOST_TICKS // 2))
     ticks = [push for k, push in enumerate(path.pushes.tolist()) if (k - middle) % every == 0]

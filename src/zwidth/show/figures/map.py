@@ -182,14 +182,14 @@ def _contours(
 
 
 def _infinite(ax: Axes, x: Floats, y: Floats, values: Floats, title: str) -> list[Any]:
-    """One colour where no value is finite: there is nothing to make levels of."""
+    """Fill where values are infinite with one colour: with none finite there is nothing to make levels of."""
     z = np.ma.masked_array(np.ones(values.shape), np.isnan(values))
     ax.contourf(x, y, z, levels=[0.0, 2.0], colors=[INFINITE_COLOUR], corner_mask=True, zorder=1.0)
     return [Patch(facecolor=INFINITE_COLOUR, label=f"{title}: infinite")]
 
 
 def _status_hatches(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -> list[Any]:
-    """Hatched where there is no value, apart from where nothing reaches."""
+    """Hatch the cells that are reached and have no value, by their status. Returns the legend's entries."""
     handles: list[Any] = []
     with_hatches: dict[str, Any] = {"colors": "none", "zorder": 1.5}
     for kind, (text, hatch) in MARKS.items():
@@ -203,7 +203,7 @@ def _status_hatches(ax: Axes, x: Floats, y: Floats, status: NDArray[np.uint8]) -
 
 
 def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
-    """Short lines along each cell's extreme direction, seen on the plane."""
+    """Draw short lines along each cell's extreme direction, on the plane. Returns the legend's entries."""
     if name not in dataset:
         return []
     x, y = dataset["x_m"].values, dataset["y_m"].values
@@ -226,7 +226,7 @@ def _direction_strokes(ax: Axes, dataset: xr.Dataset, name: str) -> list[Any]:
 
 
 def _spaced_indices(x: Floats, apart: float) -> Ints:
-    """Indices of coordinates about so far apart."""
+    """Indices of evenly spaced coordinates x (n,) that lie about `apart` from one another."""
     step = max(1, round(apart / float(x[1] - x[0])))
     return np.arange(min(step // 2, len(x) - 1), len(x), step)
 
@@ -274,7 +274,7 @@ def _paths(shape: Any) -> list[Path]:
 
 
 def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism | None:
-    """Strokes of the links, the joints and the handle in the reference posture, on the plane; None for none."""
+    """The mechanism in its reference posture, projected on the plane; None where it has none, or is not drawn."""
     if device is None or device.mechanism is None:
         return None
     from zwidth.errors import LoadError, PostureError
@@ -293,6 +293,7 @@ def _mechanism(dataset: xr.Dataset, device: Device | None) -> ProjectedMechanism
 
 
 def _draw_mechanism(ax: Axes, mechanism: ProjectedMechanism) -> None:
+    """Draw the mechanism: links, joints as circles, and the handle as a diamond."""
     strokes, joints, handle = mechanism
     halo = [withStroke(linewidth=3.4, foreground="white")]
     for stroke in strokes:
@@ -316,7 +317,7 @@ def _arrow(ax: Axes, mechanism: ProjectedMechanism, dataset: xr.Dataset) -> None
 
 
 def _view(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[float, ...]:
-    """Outline of what a map's figure shows: the map and the mechanism."""
+    """What a map's figure shows, the map and the mechanism: x and y, from and to [m]."""
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
     if mechanism is not None:
         points = np.vstack([*mechanism[0], mechanism[1], mechanism[2][None]])
@@ -326,6 +327,7 @@ def _view(x: Floats, y: Floats, mechanism: ProjectedMechanism | None) -> tuple[f
 
 
 def _frame(ax: Axes, view: tuple[float, ...], first: str, second: str) -> None:
+    """Show this view, x and y from and to [m], at equal scales, with the names of both axes."""
     ax.set_xlim(view[0], view[1])
     ax.set_ylim(view[2], view[3])
     ax.set_aspect("equal")
@@ -345,6 +347,7 @@ def draw_safe_walls(ax: Axes, table: SafeWalls) -> None:
 
 
 def _cells(ax: Axes, table: SafeWalls) -> None:
+    """Draw the largest stiffness of each cell, of a table with a workspace; of cells in space the middle layer."""
     grid = table.grid
     K, status = table.rectangles[:, 0].reshape(grid.counts[::-1]), table.status.reshape(grid.counts[::-1])
     lines = grid.lines(0), grid.lines(1)

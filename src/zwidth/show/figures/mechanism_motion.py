@@ -58,8 +58,9 @@ GRID: Final = 801  # points across a drawing at which a surface's depth is compu
 FILLED: Final = 1.0  # widths of the view that a wall is drawn beyond it: equal scales show more of one axis
 NEAR: Final = 1e-6  # rad, by which a posture found again may differ; share of a place that is no motion
 LEAST: Final = 1e-3  # share of the mechanism's size that a close-up shows at least
-ROOM: Final = 0.12
+ROOM: Final = 0.12  # of the half size of a view, on each side of it
 TITLE: Final = 60  # letters of a line
+VISIBLE: Final = 2e-3  # share of the path's size by which readings are off that are drawn
 LINK_COLOURS: Final = tuple(colour for colour, _ in LINES if colour != VERMILION)  # which is the path's
 
 
@@ -95,6 +96,7 @@ def draw_mechanism_motion(axes: Sequence[Axes], motion: MechanismMotion) -> None
 
 
 def _draw_overall(ax: Axes, motion: MechanismMotion) -> None:
+    """Draw the mechanism at the start and, lighter, at the end, the path, and the surface; all of it in view."""
     mechanism, posture = motion.mechanism, motion.start
     last = _last(motion)
     poses = [posture] if last is None else [posture, last]
@@ -126,7 +128,7 @@ def draw_motion_close_up(ax: Axes, motion: MechanismMotion) -> None:
         _frame(ax, _view(place, size), flat)
         return
     true, readings = motion.position[:, flat], motion.counted_position[:, flat]
-    if np.max(np.abs(true - readings)) > 2e-3 * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
+    if np.max(np.abs(true - readings)) > VISIBLE * max(float(np.max(np.ptp(true, axis=0))), 1e-12):
         ax.plot(*readings.T, color=BLUE, linewidth=0.8, alpha=0.8, label="as read", zorder=3.0)
     ax.plot(*true.T, color=VERMILION, linewidth=1.3, label="path", zorder=4.0)
     ax.plot(*true[0][:, None], marker="o", markerfacecolor="white", label="start", **mark)
@@ -150,6 +152,7 @@ def _last(motion: MechanismMotion) -> Posture | None:
 
 
 def _strokes(mechanism: Mechanism, posture: Posture) -> list[Floats]:
+    """The lines (k, 3) [m] as which the links are drawn in a posture."""
     placed = link_points(mechanism, posture)
     return [link_stroke(mechanism, placed, i) for i in drawn_links(mechanism)]
 
@@ -157,6 +160,10 @@ def _strokes(mechanism: Mechanism, posture: Posture) -> list[Floats]:
 def _draw_posture(
     ax: Axes, mechanism: Mechanism, posture: Posture, strokes: list[Floats], flat: list[int], faint: bool
 ) -> None:
+    """Draw one posture: links as bars, joints as circles.
+
+    strokes  (k, 3) of each link [m];   flat  the two axes that are shown;   faint  of the end of the motion
+    """
     strength = 0.35 if faint else 1.0
     named = "end" if faint else "start"
     for n, stroke in enumerate(strokes):
@@ -171,20 +178,20 @@ def _draw_posture(
 
 
 def _cut(motion: MechanismMotion, flat: list[int]) -> tuple[int, float]:
-    """The axis that is looked along, and where on it the surface is cut: where the handle is deepest."""
+    """The axis 0, 1 or 2 that is looked along, and the place on it [m] where the handle is deepest."""
     across = ({0, 1, 2} - set(flat)).pop()
     return across, float(motion.position[int(np.argmax(motion.depth)), across])
 
 
 def _where(motion: MechanismMotion, cut: tuple[int, float]) -> str:
-    """Where the surface is cut, for a path that does not stay there."""
+    """Where the surface is cut, in words; "" for a path that stays there."""
     across, place = cut
     moves = np.ptp(motion.position[:, across]) > NEAR * max(float(np.max(np.abs(motion.position))), 1e-12)
     return f" at {AXES[across]} = {quantity(place, 'm')}" if moves else ""
 
 
 def _bounds(surface: Surface | None, size: float) -> Floats | None:
-    """Two opposite corners of a surface small enough to be shown whole."""
+    """Two opposite corners (2, 3) [m] of a surface smaller than `size` [m]; None for others, and for a plane."""
     match surface:
         case Sphere():
             center, half = surface.center, np.full(3, surface.radius)
@@ -198,7 +205,7 @@ def _bounds(surface: Surface | None, size: float) -> Floats | None:
 
 
 def _view(points: Floats, least: float) -> Floats:
-    """Corners (2, 2) of a rectangle round the points, with some room."""
+    """Corners (2, 2) of a rectangle round the points (k, 2), with some room, and not smaller than `least` [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * np.maximum(high - low, least)
     half = half + ROOM * half.max()
@@ -206,7 +213,7 @@ def _view(points: Floats, least: float) -> Floats:
 
 
 def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
-    """Show the view, at equal scales; the panel's shape decides which axis shows more than it."""
+    """Show the view (2, 2) [m] at equal scales; the shape of the panel decides which axis shows more than it."""
     ax.set_xlim(*view[:, 0], auto=True)
     ax.set_ylim(*view[:, 1], auto=True)
     ax.set_aspect("equal", adjustable="datalim")
@@ -218,7 +225,7 @@ def _frame(ax: Axes, view: Floats, flat: list[int]) -> None:
 
 
 def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMotion) -> None:
-    """Where the wall is, cut at one height: shaded, with its edge."""
+    """Shade the wall and draw its edge, cut at one place of the axis that is looked along."""
     if motion.surface is None:
         return
     cut = _cut(motion, flat)
@@ -238,6 +245,7 @@ def _draw_surface(ax: Axes, view: Floats, flat: list[int], motion: MechanismMoti
 
 
 def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) -> None:
+    """Draw depth [m] and force [N] over time; without a surface both panels are hidden."""
     label(depth.yaxis, "Depth", "m")
     label(force.yaxis, "Force", "N")
     if motion.surface is None:
@@ -250,7 +258,7 @@ def _draw_contact(depth: Axes, force: Axes, motion: MechanismMotion, draw: Any) 
 
 
 def _draw_energies(ax: Axes, motion: MechanismMotion, draw: Any) -> None:
-    """Of the motion and of bent drives; what the others have put in since, where it is worth a line."""
+    """Draw the energy of motion and of bent drives, and what the others have put in, where it is worth a line."""
     courses = {
         "kinetic": motion.kinetic,
         "drives, elastic": motion.elastic,
@@ -335,6 +343,7 @@ def _base_axes(ax: Axes, points: Floats, size: float) -> None:
 
 
 def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
+    """Draw one link, (k, 2) in the picture, in the n-th of the line styles."""
     colour = LINES[n % len(LINES)][0]
     style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 2.0}
     ax.plot(*stroke.T, color=colour, linewidth=5.0, alpha=0.35, **style)
@@ -342,7 +351,11 @@ def _link(ax: Axes, stroke: Floats, name: str, n: int) -> None:
 
 
 def _joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes: list[Floats]) -> None:
-    """Base, joints and loop closures; driven joints filled, with the names of their drives."""
+    """Draw base, joints and loop closures; driven joints filled, with the names of their drives.
+
+    view     (2, 3) from the base frame to the picture;   size  of the picture [m]
+    strokes  (k, 2) of each link in the picture, which names keep off
+    """
     base = scene.base @ view.T
     below = base - np.array([0.0, 0.035 * size])
     ax.plot(*below.T, marker="^", markersize=13.0, color="#B8B8B8", linestyle="none", zorder=1.5, label="base")
@@ -376,7 +389,8 @@ def _joints(ax: Axes, scene: MechanismScene, view: Floats, size: float, strokes:
 
 
 def _free_side(place: Floats, strokes: list[Floats], near: float) -> Floats:
-    """Unit vector (2,) into the middle of the widest gap between the lines at a point; right if there is none."""
+    """Unit vector (2,) into the middle of the widest gap between the lines that end at a place; right without
+    any."""
     angles = []
     for stroke in strokes:
         for a, b in pairwise(stroke):
@@ -406,8 +420,10 @@ def _labels_by_position(points: Floats, names: tuple[str, ...], near: float) -> 
 
 
 def _handle(ax: Axes, handle: Floats, direction: Floats, view: Floats, size: float) -> None:
-    """The handle, and an arrow along the rendered direction or the axis of moments (a ring where it points at the
-    viewer)."""
+    """Draw the handle, and an arrow along the rendered direction or the axis of moments.
+
+    A ring where it points at the viewer.   view  (2, 3) from the base frame to the picture;   size  of it [m]
+    """
     turns = len(direction) == 6 and not direction[:3].any()
     along = view @ (direction[3:] if turns else direction[:3])
     ax.plot(
@@ -463,12 +479,14 @@ def draw_chain(ax: Axes, plant: Plant, chain: MassChain) -> None:
 
 
 def _roles(plant: Plant, i: int) -> list[str]:
+    """What the i-th mass is: where the wall acts, where the encoder reads, where the hand holds."""
     handle = plant.handle if plant.handle is not None else np.zeros(plant.size)
     names = (("wall acts", plant.actuator), ("encoder", plant.sensor), ("handle", handle))
     return [name for name, vector in names if vector[i] != 0.0]
 
 
 def _spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, damping: float) -> None:
+    """Draw a spring [N/m] over a damper [N s/m], or either alone, between two places of the picture."""
     both = stiffness > 0.0 and damping > 0.0
     if stiffness > 0.0:
         y = 0.3 if both else 0.0
@@ -489,4 +507,5 @@ def _spring_and_damper(ax: Axes, start: float, end: float, stiffness: float, dam
 
 
 def _ground(ax: Axes, x: float) -> None:
+    """Draw the ground, an upright line."""
     ax.plot([x, x], [-HALF, HALF], color=BLACK, linewidth=2.0)

@@ -58,6 +58,10 @@ def draw_optimisation(ax: Axes, found: Optimisation) -> None:
 
 
 def _draw_pair(ax: Axes, found: Optimisation, i: int, j: int, *, legend: bool) -> None:
+    """Draw the front over the i-th and j-th objective: designs tried, edge of what is reached, knee, baseline.
+
+    legend  whether it has one
+    """
     problem = found.problem
     columns = [problem.objectives[n].column for n in (i, j)]
     front, knee = found.values[:, columns], found.knee
@@ -95,13 +99,14 @@ def _draw_reach(ax: Axes, tried: Floats, signs: Floats) -> None:
 
 
 def _draw_bars(ax: Axes, front: Floats, low: Floats, high: Floats) -> None:
-    """What tolerances make of each design: 5 to 95 % of the produced devices."""
+    """Draw what tolerances make of each design of the front (k, 2): 5 to 95 % of the produced devices."""
     style: dict[str, Any] = {"color": GREY, "linewidth": 0.9, "zorder": 2.5}
     ax.hlines(front[:, 1], low[:, 0], high[:, 0], label="5 to 95 % as produced", **style)
     ax.vlines(front[:, 0], low[:, 1], high[:, 1], **style)
 
 
 def _draw_approach(ax: Axes, found: Optimisation) -> None:
+    """Draw the best value found of the one objective over the number of designs tried."""
     problem = found.problem
     (objective,) = problem.objectives
     costs = found.judgement.costs(problem)[:, 0]

@@ -1,4 +1,7 @@
-"""The drawing function of each kind of result, for `result.plot()` and notebooks."""
+"""The drawing function of each kind of result, for `result.plot()` and notebooks.
+
+A function `_draw_...` draws one result of the kind in its name into axes, and imports what it needs when called.
+"""
 
 from __future__ import annotations
 
@@ -88,19 +91,19 @@ def draw_any_chart(ax: Axes, chart: Any, window: Window | None = None) -> None:
     draw_chart(ax, chart, window=window)
 
 
-def _robust(ax: Axes, chart: Any) -> None:
+def _draw_common_chart(ax: Axes, chart: Any) -> None:
     from zwidth.show.figures.stability import draw_robust
 
     draw_robust(ax, chart)
 
 
-def _robust_study(ax: Axes, study: Any) -> None:
+def _draw_robust_study(ax: Axes, study: Any) -> None:
     from zwidth.show.figures.stability import draw_robust
 
     draw_robust(ax, study.chart, study.members)
 
 
-def _polar(ax: Axes, by_direction: Any) -> None:
+def _draw_by_direction(ax: Axes, by_direction: Any) -> None:
     from zwidth.show.figures.polar import draw_polar
 
     draw_polar(
@@ -108,14 +111,14 @@ def _polar(ax: Axes, by_direction: Any) -> None:
     )
 
 
-def _load_path(ax: Axes, path: Any) -> None:
+def _draw_load_path(ax: Axes, path: Any) -> None:
     """The outlines; `zwidth load --output` draws stiffness and growth beside them."""
     from zwidth.show.figures.load_path import draw_outlines
 
     draw_outlines(ax, path)
 
 
-def _bending(ax: Axes, result: Any) -> None:
+def _draw_bending(ax: Axes, result: Any) -> None:
     """The charts with bending and with rigid links over each other."""
     from zwidth.show.figures.stability import draw_models
     from zwidth.show.figures.style import draw_empty
@@ -128,31 +131,31 @@ def _bending(ax: Axes, result: Any) -> None:
         draw_empty(ax, result.bent.reason)
 
 
-def _bounds(ax: Axes, result: Any) -> None:
+def _draw_bounds_comparison(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.bounds import draw_bounds
 
     draw_bounds(ax, result.bounds, result.chart)
 
 
-def _guarantees(ax: Axes, result: Any) -> None:
+def _draw_guarantees(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.guarantees import draw_guarantees
 
     draw_guarantees(ax, result)
 
 
-def _goal(ax: Axes, result: Any) -> None:
+def _draw_goal(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.sensitivity import draw_goal
 
     draw_goal(ax, result)
 
 
-def _sensitivities(ax: Axes, result: Any) -> None:
+def _draw_sensitivities(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.sensitivity import draw_sensitivities
 
     draw_sensitivities(ax, result)
 
 
-def _verdicts(ax: Axes, verdicts: Any) -> None:
+def _draw_wall_verdicts(ax: Axes, verdicts: Any) -> None:
     """The walls as marks: discs where stable, crosses where not, grey squares where undecided."""
     K, B, names = verdicts.stiffness.ravel(), verdicts.damping.ravel(), np.array(verdicts.names)
     for name, style in (
@@ -168,7 +171,7 @@ def _verdicts(ax: Axes, verdicts: Any) -> None:
     ax.legend(frameon=False, fontsize=8.0)
 
 
-def _measure_values(ax: Axes, result: Any) -> None:
+def _draw_measure_values(ax: Axes, result: Any) -> None:
     """A measure's values: marks in order for one or a row, colours for a plane of points."""
     values = np.asarray(result.values, dtype=float)
     if values.ndim == 2:
@@ -182,7 +185,7 @@ def _measure_values(ax: Axes, result: Any) -> None:
     ax.set_ylabel("value")
 
 
-def _description(ax: Axes, description: Any) -> None:
+def _draw_description(ax: Axes, description: Any) -> None:
     """Natural frequencies as lines along a frequency axis, with their damping ratios."""
     frequencies = np.asarray(description.natural_frequencies, dtype=float)
     ratios = description.damping_ratios or [None] * len(frequencies)
@@ -195,14 +198,14 @@ def _description(ax: Axes, description: Any) -> None:
     label(ax.xaxis, "Natural frequency", "Hz")
 
 
-def _felt(ax: Axes, result: Any) -> None:
+def _draw_felt_wall(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.felt import draw_impedance
 
     felt = np.full(len(result.frequency), np.nan + 0j) if result.felt_impedance is None else result.felt_impedance
     draw_impedance(ax, result.frequency, felt, result.commanded_impedance, result.free_motion_impedance)
 
 
-def _experiment(ax: Axes, experiment: Any) -> None:
+def _draw_experiment(ax: Axes, experiment: Any) -> None:
     from zwidth.show.figures.experiment import draw_experiment, measured_bars, own_bars
 
     users = experiment.user_points
@@ -210,61 +213,61 @@ def _experiment(ax: Axes, experiment: Any) -> None:
     draw_experiment(ax, measured_bars(experiment.points), experiment.chart, own)
 
 
-def _limit_cycles(ax: Axes, result: Any) -> None:
+def _draw_limit_cycles(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.limit_cycles import draw_limit_cycles
 
     draw_limit_cycles(ax, result)
 
 
-def _couplings(ax: Axes, result: Any) -> None:
+def _draw_couplings(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.guarantees import draw_couplings
 
     draw_couplings(ax, result)
 
 
-def _contact(ax: Axes, result: Any) -> None:
-    _response(ax, result.response)
+def _draw_contact_simulation(ax: Axes, result: Any) -> None:
+    _draw_time_response(ax, result.response)
 
 
-def _response(ax: Axes, response: Any) -> None:
+def _draw_time_response(ax: Axes, response: Any) -> None:
     """Position over time; `zwidth simulate --output` draws all panels."""
     from zwidth.show.figures.contact_response import draw_position
 
     draw_position(ax, response)
 
 
-def _felt_chart(ax: Axes, chart: Any) -> None:
+def _draw_felt_chart(ax: Axes, chart: Any) -> None:
     from zwidth.show.figures.felt import draw_felt_chart
 
     draw_felt_chart(ax, chart)
 
 
-def _region(ax: Axes, region: Any) -> None:
+def _draw_region(ax: Axes, region: Any) -> None:
     from zwidth.show.figures.guarantees import draw_region
 
     draw_region(ax, region)
 
 
-def _eigenvalue_paths(ax: Axes, result: Any) -> None:
+def _draw_eigenvalue_paths(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.stability import draw_eigenvalue_paths
 
     draw_eigenvalue_paths(ax, result)
 
 
-def _validity(ax: Axes, result: Any) -> None:
+def _draw_validity(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.sensitivity import draw_validity
 
     draw_validity(ax, result)
 
 
-def _sweep(ax: Axes, result: Any) -> None:
+def _draw_sweep(ax: Axes, result: Any) -> None:
     """The first column; `zwidth sweep --output` draws all columns."""
     from zwidth.show.figures.study import draw_first_column
 
     draw_first_column(ax, result.dataset())
 
 
-def _common_area(ax: Axes, result: Any) -> None:
+def _draw_common_area(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.map import draw_areas
 
     handles = draw_areas(ax, result)
@@ -275,33 +278,33 @@ def _common_area(ax: Axes, result: Any) -> None:
     ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.02), fontsize=8.0, frameon=False)
 
 
-def _mechanism_motion(ax: Axes, motion: Any) -> None:
+def _draw_mechanism_motion(ax: Axes, motion: Any) -> None:
     """The handle's path at the surface; `zwidth move --output` draws all panels."""
     from zwidth.show.figures.mechanism_motion import draw_motion_close_up
 
     draw_motion_close_up(ax, motion)
 
 
-def _identification(ax: Axes, result: Any) -> None:
+def _draw_identification(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.identify import draw_identification
 
     draw_identification(ax, result)
 
 
-def _tolerance(ax: Axes, result: Any) -> None:
+def _draw_tolerance_study(ax: Axes, result: Any) -> None:
     """The bands; `zwidth tolerance --output` draws what each tolerance is worth below them."""
     from zwidth.show.figures.tolerance import draw_bands
 
     draw_bands(ax, result)
 
 
-def _optimisation(ax: Axes, result: Any) -> None:
+def _draw_optimisation(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.optimise import draw_optimisation
 
     draw_optimisation(ax, result)
 
 
-def _safe_walls(ax: Axes, result: Any) -> None:
+def _draw_safe_walls(ax: Axes, result: Any) -> None:
     from zwidth.show.figures.map import draw_safe_walls
 
     draw_safe_walls(ax, result)
@@ -309,33 +312,33 @@ def _safe_walls(ax: Axes, result: Any) -> None:
 
 DRAWINGS: Final[dict[str, Draw]] = {
     "Chart": draw_any_chart,
-    "CommonChart": _robust,
-    "RobustStudy": _robust_study,
-    "ByDirection": _polar,
-    "LoadPath": _load_path,
-    "Bending": _bending,
-    "BoundsComparison": _bounds,
-    "Guarantees": _guarantees,
-    "Sensitivities": _sensitivities,
-    "Goal": _goal,
-    "WallVerdicts": _verdicts,
-    "MeasureValues": _measure_values,
-    "Description": _description,
-    "FeltWall": _felt,
-    "Experiment": _experiment,
-    "LimitCyclePrediction": _limit_cycles,
-    "Couplings": _couplings,
-    "ContactSimulation": _contact,
-    "TimeResponse": _response,
-    "MechanismMotion": _mechanism_motion,
-    "FeltChart": _felt_chart,
-    "Region": _region,
-    "EigenvaluePaths": _eigenvalue_paths,
-    "Validity": _validity,
-    "Sweep": _sweep,
-    "CommonArea": _common_area,
-    "Identification": _identification,
-    "ToleranceStudy": _tolerance,
-    "Optimisation": _optimisation,
-    "SafeWalls": _safe_walls,
+    "CommonChart": _draw_common_chart,
+    "RobustStudy": _draw_robust_study,
+    "ByDirection": _draw_by_direction,
+    "LoadPath": _draw_load_path,
+    "Bending": _draw_bending,
+    "BoundsComparison": _draw_bounds_comparison,
+    "Guarantees": _draw_guarantees,
+    "Sensitivities": _draw_sensitivities,
+    "Goal": _draw_goal,
+    "WallVerdicts": _draw_wall_verdicts,
+    "MeasureValues": _draw_measure_values,
+    "Description": _draw_description,
+    "FeltWall": _draw_felt_wall,
+    "Experiment": _draw_experiment,
+    "LimitCyclePrediction": _draw_limit_cycles,
+    "Couplings": _draw_couplings,
+    "ContactSimulation": _draw_contact_simulation,
+    "TimeResponse": _draw_time_response,
+    "MechanismMotion": _draw_mechanism_motion,
+    "FeltChart": _draw_felt_chart,
+    "Region": _draw_region,
+    "EigenvaluePaths": _draw_eigenvalue_paths,
+    "Validity": _draw_validity,
+    "Sweep": _draw_sweep,
+    "CommonArea": _draw_common_area,
+    "Identification": _draw_identification,
+    "ToleranceStudy": _draw_tolerance_study,
+    "Optimisation": _draw_optimisation,
+    "SafeWalls": _draw_safe_walls,
 }

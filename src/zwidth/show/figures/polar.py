@@ -64,7 +64,8 @@ def draw_polar(
 
 
 def _draw_outline(ax: Axes, stiffness: Floats, angle: Floats) -> None:
-    """A closed outline, filled where every direction has an answer."""
+    """Draw a closed outline of stiffness (k,) [N/m] over angle (k,) [rad]; filled if every direction has an
+    answer."""
     K, along = np.append(stiffness, stiffness[:1]), np.append(angle, angle[:1])
     x, y = K * np.cos(along), K * np.sin(along)
     if np.isfinite(stiffness).all():
@@ -73,7 +74,7 @@ def _draw_outline(ax: Axes, stiffness: Floats, angle: Floats) -> None:
 
 
 def _draw_bars(ax: Axes, stiffness: Floats, angle: Floats) -> None:
-    """A bar from the middle along each direction in which the handle moves, where it does not move along all."""
+    """Draw a bar from the middle along each direction in which the handle moves."""
     ends = stiffness[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     bars = LineCollection(
         [np.vstack([np.zeros(2), end]) for end in ends],
@@ -85,7 +86,7 @@ def _draw_bars(ax: Axes, stiffness: Floats, angle: Floats) -> None:
 
 
 def _extremes(stiffness: Floats, angles_deg: Floats) -> list[tuple[str, int, str]]:
-    """The stiffest and the least stiff direction in words, with a marker each; one where both are alike."""
+    """Text, index and marker of the stiffest and the least stiff direction; one where both are alike."""
     most, least = int(np.nanargmax(stiffness)), int(np.nanargmin(stiffness))
     if stiffness[most] - stiffness[least] > ALIKE * stiffness[most]:
         found = [("stiffest", most, "o"), ("least stiff", least, "s")]
@@ -100,7 +101,7 @@ def _extremes(stiffness: Floats, angles_deg: Floats) -> list[tuple[str, int, str
 
 
 def _frame(ax: Axes, reach: float, axes: tuple[str, str]) -> None:
-    """Equal axes with circles of equal stiffness."""
+    """Frame equal axes up to `reach` [N/m], with circles of equal stiffness."""
     ax.set_aspect("equal")
     ax.set_xlim(-1.05 * reach, 1.05 * reach)
     ax.set_ylim(-1.05 * reach, 1.05 * reach)

@@ -119,13 +119,13 @@ def _widest(labels: list[str]) -> float:
 
 
 def _fitted(path: str, width: float) -> str:
-    """The path on one line, or with its last name on a second where it is wider than this [points]."""
+    """The path on one line, or with its last name on a second where it is wider than `width` [points]."""
     table, dot, name = path.rpartition(".")
     return path if text_width(path, TICK_SIZE) <= width or not dot else f"{table}.\n{name}"
 
 
 def _short(path: str) -> str:
-    """A path without the table that all its neighbours share."""
+    """A path without "mechanism.", with which nearly all begin."""
     return path.removeprefix("mechanism.")
 
 
@@ -160,6 +160,9 @@ def draw_validity(ax: Axes, validity: Validity) -> None:
 
 
 def _with_gaps(x: np.ndarray, y: np.ndarray, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both with a gap wherever the piece of edge changes."""
+    """Both arrays (k,) with nan wherever the piece of edge changes.
+
+    arc  (k,) number of the piece
+    """
     at = np.flatnonzero(np.diff(arc)) + 1
     return np.insert(x, at, np.nan), np.insert(y, at, np.nan)

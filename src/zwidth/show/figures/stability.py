@@ -136,7 +136,10 @@ def mark_stiffest(ax: Axes, chart: StabilityChart | MeasuredChart, text: str) ->
 
 
 def frame(ax: Axes, window: Window, *, empty: bool) -> None:
-    """Limits, labels, and the axes K = 0, B = 0 where they are in view."""
+    """Set the limits and labels of a chart, and draw the axes K = 0 and B = 0 where they are in view.
+
+    empty  whether no wall is stable, which the middle then says
+    """
     K0, K1, B0, B1 = window
     ax.set_xlim(K0, K1)
     ax.set_ylim(B0, B1)
@@ -188,7 +191,7 @@ def _star(ax: Axes, wall: FastestDecay | None, name: str, period: float, colour:
 
 
 def draw_level(ax: Axes, chart: StabilityChart, text: str, rank: int, count: int) -> None:
-    """One contour; the smaller the radius the lighter."""
+    """Draw one contour of decay; black for rank 0, lighter with the rank of `count` contours."""
     colour = colormaps["viridis"](0.75 * rank / max(count - 1, 1)) if rank else BLACK
     for k, ring in enumerate(edges_of(chart.regions)):
         dashes = LINES[rank % len(LINES)][1]
@@ -213,6 +216,10 @@ def tenfold_time(radius: float, period: float) -> float:
 
 
 def _meaning(radius: float, period: float) -> str:
+    """A spectral radius, with the time in which its motion shrinks to a tenth, in words.
+
+    period  T [s]
+    """
     return f"{radius:.4g} ({quantity(tenfold_time(radius, period), 's')})"
 
 
@@ -260,6 +267,7 @@ def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
     if not ends:
         return []
     K, B, f = np.array(ends).T
+    # least distance in K and in B of two walls that are not one
     near = SAME_WALL * np.max(
         [np.ptp(np.vstack([arc.stiffness, arc.damping]), axis=1) for arc in chart.boundary], 0
     )
@@ -275,6 +283,7 @@ def corners(chart: StabilityChart) -> list[tuple[float, float, float, float]]:
 
 
 def _ends(arc: BoundaryArc) -> list[tuple[float, float, float]]:
+    """Both ends of an arc, (K [N/m], B [N s/m], f [Hz])."""
     return [(float(arc.stiffness[k]), float(arc.damping[k]), float(arc.frequency[k])) for k in (0, -1)]
 
 
@@ -333,13 +342,13 @@ def _draw_members(ax: Axes, chart: CommonChart) -> None:
 
 
 def _area(ring: Floats) -> float:
-    """Area within a closed walk."""
+    """Area within a closed ring (k, 2)."""
     x, y = ring.T
     return 0.5 * abs(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
 
 
 def _spread(items: Sequence[int], most: int) -> list[int]:
-    """At most so many of the items, evenly spread, the first and the last among them."""
+    """At most `most` of the items, evenly spread, the first and the last among them."""
     return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int))]
 
 
@@ -352,7 +361,7 @@ def _claim(chart: CommonChart) -> str:
 
 
 def _draw_edge(ax: Axes, chart: CommonChart, members: Sequence[Mapping[str, Any]], view: Window) -> None:
-    """The edge's arcs; those who bind most of what is seen are named."""
+    """Draw the edge's arcs; the members who bind most of what is seen have a line and a name of their own."""
     K0, K1, B0, B1 = view
     lengths: dict[int, float] = {}
     for arc in chart.boundary:
@@ -398,6 +407,7 @@ def _words(members: Sequence[Mapping[str, Any]], index: int) -> str:
 
 
 def _box(chart: CommonChart) -> Window:
+    """What is shown: what single members allow with K >= 0 and B >= 0, at most MOST_REACH times the robust set."""
     walls = [outline for outlines in chart.outlines.values() for outline in outlines]
     if isnan(chart.stiffness_max) or not walls:
         return (0.0, 1.0, 0.0, 1.0)
@@ -474,7 +484,7 @@ def _draw_measured_points(ax: Axes, chart: MeasuredChart) -> None:
 
 
 def _unusable(ax: Axes, chart: MeasuredChart) -> None:
-    """The edge within unusable stretches through which it runs, dashed; each stretch a line of the legend."""
+    """Draw the edge dashed within the unusable stretches that it runs through, each a line of the legend."""
     edge = chart.edge
     f = edge.angles / (2.0 * np.pi * chart.loop.period)
     spans = sorted({(stretch.low, stretch.high) for stretch in chart.unusable if stretch.on_edge})

@@ -1,7 +1,4 @@
-"""Many designs of one device: curves, heat maps, parallel coordinates.
-
-Parallel coordinates: each design a line through its numbers (Inselberg 1985, read second-hand).
-"""
+"""Many designs of one device: curves, heat maps, parallel coordinates (Inselberg 1985, read second-hand)."""
 
 from __future__ import annotations
 
@@ -138,6 +135,7 @@ def _split_axes(dataset: xr.Dataset, names: Sequence[str]) -> tuple[list[str], l
 
 
 def _curves(dataset: xr.Dataset, names: Sequence[str], along: str) -> Figure:
+    """A panel for each column over the axis `along`, one legend of lines and missing values above all."""
     others = [str(dim) for dim in dataset[names[0]].dims if dim != along]
     lines = 1 if not others else int(np.prod([dataset.sizes[key] for key in others]))
     drawing, panels = _panels(5.8, 0.9 + 0.17 * lines + 2.1 * len(names), len(names), 1, len(names))
@@ -240,6 +238,7 @@ def _draw_missing(ax: Axes, x: NDArray[Any], missing: Sequence[tuple[str, NDArra
 
 
 def _name_column(ax: Axes, column: Any) -> None:
+    """Name the upright axis by a column, in its unit if it has one."""
     title = "\n".join(wrap(str(column.attrs["title"]), LETTERS - 6, break_long_words=False))
     unit = spoken_unit(str(column.attrs.get("unit", "")))
     if unit:
@@ -249,7 +248,7 @@ def _name_column(ax: Axes, column: Any) -> None:
 
 
 def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
-    """An axis by its key, in SI units, or by its texts."""
+    """Name the x or y axis by the key of a coordinate, in SI units, or by its texts."""
     axis = ax.xaxis if which == "x" else ax.yaxis
     key = str(coordinate.attrs.get("long_name", coordinate.name))
     if coordinate.dtype.kind not in "if":
@@ -271,11 +270,13 @@ def _name_axis(ax: Axes, which: str, coordinate: Any) -> None:
 
 
 def _combinations(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Every combination of the values of these axes, key -> value."""
     for values in product(*(dataset[key].values for key in keys)):
         yield dict(zip(keys, values, strict=True))
 
 
 def _line_handles(dataset: xr.Dataset, keys: Sequence[str], *, lines: bool) -> Iterator[Line2D]:
+    """The legend's entries of combinations of these axes, which are drawn as lines, or else as points."""
     for n, chosen in enumerate(_combinations(dataset, keys) if keys else ()):
         yield Line2D([], [], label=_combination_text(chosen), **(_line_style(n) if lines else _marker_style(n)))
 
@@ -293,17 +294,20 @@ def _marker_style(n: int) -> dict[str, Any]:
 
 
 def _combination_text(chosen: dict[str, Any]) -> str:
+    """A combination of values in words, for a legend or a title."""
     return ", ".join(
         f"{key} {value}" if isinstance(value, str) else f"{key} {value:.4g}" for key, value in chosen.items()
     )
 
 
 def _symbol(status: int) -> Line2D:
+    """The legend's entry of the symbol of designs with this status."""
     style: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markersize": 4.5, "color": BLACK}
     return Line2D([], [], marker=SYMBOLS[status], label=STATUS[status], **style)
 
 
 def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
+    """The legend of these entries above the axes, in three columns where their texts are short."""
     handles = [*lines, *marks]
     if not handles:
         return
@@ -326,6 +330,7 @@ def _legend_above(ax: Axes, lines: list[Any], marks: list[Any]) -> None:
 
 
 def _heat_maps(dataset: xr.Dataset, names: Sequence[str], axes: Sequence[str], texts: Sequence[str]) -> Figure:
+    """A heat map for each column and each combination of the texts; the maps of one column share their colours."""
     choices = list(_combinations(dataset, texts))
     wide = len(choices) if len(choices) > 1 else min(2, len(names))
     high = len(names) if len(choices) > 1 else -(-len(names) // wide)
@@ -389,7 +394,8 @@ PAPER: Final = ListedColormap(["#F2F2F2"])
 
 
 def _edges(coordinate: Any) -> Floats:
-    """Ends of the cells about an axis's values, halfway between them, by ratio where the axis is divided so."""
+    """Ends (k + 1,) of the cells about an axis's values (k,), halfway between them, by ratio on a logarithmic
+    one."""
     values = np.asarray(coordinate.values, dtype=float)
     logarithmic = coordinate.attrs.get("scale") == "log" and bool((values > 0.0).all())
     at = np.log(values) if logarithmic else values
@@ -402,6 +408,7 @@ def _edges(coordinate: Any) -> Floats:
 
 
 def _parallel(dataset: xr.Dataset, names: Sequence[str]) -> Figure:
+    """A figure of parallel coordinates: an upright for each axis of the study, and for each column."""
     dims = [str(dim) for dim in dataset[names[0]].dims]
     keys = dims if dims != ["design"] else _keys_of(dataset)
     drawing, ax = figure(max(5.6, 1.25 * (len(keys) + len(names)) + 0.8), 4.3)
@@ -410,13 +417,14 @@ def _parallel(dataset: xr.Dataset, names: Sequence[str]) -> Figure:
 
 
 def _keys_of(dataset: xr.Dataset) -> list[str]:
-    """The axes of a Latin hypercube: its coordinates but the number, and what goes with them."""
+    """The axes of a study whose designs are listed, as of a Latin hypercube: coordinates with the role of one."""
     return [str(key) for key in dataset.coords if key != "design" and dataset[key].attrs.get("role") == "axis"]
 
 
 DARKEST: Final = 0.9  # of the colours' scale: its light end looks like paper
 AXIS_LETTERS: Final = 17
 INCOMPLETE_COLOUR: Final = "#A8A8A8"
+BELOW: Final = -0.035  # height of crosses and texts below the uprights, which go from 0 to 1
 THIN_LINES_FROM: Final = 150  # designs from which on lines are drawn thinner
 
 
@@ -455,13 +463,17 @@ def draw_parallel(ax: Axes, dataset: xr.Dataset, keys: Sequence[str], names: Seq
     text = (
         f"colour: {str(dataset[names[0]].attrs['title'])[:1].lower()}{str(dataset[names[0]].attrs['title'])[1:]}"
     )
-    ax.text(len(uprights) - 1, -0.035, text, ha="right", va="center", fontsize=7.0)
+    ax.text(len(uprights) - 1, BELOW, text, ha="right", va="center", fontsize=7.0)
     ax.set_xlim(-0.25, len(uprights) - 0.55)
     ax.set_ylim(-0.06, 1.03)
     ax.axis("off")
 
 
 def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
+    """Draw a line for each design; one without all numbers is grey, with a cross below the first missing one.
+
+    heights  (designs, uprights) 0 to 1, nan where there is none;   shade  (designs,) the colour, 0 to 1
+    """
     thin = 0.5 if len(heights) > THIN_LINES_FROM else 0.9
     complete = np.array([bool(np.isfinite(line).all()) for line in heights])
     order = np.argsort(np.where(np.isfinite(shade), shade, -1.0))
@@ -481,10 +493,10 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
         ax.add_collection(drawn)
         ends = [int(np.flatnonzero(~np.isfinite(heights[n]))[0]) for n in incomplete]
         for place in sorted(set(ends)):
-            ax.plot(place, -0.035, "x", color=VERMILION, markersize=5.0, clip_on=False, zorder=4.0)
+            ax.plot(place, BELOW, "x", color=VERMILION, markersize=5.0, clip_on=False, zorder=4.0)
             ax.annotate(
                 f"{ends.count(place)} without",
-                (place, -0.035),
+                (place, BELOW),
                 xytext=(5, 0),
                 textcoords="offset points",
                 va="center",
@@ -492,7 +504,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
                 color=VERMILION,
             )
         stubs = [
-            np.array([[end - 1, heights[n, end - 1]], [end, -0.035]])
+            np.array([[end - 1, heights[n, end - 1]], [end, BELOW]])
             for n, end in zip(incomplete, ends, strict=True)
             if end
         ]
@@ -502,7 +514,7 @@ def _draw_lines(ax: Axes, heights: Floats, shade: Floats) -> None:
 
 
 def _pieces(across: Any, heights: Floats) -> list[Floats]:
-    """The parts of a line between missing numbers."""
+    """The parts (k, 2) of a line between missing numbers, those of one point left out."""
     there = np.isfinite(heights)
     cuts = np.flatnonzero(np.diff(there.astype(int))) + 1
     pieces = np.split(np.column_stack([across, heights]), cuts)
@@ -510,6 +522,7 @@ def _pieces(across: Any, heights: Floats) -> list[Floats]:
 
 
 def _draw_uprights(ax: Axes, uprights: Sequence[ParallelAxis], keys: int) -> None:
+    """Draw the uprights with ticks and names: of the axes, the first `keys` of them, thin; of columns bold."""
     for n, one in enumerate(uprights):
         measured = n >= keys
         ax.plot([n, n], [0.0, 1.0], color=BLACK, linewidth=1.4 if measured else 0.8, zorder=3.0)
@@ -531,6 +544,8 @@ def _draw_uprights(ax: Axes, uprights: Sequence[ParallelAxis], keys: int) -> Non
 
 
 def _parallel_axis(column: Any, values: NDArray[Any]) -> ParallelAxis:
+    """The upright of an axis or a column with the values (designs,): texts evenly spread, numbers in
+    proportion."""
     name = str(column.attrs.get("title") or column.attrs.get("long_name") or column.name)
     unit = spoken_unit(str(column.attrs.get("unit", column.attrs.get("units", ""))))
     if values.dtype.kind not in "ifu":

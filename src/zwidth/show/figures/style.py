@@ -90,7 +90,7 @@ _STYLE: Final[dict[str, Any]] = {
 
 
 def context() -> AbstractContextManager[None]:
-    """The house's settings, for figures made inside; `figure` and `save` use it already."""
+    """Context in which figures are made with settings of this file alone; `figure` and `save` use it already."""
     settings: Any = {**mpl.rcParamsDefault, **_STYLE}
     return mpl.rc_context(settings)
 
@@ -131,9 +131,10 @@ def save(made: Figure, path: str | os.PathLike[str]) -> Path:
 
 
 def _write(made: Figure, target: Path | StringIO, kind: str, metadata: dict[str, Any]) -> None:
-    """Draw a figure into a file of this kind, as `Figure.savefig` does, which draws twice: once for the layout.
+    """Draw a figure into a file of this kind, in one pass.
 
-    Drawing lays out first, for the very canvas that it draws on, so that once gives the same file.
+    `Figure.savefig` draws twice, once for the layout. Drawing lays out first, for the very canvas that it draws
+    on, so that once gives the same file.
     """
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -182,6 +183,7 @@ class Prefixed(Formatter):
         self.exponent, self.decimals = 0, 0
 
     def set_locs(self, locs: Sequence[float]) -> None:
+        """Choose prefix and decimals for the ticks in view, and name the axis; called when the figure is drawn."""
         low, high = sorted(self.of.get_view_interval())
         largest = max(abs(low), abs(high))
         self.exponent = 0 if self.plain else exponent_of(largest)
@@ -282,6 +284,10 @@ def _in_lines(text: str, room: float) -> str:
 
 
 def _legend(ax: Axes, **place: Any) -> None:
+    """Draw the legend of all that has a label, at this place; its texts are broken into lines that fit.
+
+    place  arguments of `Axes.legend`
+    """
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return
@@ -337,7 +343,7 @@ def levels_of(values: Floats) -> Floats:
 
 
 def _ratios(low: float, high: float) -> Floats:
-    """1, 2, 5 or finer per decade, or a power of ten every few decades, just as many as are wanted."""
+    """Round levels from low to high: 1, 2, 5 or finer per decade, or a power of ten every few decades."""
     first, last = floor(log10(low) + 1e-12), ceil(log10(high) - 1e-12)
     every = max(1, ceil((last - first) / LEVELS))
     best = 10.0 ** np.arange(first, last + every, every, dtype=np.float64)
@@ -385,7 +391,7 @@ def colour_bar(
 
 
 def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
-    """Ticks at the levels, under a prefix or a power of ten that they have in common."""
+    """Number the levels on a bar of colours, under a prefix or power of ten that they share, and name it."""
     exponent = _common_exponent(levels, unit)
     texts = _texts(levels, exponent)
     if any("e" in text for text in texts):
@@ -398,7 +404,7 @@ def _bar_label(bar: Any, title: str, unit: str, levels: Floats) -> None:
 
 
 def _common_exponent(levels: Floats, unit: str) -> int:
-    """The power of ten under which all levels are short; that of the largest where there is no such."""
+    """The power of ten under which all levels read without an exponent; 0 where there is none."""
     sizes = np.abs(levels[levels != 0.0])
     largest, least = (float(sizes.max()), float(sizes.min())) if len(sizes) else (0.0, 0.0)
     first = exponent_of(largest)
@@ -409,4 +415,5 @@ def _common_exponent(levels: Floats, unit: str) -> int:
 
 
 def _texts(levels: Floats, exponent: int) -> list[str]:
+    """The levels in four digits, in units of a power of ten."""
     return [f"{v / 10.0**exponent:.4g}" for v in levels.tolist()]

@@ -130,6 +130,7 @@ def _bars(result: ToleranceStudy) -> list[tuple[str, Interval, bool]]:
 
 
 def _mark(ax: Axes, stiffness: float, damping: float, marker: str, face: str, text: str) -> None:
+    """Draw a mark at a wall, filled with the colour `face`."""
     style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": VERMILION, "markeredgewidth": 1.6}
     ax.plot(
         [stiffness], [damping], marker=marker, markersize=6.0, linestyle="none", zorder=5.0, label=text, **style
@@ -137,6 +138,7 @@ def _mark(ax: Axes, stiffness: float, damping: float, marker: str, face: str, te
 
 
 def _stiffest_text(band: Band) -> str:
+    """The stiffest wall of a band in words."""
     assert band.stiffest is not None
     place = f"{quantity(band.stiffest.stiffness, 'N/m')} at {quantity(band.stiffest.damping, 'N s/m')}"
     return f"stiffest wall of {_percent(band.probability)}: {place}"
@@ -148,11 +150,12 @@ def _percent(share: float) -> str:
 
 
 def _share(share: Interval) -> str:
+    """A share in per cent, with its interval."""
     return f"{100.0 * share.value:.3g} % ({100.0 * share.low:.3g} to {100.0 * share.high:.3g} %)"
 
 
 def _view(result: ToleranceStudy) -> tuple[float, float, float, float]:
-    """The part with K >= 0 and B >= 0 that the widest band and the edge in the middle reach."""
+    """What is shown, K and B from and to: what bands, edge in the middle and wanted wall reach of K, B >= 0."""
     reach = [walls for band in result.bands if len(walls := np.asarray(band_path(band).vertices))]
     if result.nominal is not None and result.nominal.regions:
         reach.append(np.vstack(result.nominal.regions))

@@ -169,6 +169,7 @@ def numbers(facts: Facts) -> list[Row]:
 
 
 def _row(label: str, of: BendingNumbers) -> Row:
+    """Label, largest stiffness, static stiffness felt at most, and first mode."""
     static = quantity(of.static_stiffness, "N/m")
     return (
         label,

@@ -37,7 +37,7 @@ class Facts:
     variants             the device as described first, then what_if's changes and models
     natural_frequencies  undamped, of the ungripped device [Hz]; rigid modes 0
     bounds               the published conditions on the loop
-    runs_away            a motion that no wall affects is unstable
+    runs_away            whether a motion that no wall affects is unstable
     """
 
     device: Device

@@ -63,7 +63,7 @@ def svg_figures(facts: Facts) -> dict[str, str]:
 
 
 def _load_path(facts: Facts) -> str:
-    """Only of a device under load."""
+    """Drawings of the charts under pushes; "" for a device without load."""
     path = facts.load_path
     if path is None:
         return ""
@@ -72,13 +72,14 @@ def _load_path(facts: Facts) -> str:
 
 
 def _felt(facts: Facts, felt: FeltChart | None) -> str:
-    """Only where what is felt differs from what is commanded."""
+    """Drawings of the chart at felt stiffness; "" where what is felt is what is commanded."""
     if felt is None or not isfinite(felt.limit) or not felt.regions:
         return ""
     return _svg("felt", "Stable walls at the stiffness that is felt", lambda ax: draw_felt_chart(ax, felt))
 
 
 def _sensitivities(facts: Facts) -> str:
+    """Drawings of the sensitivities as bars; "" where there are none."""
     rows = len(facts.sensitivities.ranking[:TOP])
     if not rows:
         return ""
@@ -93,13 +94,14 @@ def _sensitivities(facts: Facts) -> str:
 
 
 def _validity(facts: Facts, fits: Validity | None) -> str:
+    """Drawings of the error of simpler models; "" where none is known."""
     if fits is None or not len(fits.frequency) or not any(len(fit.error) for fit in fits.fits):
         return ""
     return _svg("validity", "Error of simpler models by frequency", lambda ax: draw_validity(ax, fits))
 
 
 def _models(facts: Facts) -> dict[str, StabilityChart]:
-    """The device as described, then its models."""
+    """Charts by their labels: the device as described, then its models."""
     given = "as described" if facts.model == "full" else f"as described: {facts.model} model"
     same = f"model-{facts.model}"
     others = [v for v in facts.variants if v.key.startswith("model-") and v.key != same]
@@ -113,7 +115,10 @@ def _svg(
     height: float = 3.7,
     narrow_height: float | None = None,
 ) -> str:
-    """Both drawings of a figure; the style sheet shows the one that suits the screen."""
+    """Both drawings of a figure with one pair of axes, as `both_drawings`.
+
+    height, narrow_height  of the wide and of the narrow one [inches]; None: the same
+    """
     heights = {WIDTHS["wide"]: height, WIDTHS["narrow"]: narrow_height or height}
 
     def drawn(width: float) -> Figure:

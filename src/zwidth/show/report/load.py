@@ -112,6 +112,7 @@ def along(facts: Facts) -> str:
 
 
 def _motion(motion: SidewaysMotion) -> str:
+    """One motion along the surface in words: its frequency if it vibrates, and its growth or decay."""
     rate = "neither grows nor decays"
     if motion.growth_rate > 0.0:
         rate = f"grows by {number(motion.growth_rate)}{SPACE}1/s and doubles in {seconds(motion.time_to_double)}"

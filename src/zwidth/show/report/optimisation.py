@@ -51,6 +51,7 @@ def optimisation_page(found: Optimisation) -> str:
 
 
 def _value(number: float, unit: str) -> str:
+    """A value with its unit; a dash where it is not finite."""
     return quantity(number, unit) if np.isfinite(number) else NONE
 
 
@@ -101,6 +102,7 @@ def _front(found: Optimisation) -> tuple[list[str], list[list[str]]]:
 
 
 def _front_drawing(found: Optimisation) -> str:
+    """Drawings of the front; "" without any design in it."""
     if not len(found.front):
         return ""
     return both_drawings("front", "The front", lambda width: front_figure(found, width, 3.9))

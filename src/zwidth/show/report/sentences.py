@@ -139,6 +139,7 @@ def limit(facts: Facts) -> str:
 
 
 def _cause(facts: Facts, best: Variant) -> str:
+    """What a single change takes away, in words: the cause that limits the device."""
     controller = facts.loop.controller
     flexible = frequency_list(facts)
     if best.key == "rigid-drives":
@@ -173,6 +174,7 @@ def frequency_list(facts: Facts) -> list[str]:
 
 
 def _change_text(facts: Facts, best: Variant) -> str:
+    """A single change in words, as a condition: "with ...", "without ..."."""
     rigid = (
         f"rigid {_gives(facts)}".replace("the ", "") if facts.device.mechanism is not None else "a rigid structure"
     )
@@ -186,6 +188,7 @@ def _change_text(facts: Facts, best: Variant) -> str:
 
 
 def _reached(variant: Variant) -> str:
+    """The largest stiffness that a variant reaches."""
     return quantity(variant.stiffness_max, "N/m")
 
 
@@ -332,10 +335,12 @@ def first_change(facts: Facts) -> str:
     (path, value), *rest = candidates[:3]
     gain = quantity(0.01 * abs(value) * facts.base.stiffness_max, "N/m")
     share = f"{percent(0.01 * abs(value))} more stiffness"
-    text = f"What to change first is {path}: {ONE_PERCENT} {_way(value)} of it gives {share}, {gain}"
+    text = f"What to change first is {path}: {ONE_PERCENT} {_more_less(value)} of it gives {share}, {gain}"
     if not rest:
         return f"{text}."
-    others = [f"{other} ({ONE_PERCENT} {_way(slope)} gives {percent(0.01 * abs(slope))})" for other, slope in rest]
+    others = [
+        f"{other} ({ONE_PERCENT} {_more_less(slope)} gives {percent(0.01 * abs(slope))})" for other, slope in rest
+    ]
     return f"{text}; then {join_words(others)}."
 
 
@@ -344,7 +349,8 @@ def _changeable_numbers(facts: Facts) -> list[tuple[str, float]]:
     return [(path, value) for path, value in facts.sensitivities.ranking if not path.startswith(SCALES)]
 
 
-def _way(value: float) -> str:
+def _more_less(value: float) -> str:
+    """Which way a number is to be changed for more stiffness, by its sensitivity."""
     return "more" if value > 0.0 else "less"
 
 
@@ -459,6 +465,7 @@ def _where(fit: ModelFit, validity: Validity) -> str:
 
 
 def _range(interval: Interval, validity: Validity) -> str:
+    """A range of frequencies in words, as `_where`: ends of the edge are not named."""
     low, high = interval
     if low <= float(validity.frequency[0]):
         return f"below {hertz(high)}{_share(high, validity)}"
@@ -468,6 +475,7 @@ def _range(interval: Interval, validity: Validity) -> str:
 
 
 def _share(frequency: float, validity: Validity) -> str:
+    """A frequency as a share of the first natural one, in brackets; "" where there is none."""
     if not isfinite(validity.first_natural):
         return ""
     return f" ({percent(frequency / validity.first_natural)} of that)"

@@ -196,6 +196,7 @@ def _load(facts: Facts) -> dict[str, Any]:
 
 
 def _walls(variant: Variant) -> dict[str, Any]:
+    """Numbers of the chart of a variant by key and unit, with the reason where it has none."""
     frequencies = list(variant.frequencies)
     return {
         "stiffness_max_N_per_m": variant.stiffness_max or None,
