@@ -34,7 +34,7 @@ class TupleReference(types.Type):
 
     @property
     def key(self) -> types.BaseNamedTuple:
-        """What tells one such type from another."""
+        """The type of the tuple, by which numba tells such types apart."""
         return self.fields
 
     def unify(self, context: Any, other: types.Type) -> types.Type | None:
@@ -42,7 +42,7 @@ class TupleReference(types.Type):
         return self.fields if other == self.fields else None
 
     def can_convert_to(self, context: Any, other: types.Type) -> Conversion | None:
-        """How the address becomes the tuple."""
+        """How numba may convert the address: safely to its own tuple; None: not to another type."""
         return Conversion.safe if other == self.fields else None
 
 

@@ -35,7 +35,7 @@ HEADER_NAME: Final = "safe_walls.h"
 
 
 def header_text(table: SafeWalls) -> str:
-    """The header."""
+    """The text of the header that holds this table."""
     parts = _TEMPLATES / "safe_walls.h.txt"
     text = parts.read_text(encoding="utf-8")
     for key, value in _fields(table).items():

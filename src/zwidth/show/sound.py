@@ -70,7 +70,7 @@ class Sound:
 
     @property
     def level(self) -> float:
-        """Of the largest velocity, before clipping [dB of full scale]."""
+        """Level of the largest velocity, before clipping [dB of full scale]."""
         return 20.0 * log10(self.peak_velocity / self.full_scale)
 
     @property

@@ -60,7 +60,7 @@ class Lane:
             self._watch = asyncio.ensure_future(self._lose_patience(request.kind))
 
     def confirm(self) -> None:
-        """The page has drawn a view."""
+        """Make room for another view on its way: the page has drawn one."""
         if self._room is not None and self._room._value < IN_FLIGHT:
             self._room.release()
 
@@ -156,7 +156,10 @@ class Connection:
     """What one page has asked and been told; `receive` takes its messages one after another."""
 
     def __init__(self, pool: SparePool, send: Send, received: dict[str, Any]) -> None:
-        """received  takes the state that the page shows, as `state`"""
+        """Start both lanes.
+
+        received  is given the state that the page shows, under the key `state`
+        """
         self.send, self._lock, self.received = send, asyncio.Lock(), received
         self.files: dict[str, FileRequest] = {}
         self.view = Lane(pool, self._send, self.files, confirms=True)

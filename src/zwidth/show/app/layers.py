@@ -36,7 +36,8 @@ DISKS: Final = 25  # of the angles, at which a disk is drawn
 
 
 def impedance(point: OperatingPoint, wall: Wall) -> Contents:
-    """What the hand feels of the wall over frequency, beside the commanded impedance and that of free motion."""
+    """Moduli over frequency [Hz] of the impedances of a wall [N s/m]: felt by the hand, commanded, of free
+    motion."""
     felt = point.felt(wall.stiffness, wall.damping)
     arrays = {
         "frequency": felt.frequency,

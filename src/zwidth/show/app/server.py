@@ -124,6 +124,8 @@ def _add_checks(app: FastAPI, settings: Settings) -> None:
 
     @app.middleware("http")
     async def guard(request: Request, following: Any) -> Response:
+        """Refuse a request for another host, or from another page; restrict the page in the headers of the
+        answer."""
         host = request.headers.get("host", "")
         if not settings.knows_host(host):
             return PlainTextResponse("this workbench answers to 127.0.0.1 and localhost only\n", 403)

@@ -52,7 +52,7 @@ def deliver(answer: Answer, as_json: bool) -> int:
 
 
 def put(text: str) -> None:
-    """Text on standard output."""
+    """Write text to standard output at once."""
     sys.stdout.write(text)
     sys.stdout.flush()
 

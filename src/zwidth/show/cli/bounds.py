@@ -56,6 +56,7 @@ class BoundsCommand(Command):
         return case.point.bounds(case["damping"])
 
     def pages(self, case: CommandLine, result: BoundsComparison, document: Mapping[str, Any]) -> Iterator[Any]:
+        """The exact answer, a row for each condition that speaks, and what the others lack."""
         yield two_columns(list(_exact(result)))
         speaking = [bound for bound in result.bounds if not bound.lacking]
         # the assumptions not met, in the order in which they come up, numbered from 1

@@ -76,12 +76,14 @@ class ChartCommand(Command):
         return wall_law.operating_point(case).chart().drawn()
 
     def document(self, case: CommandLine, result: Chart) -> dict[str, Any]:
+        """The chart's own document; of a measured response with the warning that it was cut short."""
         from zwidth.chart.measured.chart import MeasuredChart
 
         more: dict[str, Any] = {"warning": unmeasured_warning(result)} if isinstance(result, MeasuredChart) else {}
         return result.document() | more
 
     def reason(self, case: CommandLine, result: Chart) -> str | None:
+        """Why there is no largest stiffness (nan); None where there is one."""
         if result.stiffness_max == result.stiffness_max:
             return None
         if doubt := getattr(result, "doubt", ""):
@@ -91,6 +93,7 @@ class ChartCommand(Command):
         return no_measured_wall(result) if isinstance(result, MeasuredChart) else NO_WALL
 
     def pages(self, case: CommandLine, result: Chart, document: Mapping[str, Any]) -> Iterator[Any]:
+        """Warnings, then rows on the directions, on the chart, and on a measured response."""
         if document.get("warning"):
             yield f"warning: {document['warning']}"
         if document.get("decided") is False and result.regions:
@@ -149,7 +152,7 @@ def _load_rows(chart: Chart) -> Iterator[tuple[str, str]]:
 
 
 def _decays(buildable: FastestDecay | None, of_all: FastestDecay | None) -> Iterator[tuple[str, str]]:
-    """The fastest decay with K, B >= 0 first, and that of all walls where it is another."""
+    """Rows on the fastest decay: of walls with K, B >= 0, and of all walls where that is another."""
     label = "fastest decay"
     for fastest in (buildable, None if of_all == buildable else of_all):
         if fastest:

@@ -48,6 +48,7 @@ class CheckCommand(Command):
         return wall_law.operating_point(case).check(stiffness, damping, progress=case.progress)
 
     def pages(self, case: CommandLine, result: WallVerdicts, document: Mapping[str, Any]) -> Iterator[Any]:
+        """A row for each wall, up to SHOWN of them, and what the table does not say."""
         points = document["points"]
         rows = [
             (

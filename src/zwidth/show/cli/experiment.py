@@ -62,6 +62,7 @@ class ExperimentCommand(Command):
         return {"left_out": []} | super().circumstances(case)
 
     def compute(self, case: CommandLine) -> Experiment:
+        """The measured boundary; faults of the file that keeps finished work become BadInput."""
         from zwidth.errors import StoreError
         from zwidth.study.boundary.experiment import measure_boundary
 
@@ -82,6 +83,7 @@ class ExperimentCommand(Command):
     def write(
         self, case: CommandLine, result: Experiment, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write the file as every command does; then remove the finished work, unless --resume names its file."""
         reason = super().write(case, result, document, reason)
         file = _journal(case)
         if case["file"] is None and file is not None:

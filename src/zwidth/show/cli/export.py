@@ -76,6 +76,7 @@ class ExportCommand(Command):
         return "safe_walls.h"
 
     def check(self, case: CommandLine) -> None:
+        """Refuse options of a run, or of hands, that do not go together, and a folder that cannot be written."""
         check_workers(case.options)
         if case["hands"] is not None and case.question.operator is not None:
             raise BadInput("--operator and --hands exclude each other; leave out --operator")
@@ -83,6 +84,7 @@ class ExportCommand(Command):
             _check_folder(Path(case["arduino"]))
 
     def parse(self, case: CommandLine) -> Mapping[str, Any]:
+        """The names of --hands, each once. Raises BadInput for an empty one."""
         if case["hands"] is None:
             return {}
         names = tuple(dict.fromkeys(name.strip() for name in case["hands"].split(",")))
@@ -91,6 +93,7 @@ class ExportCommand(Command):
         return {"hands": names}
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        """What every answer states, but for the posture, the direction and the operator."""
         # neither a single posture nor a direction; who holds the device is told by `hands`
         facts = super().circumstances(case)
         for key in ("position_m", "projected_m", "direction", "axis", "operator"):
@@ -157,6 +160,7 @@ class ExportCommand(Command):
     def write(
         self, case: CommandLine, result: SafeWalls, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write the header, the dataset, or what every command writes; then remove the finished work."""
         from zwidth.study.wall_tables.safe_walls import SafeWallsJob
 
         assert case.path is not None
@@ -182,6 +186,7 @@ class ExportCommand(Command):
         return [*super().caption(case, document), f"stable in every direction, held by {held}{margin}"]
 
     def write_others(self, case: CommandLine, result: SafeWalls) -> dict[str, Path]:
+        """Write the sketch for a board where --arduino names a folder."""
         if case["arduino"] is None:
             return {}
         from zwidth.show.safe_walls_header import write_sketch

@@ -48,6 +48,7 @@ class FeltCommand(Command):
         return {"wall_stiffness_N_per_m": case["stiffness"], "wall_damping_Ns_per_m": case["damping"]}
 
     def compute(self, case: CommandLine) -> FeltWall:
+        """The felt wall; a plant without a handle becomes BadInput."""
         from zwidth.errors import HandleError
 
         try:
@@ -60,6 +61,7 @@ class FeltCommand(Command):
             ) from None
 
     def reason(self, case: CommandLine, result: FeltWall) -> str | None:
+        """Why the wall is not felt, with the stiffest stable one where that is known; None where it is."""
         if result.reason is None or result.stiffness_max is None:
             return result.reason
         return f"{result.reason}; the stiffest stable wall has {amount(result.stiffness_max, 'N/m')}"
@@ -70,6 +72,7 @@ class FeltCommand(Command):
     def write(
         self, case: CommandLine, result: FeltWall, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write the file as every command does, but none where the wall is not stable."""
         if reason is None:
             return super().write(case, result, document, reason)
         del document["file"]  # of a wall that is not stable nothing is written

@@ -57,6 +57,7 @@ class LazyCommands(MutableMapping[str, click.Command]):
         self._made: dict[str, click.Command] = {}
 
     def __getitem__(self, name: str) -> click.Command:
+        """The command of this name, imported and made when it is first wanted."""
         if name not in self._made:
             module, attribute = COMMANDS[name]
             command = getattr(import_module(f"zwidth.show.cli.{module}"), attribute)

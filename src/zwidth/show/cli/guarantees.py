@@ -41,6 +41,7 @@ class GuaranteesCommand(Command):
     keys = ("guarantees",)
 
     def check(self, case: CommandLine) -> None:
+        """Raise click.UsageError for a wall without --coupling, or one without stiffness."""
         stiffness = case["stiffness"]
         if stiffness is None and case["damping"] is None:
             return
@@ -61,6 +62,7 @@ class GuaranteesCommand(Command):
         return result.refusal or (NOTHING if result.is_empty else None)
 
     def pages(self, case: CommandLine, result: Guarantees, document: Mapping[str, Any]) -> Iterator[Any]:
+        """A row for each guarantee, the premises that are not known, and the couplings where they are wanted."""
         withheld = result.refusal
         rows = [
             (one.name, "none" if one.region.reason == withheld is not None else _largest(one.region), one.meaning)
@@ -81,6 +83,7 @@ class GuaranteesCommand(Command):
             yield _limit_sentence(coupled.limit)
 
     def draw(self, case: CommandLine, result: Guarantees) -> Figure:
+        """The guarantees; below them the couplings where there are any."""
         from zwidth.show.figures.guarantees import draw_couplings, draw_guarantees
         from zwidth.show.figures.plots import size_of
         from zwidth.show.figures.style import figure

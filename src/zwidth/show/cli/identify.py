@@ -53,6 +53,7 @@ class IdentifyCommand(Command):
     takes_point: ClassVar[bool] = False
 
     def about(self, command: Callback) -> Callback:
+        """The records and the device; also posture and direction where `takes_point`."""
         if self.takes_point:
             return _with_files(about_a_device(command, device=device_option))
 
@@ -64,11 +65,13 @@ class IdentifyCommand(Command):
         return _with_files(device_option(with_settings_option(with_device)))
 
     def for_click(self) -> click.Command:
+        """The command as click knows it, with --write after the options of all commands."""
         made = super().for_click()
         made.params.append(_write)
         return made
 
     def check(self, case: CommandLine) -> None:
+        """Raise BadInput where --write is given and DEVICE is no file that can be written."""
         if not case["write"]:
             return
         if not Path(case.question.name).is_file():
@@ -94,6 +97,7 @@ class IdentifyCommand(Command):
         return False
 
     def compute(self, case: CommandLine) -> Identification:
+        """The identification of this kind; its options are those that IDENTIFY names."""
         options = {name: case[name] for name in IDENTIFY[self.name]}
         if self.takes_point:
             options["point"] = case.point
@@ -110,6 +114,7 @@ class IdentifyCommand(Command):
         return result.reason
 
     def pages(self, case: CommandLine, result: Identification, document: Mapping[str, Any]) -> Iterator[Any]:
+        """The checks; the numbers with their intervals, how well they predict, and how to write them."""
         yield answer_table(
             ["check", "", "seen"],
             [(check.what, "ok" if check.passed else "note" if check.warning else "no", check.reason)
@@ -133,6 +138,7 @@ class IdentifyCommand(Command):
     def write(
         self, case: CommandLine, result: Identification, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write the file as every command does; without any number .json alone, for there is nothing to draw."""
         if reason is None or case.writes((".json",)):
             return super().write(case, result, document, reason)
         del document["file"]  # where nothing was fitted there is nothing to draw

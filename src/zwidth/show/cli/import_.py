@@ -62,6 +62,7 @@ class ImportCommand(Command):
         return (Path(question.name).stem or "device") + ENDING
 
     def check(self, case: CommandLine) -> None:
+        """Refuse to overwrite a file without --force."""
         assert case.path is not None
         if case.path.exists() and not case["force"]:
             raise BadInput(
@@ -75,6 +76,7 @@ class ImportCommand(Command):
         return {}
 
     def compute(self, case: CommandLine) -> ImportedDevice:
+        """The device that the file describes; messages name options, not arguments."""
         from zwidth.device.robot_files.import_file import import_file
 
         try:

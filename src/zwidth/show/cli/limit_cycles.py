@@ -71,6 +71,8 @@ class LimitCyclesCommand(Command):
         }
 
     def compute(self, case: CommandLine) -> LimitCyclePrediction:
+        """The prediction. Raises NoAnswerError where nothing depends on the amplitude, BadInput without encoder
+        steps."""
         from zwidth.contact.wall_limit_cycles import amplitude_dependent, predict_limit_cycles
         from zwidth.errors import ArgumentError
 
@@ -106,6 +108,7 @@ class LimitCyclesCommand(Command):
         yield from _remarks(result)
 
     def write_others(self, case: CommandLine, result: LimitCyclePrediction) -> dict[str, Path]:
+        """Draw the friction-quantisation plane into the file of --plane."""
         if case["plane"] is None:
             return {}
         from zwidth.show.figures.limit_cycles import draw_plane
@@ -127,7 +130,10 @@ def _device_key(keys: tuple[str, str], case: CommandLine) -> str:
 
 
 def _plane(case: CommandLine) -> DevicePlane:
-    """The device in the friction-quantisation plane. Raises BadInput for a wall that does not push, and so on."""
+    """The device in the friction-quantisation plane, on walls of PLANE_STIFFNESSES times the stiffness.
+
+    Raises  BadInput  for a wall without positive stiffness, and for a loop that has no place in the plane
+    """
     from zwidth.contact.friction_quantisation_plane import device_plane
 
     stiffness = case["stiffness"]

@@ -60,6 +60,7 @@ class LoadCommand(Command):
             )
 
     def compute(self, case: CommandLine) -> LoadPath:
+        """The charts under the pushes; a device without a mechanism becomes BadInput."""
         if case.device.mechanism is None:
             raise BadInput(
                 f"{case.question.name}: has no [mechanism], whose forces turn as it moves; use zwidth chart"
@@ -83,6 +84,7 @@ class LoadCommand(Command):
         return super().caption_facts(case, document) | {"varied": ["the hand's push"]}
 
     def pages(self, case: CommandLine, result: LoadPath, document: Mapping[str, Any]) -> Iterator[Any]:
+        """Two tables with a row for each push, of charts and of forces, and sentences on both."""
         from zwidth.show.load_text import path_sentences
 
         free = result.unpushed.stiffness_max
@@ -111,7 +113,7 @@ def _bare(case: CommandLine) -> Device:
 
 
 def _of_push(case: CommandLine) -> tuple[str, ...]:
-    """What the charts under a push leave out of it: of links that bend."""
+    """What charts under a push leave out: what a load does to links that bend; () where none does."""
     from zwidth.loop.linear_omissions import load_omissions
     from zwidth.model.load import Load
 
@@ -119,7 +121,7 @@ def _of_push(case: CommandLine) -> tuple[str, ...]:
 
 
 def _unpushed(case: CommandLine) -> Device:
-    """The device with what is kept of its load."""
+    """The device under its load but for the hand's push; without a load where that was all of it."""
     from zwidth.study.loaded_charts import without_push
 
     kept = without_push(case.device.load)

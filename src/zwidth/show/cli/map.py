@@ -84,6 +84,7 @@ class MapCommand(Command):
         return about_a_workspace(command)
 
     def epilog(self) -> str:
+        """Below the help: the measures with title and unit, and examples."""
         width = max(map(len, MEASURES))
         lines = [
             f"  {name:{width}}  {one.title}{f' [{unit_text(one.unit)}]' if one.unit else ''}"
@@ -95,6 +96,7 @@ class MapCommand(Command):
         check_workers(case.options)
 
     def parse(self, case: CommandLine) -> dict[str, Any]:
+        """Measures, requirements, and the wanted wall that measures take their numbers from."""
         from zwidth.measures.definition import WantedWall
 
         measures, required = _measures(case)
@@ -107,6 +109,7 @@ class MapCommand(Command):
         return {"measure": first.name, "title": first.title, "unit": first.unit}
 
     def circumstances(self, case: CommandLine) -> dict[str, Any]:
+        """What every answer states, without a posture; `direction` may be a rule such as "worst"."""
         # the answer has no single posture, but one direction or one rule that chooses it
         facts = super().circumstances(case)
         del facts["position_m"]
@@ -115,6 +118,7 @@ class MapCommand(Command):
         return facts if case["extreme"] is None else facts | {"direction": case["extreme"]}
 
     def compute(self, case: CommandLine) -> MapResult:
+        """The map, and the area common to all requirements; faults of plane or measures become BadInput."""
         from zwidth.errors import MeasureError, TooLarge, WorkspaceError
         from zwidth.study.workspace.common_area import common_area
         from zwidth.study.workspace.map import workspace_map
@@ -173,6 +177,7 @@ class MapCommand(Command):
     def write(
         self, case: CommandLine, result: MapResult, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write arrays with the areas of requirements as attributes; all else as every command does."""
         if not case.writes(ARRAYS):
             return super().write(case, result, document, reason)
         from zwidth.show.dataset import write_dataset

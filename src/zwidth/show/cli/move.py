@@ -241,6 +241,10 @@ class MoveCommand(Command):
         return super().circumstances(case) | {"operator": None, "left_out": left_out}
 
     def compute(self, case: CommandLine) -> MechanismMotion:
+        """The motion; what cannot be simulated becomes BadInput under the option's name.
+
+        Raises  NoAnswerError  where it ends before a sample, or the environment gives no force
+        """
         from zwidth.errors import ArgumentError, TooLarge
 
         device, name = case.device, case.question.name

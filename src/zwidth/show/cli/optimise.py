@@ -63,6 +63,7 @@ class OptimiseCommand(Command):
         return circumstances_of_study(case, case.question.study)
 
     def compute(self, case: CommandLine) -> Optimisation:
+        """The optimisation, continued from its folder; faults of the study become BadInput."""
         from zwidth.errors import MeasureError, TooLarge
         from zwidth.study.optimisation.optimise import optimise_by
 
@@ -83,6 +84,7 @@ class OptimiseCommand(Command):
         return ""
 
     def pages(self, case: CommandLine, result: Optimisation, document: Mapping[str, Any]) -> Iterator[Any]:
+        """How the front was found, a row for each of its designs, and further sentences."""
         from zwidth.show.report.optimisation import optimisation_sentences
 
         said = [printable(typed(sentence)) for sentence in optimisation_sentences(result)]
@@ -96,6 +98,7 @@ class OptimiseCommand(Command):
     def write(
         self, case: CommandLine, result: Optimisation, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write the report, or what every command writes; then remove the finished work."""
         assert case.path is not None
         if case.writes(PAGES):
             from zwidth.show.report.optimisation import optimisation_page
@@ -107,6 +110,7 @@ class OptimiseCommand(Command):
         return reason
 
     def write_others(self, case: CommandLine, result: Optimisation) -> dict[str, Path]:
+        """Write a device file for each design of the front, and remove those of an earlier, larger front."""
         if case["designs"] is None:
             return {}
         if not len(result.front):

@@ -52,6 +52,7 @@ class PolarCommand(Command):
         return {key: value for key, value in super().circumstances(case).items() if key != "direction"}
 
     def compute(self, case: CommandLine) -> ByDirection:
+        """The largest stiffness by direction; without a mechanism, or with unsupported parts: BadInput."""
         question = case.question
         if case.device.mechanism is None:
             raise BadInput(f"{question.name}: has no [mechanism], and so one direction only; use zwidth chart")
@@ -64,6 +65,7 @@ class PolarCommand(Command):
         return result.reason
 
     def heading(self, case: CommandLine) -> str:
+        """The first lines, without a direction: device and posture; computer; what is left out."""
         facts = self.circumstances(case)
         _, rest = super().heading(case).split("\n", 1)
         where = f"at {vector(facts['position_m'], 'm')}, assembly {facts['assembly']}, model {facts['model']}"

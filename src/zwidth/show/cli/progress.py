@@ -142,7 +142,7 @@ def interrupted() -> int:
 
 
 def say(*lines: str) -> None:
-    """Lines on standard error, if anybody listens."""
+    """Write lines to standard error, if there is one that can be written."""
     if sys.stderr is None:  # for which print would take standard output
         return
     with suppress(OSError, ValueError):

@@ -74,6 +74,7 @@ class RobustCommand(Command):
         return {"operators": operators, "ranges": _ranges(case["ranges"])}
 
     def compute(self, case: CommandLine) -> RobustStudy:
+        """The study of the family. Raises BadInput where nothing varies, or for wrong ranges."""
         from zwidth.errors import RangeError
         from zwidth.study.robust.family import Family
         from zwidth.study.robust.robust_study import robust_study
@@ -99,6 +100,7 @@ class RobustCommand(Command):
         return super().caption_facts(case, document) | facts_of_members(document["members"])
 
     def reason(self, case: CommandLine, result: RobustStudy) -> str | None:
+        """Which members have no stable wall in common; None where all have one."""
         if result.chart.members_at_stiffness_max:
             return None
         names = [member_text(index, result.members[index]) for index in result.chart.excluding]
@@ -108,6 +110,7 @@ class RobustCommand(Command):
         return f"no wall with K > 0 and B >= 0 is stable for every member; {group}: {'; '.join(names)}"
 
     def pages(self, case: CommandLine, result: RobustStudy, document: Mapping[str, Any]) -> Iterator[Any]:
+        """Numbers of the robust set, and a row for each member that limits it."""
         if result.doubt:
             yield f"warning: this is undecided: {printable(result.doubt)}"
         if not result.chart.members_at_stiffness_max:

@@ -100,6 +100,7 @@ class SensitivityCommand(Command):
         yield from _remarks(result, len(known) - len(shown))
 
     def draw(self, case: CommandLine, result: Found) -> Figure:
+        """Bars of the sensitivities, or with a goal of the changes that reach it; one for each number shown."""
         from zwidth.show.figures.sensitivity import draw_goal, draw_sensitivities
         from zwidth.show.figures.style import figure
 

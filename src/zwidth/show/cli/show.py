@@ -51,6 +51,7 @@ class ShowCommand(Command):
         return case.point.describe()
 
     def document(self, case: CommandLine, result: Description) -> dict[str, Any]:
+        """Numbers of the device, those that its file leaves out, sources, and under load the equilibrium."""
         from zwidth.device.plausibility import unknown_numbers
 
         unknown = unknown_numbers(case.device.document)
@@ -66,6 +67,7 @@ class ShowCommand(Command):
         return entries(json_value(document))
 
     def pages(self, case: CommandLine, result: Description, document: Mapping[str, Any]) -> Iterator[Any]:
+        """Masses and frequencies, the balance under load, the mechanism, missing numbers, and sources."""
         values = json_value(document)
         if result.effective is not None:
             yield two_columns(_felt(values))

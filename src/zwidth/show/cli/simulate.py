@@ -100,12 +100,14 @@ class SimulateCommand(Command):
     linear = False
 
     def check(self, case: CommandLine) -> None:
+        """Refuse options of a contact, or of a sound, that do not go together."""
         check_contact(case.options)
         for name in ("sound_full_scale", "sound_pitch"):
             if case[name] is not None and not case.writes(SOUND):
                 raise usage_error(f"--{name.replace('_', '-')} belongs to a sound; add --output FILE.wav")
 
     def compute(self, case: CommandLine) -> ContactSimulation:
+        """The simulated contact; wrong options become BadInput under their names."""
         from zwidth.contact.point_contact import simulate_contact
         from zwidth.show.sound import seconds_to_hear
 
@@ -141,6 +143,7 @@ class SimulateCommand(Command):
     def write(
         self, case: CommandLine, result: ContactSimulation, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write the sound, or what every command writes. Returns why nothing is to be heard."""
         if not case.writes(SOUND):
             return super().write(case, result, document, reason)
         from zwidth.errors import NoAnswerError

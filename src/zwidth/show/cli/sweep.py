@@ -134,6 +134,7 @@ class SweepCommand(Command):
         return circumstances_of_study(case, case.question.study)
 
     def compute(self, case: CommandLine) -> Sweep:
+        """The designs, continued from their store; faults of the study become BadInput."""
         from zwidth.errors import MeasureError, TooLarge
         from zwidth.study.designs.sweep import check_listing, compute_designs
         from zwidth.study.designs.sweep_job import sweep_job
@@ -172,6 +173,8 @@ class SweepCommand(Command):
         return ""  # the pages begin with how many designs there are
 
     def pages(self, case: CommandLine, result: Sweep, document: Mapping[str, Any]) -> Iterator[Any]:
+        """The designs in a table where they are few, else the extremes of each measure; why designs have no
+        value."""
         from zwidth.study.designs.sweep import axis_value_text
 
         count, sampling, columns = result.job.count, result.job.sampling, result.job.columns
@@ -200,6 +203,7 @@ class SweepCommand(Command):
         yield from _reasons(result)
 
     def write(self, case: CommandLine, result: Sweep, document: dict[str, Any], reason: str | None) -> str | None:
+        """Write a folder, arrays or a table piece by piece, else as every command does; then remove the store."""
         from zwidth.show.dataset import write_dataset, write_sweep_csv, write_sweep_zarr
 
         assert case.path is not None

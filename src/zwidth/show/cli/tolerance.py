@@ -115,6 +115,7 @@ class ToleranceCommand(Command):
         check_workers(case.options)
 
     def compute(self, case: CommandLine) -> ToleranceStudy:
+        """The study of the drawn devices, continued from its folder; faults of the study become BadInput."""
         from zwidth.errors import MeasureError, TooLarge
         from zwidth.study.tolerances.tolerance_study import answer
 
@@ -135,6 +136,7 @@ class ToleranceCommand(Command):
         return ""  # the pages begin with how many devices there are
 
     def pages(self, case: CommandLine, result: ToleranceStudy, document: Mapping[str, Any]) -> Iterator[Any]:
+        """The tolerances, the wanted wall, quantiles, bands, indices, and which tolerance to tighten first."""
         question = result.question
         devices = f"{question.samples} device{'s' * (question.samples != 1)} drawn"
         yield f"{printable(document['name'])}: {devices}, seed {question.seed}"
@@ -168,6 +170,7 @@ class ToleranceCommand(Command):
     def write(
         self, case: CommandLine, result: ToleranceStudy, document: dict[str, Any], reason: str | None
     ) -> str | None:
+        """Write arrays, or what every command writes; then remove the finished work."""
         from zwidth.show.dataset import write_dataset
 
         assert case.path is not None

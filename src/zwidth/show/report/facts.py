@@ -49,12 +49,12 @@ class Facts:
 
     @property
     def posture(self) -> Posture | None:
-        """None for a device given by its plant."""
+        """The posture; None for a device given by its plant."""
         return self.point.posture
 
     @property
     def direction(self) -> Floats | None:
-        """None for a device given by its plant."""
+        """The rendered direction (3,), or screw (6,); None for a device given by its plant."""
         return None if self.posture is None else self.point.direction
 
     @property
@@ -81,7 +81,7 @@ class Facts:
 
     @property
     def chart(self) -> StabilityChart:
-        """Its chart."""
+        """The chart of the device as described."""
         chart = self.base.chart
         assert chart is not None
         return chart
