@@ -89,7 +89,7 @@ class Identification(Result):
         return "; ".join(failed) or "the data tell no number"
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of this name or path. Raises NoAnswerError."""
+        """The estimate of this name or path. Raises NoAnswerError where none has it."""
         for estimate in self.estimates:
             if name in (estimate.name, estimate.path):
                 return estimate
@@ -148,7 +148,7 @@ class Identification(Result):
 
 
 def interval(estimate: Estimate) -> str:
-    """The interval in words, its ends with as many digits as tell them apart.
+    """The interval of an estimate in words, its ends with as many digits as tell them apart.
 
     >>> interval(Estimate("mass", 0.1, 0.05, inf, "kg")), interval(Estimate("mass", 0.1, 0.09996, 0.10004, "kg"))
     ('above 0.05', '0.09996 to 0.10004')
@@ -175,7 +175,7 @@ def written_value(estimate: Estimate) -> float:
 
 
 def _digits(estimate: Estimate) -> int:
-    """Significant digits of which the last two differ between the ends of the interval."""
+    """Significant digits with which a value is written: the last two differ between the ends of its interval."""
     width = estimate.high - estimate.low
     largest = max((abs(one) for one in (estimate.low, estimate.high) if isfinite(one)), default=0.0)
     if not isfinite(width) or width <= 0.0 or largest == 0.0:

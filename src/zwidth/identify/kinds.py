@@ -98,10 +98,12 @@ def identify(
 
 
 def _listed(records: Any) -> Iterable[Any]:
+    """A list of records as it is, and a single record as a list."""
     return records if isinstance(records, list | tuple) else [records]
 
 
 def _record(given: Any, columns: Columns, number: int) -> Record:
+    """The record of a file or table, with these columns; `number` names a table. Raises DeviceError."""
     if isinstance(given, Record):
         return given
     if isinstance(given, str | os.PathLike):

@@ -56,7 +56,7 @@ class Fit:
 
     @property
     def sum_of_squares(self) -> float:
-        """Of the residuals."""
+        """Sum of the squared residuals."""
         return float(np.sum(self.residuals**2))
 
 
@@ -191,8 +191,8 @@ def _profiled_ends(
 def _distinct(
     minima: Sequence[OptimizeResult], least: OptimizeResult, variance: float
 ) -> list[tuple[Floats, float, Floats]]:
-    """Place (p,), sum of squares and covariance (p, p) of each minimum, the least first, those that came to the
-    same place once.
+    """Place (p,), sum of squares and covariance (p, p) of each minimum, the least first; one of several that are
+    at the same place.
 
     variance  of a residual
     """
@@ -205,7 +205,8 @@ def _distinct(
 
 
 def _covariance(jacobian: Floats) -> Floats:
-    """(J^T J)^-1; infinite variance of parameters that the residuals do not feel."""
+    """Covariance (J^T J)^-1 (p, p) by the derivatives J (n, p); the variance of a parameter that changes no
+    residual is inf."""
     _, size, rows = np.linalg.svd(jacobian, full_matrices=False)
     felt = size > 1e-12 * np.max(size, initial=1e-300)
     inverse = rows[felt].T / size[felt]
@@ -217,8 +218,8 @@ def _covariance(jacobian: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class _EndSearch:
-    """Where the sum of squares, least over the other parameters, is by `rise` above `least`, along one parameter
-    from a minimum at `best` whose own sum is `height`."""
+    """Search for the ends of one parameter's interval, from a minimum at `best` (p,) with the sum of squares
+    `height`: where the sum, least over the other parameters, is by `rise` above `least`."""
 
     residuals: Residuals
     best: Floats
@@ -268,7 +269,10 @@ class _EndSearch:
         return float(self.best[i] + towards * step)
 
     def _next(self, inner: float, outer: float, rises: dict[float, float]) -> float:
-        """The next step: the root of the rise is nearly a straight line over it."""
+        """The next step to try, as the root of the rise is nearly a straight line over the step.
+
+        inner, outer  steps with too small and too large a rise, nan where none was seen;   rises  step -> root
+        """
         if np.isnan(outer):
             return inner * float(np.clip(1.0 / max(rises[inner], 0.1), 1.2, 4.0))
         share = (1.0 - rises[inner]) / (rises[outer] - rises[inner])
@@ -282,6 +286,7 @@ class _EndSearch:
         others = np.arange(len(self.best)) != i
 
         def held(some: Floats) -> Floats:
+            """The residuals with parameter i held, of the other ones (p - 1,)."""
             x = np.empty(len(self.best))
             x[others], x[i] = some, fixed
             return self.residuals(x)
@@ -302,9 +307,9 @@ class _EndSearch:
 def _descended(
     residuals: Residuals, x: Floats, step: Floats, low: Floats, high: Floats, enough: float
 ) -> tuple[Floats, float]:
-    """The least sum of squares near x, and its place, by damped Gauss-Newton steps within bounds.
+    """Place (p,) of the least sum of squares near x (p,), and that sum, by damped Gauss-Newton steps.
 
-    step    (p,) by which derivatives are taken
+    step    (p,) by which derivatives are taken;   low, high  (p,) bounds
     enough  what a step must gain for another one to be made: an end needs no more digits than its rise
     """
     r = residuals(x)

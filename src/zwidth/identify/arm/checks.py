@@ -1,6 +1,6 @@
-"""What a record of a mechanism's joints must be before its torques are fitted.
+"""Checks of a record of a mechanism's joints before its torques are fitted.
 
-Which columns of a record belong to which drive, and what makes of them the coordinates that the model has.
+Which columns of a record belong to which drive, and the matrices from them to the coordinates of the model.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from zwidth.model.mechanism import PRISMATIC, Mechanism
 from zwidth.model.mechanism_arrays import pack
 from zwidth.model.raw_sweep import encoder_step
 
-COUNTS: Final = 10.0  # that every joint must move, at least
+COUNTS: Final = 10.0  # encoder counts that every joint must move, at least
 SLOPE: Final = 0.1  # by which a recorded velocity may differ from the derivative of the position
 ALIKE: Final = 0.9  # correlation between them, at least
 CLIPPED: Final = 0.04  # share of the samples at one extreme torque: a sine that is counted finely has less
 OVER_LIMIT: Final = 0.01  # share of the samples beyond the drive's limit
-RATIOS: Final = {
+RATIOS: Final = {  # recorded velocity over the derivative of the position -> what the velocity may be recorded in
     180.0 / np.pi: "in degrees",
     np.pi / 180.0: "in radians where degrees are meant",
     1000.0: "in thousandths",
@@ -42,10 +42,10 @@ BETTER: Final = 0.3  # share of the unexplained torque, below which another read
 
 @dataclass(frozen=True)
 class MotionSurvey:
-    """What is seen of the first rows of a record.
+    """The longest stretch without a gap among the first rows of a record, which the checks look at.
 
-    rows          of its longest stretch among the first ones, a piece of the record
-    coordinates, forces  (n, d)  of the drives
+    rows          the columns of the stretch, n samples
+    coordinates, forces  (n, d)  of the drives, as `DriveChannels` makes them of the columns
     """
 
     rows: Piece
@@ -54,10 +54,10 @@ class MotionSurvey:
 
 
 def motion_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], counts: Floats, turning: Floats) -> Check:
-    """That the joints move by more than ten counts.
+    """Check that every joint moves by more than ten counts, and by no more than four turns.
 
     counts   (d,) of the encoders, at the joint [rad], [m]; nan where not known: the step that the readings show
-    turning  (d,) whether a coordinate is an angle
+    turning  (d,) 1 where a coordinate is an angle, 0 where it is a way
     """
     spans = np.max([np.ptp(one.coordinates, axis=0) for one in surveys], axis=0)
     steps = np.max([_steps(one.coordinates) for one in surveys], axis=0)
@@ -84,7 +84,7 @@ def _steps(values: Floats) -> list[float]:
 
 
 def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits: Floats) -> Check:
-    """That torques vary, stay within the drives' limits (d,) at the joint, and are not cut."""
+    """Check that torques vary, stay within the drives' limits (d,) at the joint, and are not cut."""
     constant, cut, beyond = list[str](), list[str](), list[str]()
     for k, name in enumerate(drives):
         forces = np.concatenate([one.forces[:, k] for one in surveys])
@@ -124,9 +124,9 @@ def _clipped_share(forces: Floats) -> float:
 def velocity_check(
     drives: Sequence[str], channels: DriveChannels, survey: MotionSurvey, rate_taps: Floats, taps: Floats
 ) -> Check | None:
-    """That recorded velocities are the derivatives of the positions; None where there are none.
+    """Check that recorded velocities are the derivatives of the positions; None where no velocity is recorded.
 
-    rate_taps, taps   kernels that differentiate and that only smooth
+    rate_taps, taps  (t,) kernels, `Kernel.taps`: one that smooths and differentiates, one that only smooths
     """
     given = [k for k, name in enumerate(channels.velocity) if name]
     if not given:
@@ -166,6 +166,7 @@ def velocity_check(
 
 
 def _correlation(one: Floats, other: Floats) -> float:
+    """Correlation coefficient of two signals (n,); 0 where one of them is constant."""
     a, b = one - np.mean(one), other - np.mean(other)
     size = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b) / size if size > 0.0 else 0.0
@@ -174,10 +175,12 @@ def _correlation(one: Floats, other: Floats) -> float:
 def other_readings(
     names: Sequence[str], columns: Sequence[Floats], torques: Sequence[Floats]
 ) -> tuple[str, float, float]:
-    """A reading of the torques' columns, other signs or two swapped, that explains them far better.
+    """Look for one torque with its sign turned, or two torques swapped, with which the fit is far better.
 
-    columns  (n, d, b) of each stretch;   torques  (n, d)
-    Returns  what it is, "" where there is none; and the shares that are left unexplained, as it is and so
+    names    (d,) of the drives
+    columns  (n, d, b) of each stretch, torque per unit of each base parameter;   torques  (n, d) as recorded
+    Returns  the best such change in words, "" where none is far better; the share of the torques' squares that the
+             fit leaves as recorded; and the share that it leaves with that change
     """
     X = np.concatenate(list(columns))
     y = np.concatenate(list(torques))
@@ -185,6 +188,7 @@ def other_readings(
     scale = np.where(scale > 0.0, scale, 1.0)
 
     def unexplained(read: Floats, weights: Floats) -> float:
+        """Share of the squares of torques (n, d), each drive's over its weight, that least squares leave."""
         A, b = (X / weights[:, None]).reshape(-1, X.shape[2]), (read / weights).reshape(-1)
         size = np.linalg.norm(A, axis=0)
         A = A / np.where(size > 0.0, size, 1.0)
@@ -211,9 +215,9 @@ def other_readings(
 def sign_check(
     names: Sequence[str], labels: Sequence[str], predicted: Sequence[Floats], measured: Sequence[Floats]
 ) -> Check | None:
-    """That no torque runs against the others in one record; None where it does not.
+    """Check that no drive's torque runs against its prediction in a record (correlation below -0.5); None if so.
 
-    predicted, measured  (n, d) of each record
+    names, labels  of the drives, and of the records;   predicted, measured  (n, d) torques of each record
     """
     faults = list[str]()
     for label, one, other in zip(labels, predicted, measured, strict=True):
@@ -245,9 +249,9 @@ class DriveChannels:
     """The columns of one record, drive by drive, d drives.
 
     coordinate, force  (d,) names of columns;   velocity  (d,) names, "" where there is none
-    to_drive    (d, d)  the drives' coordinates per column of coordinates: 1, or 1 over the ratio of motors, or the
-                        coupling of drives that turn with several joints
-    to_force    (d, d)  generalised forces of the drives' coordinates per column of forces
+    to_drive    (d, d)  matrix from the columns of coordinates to the drives' coordinates: 1, or 1 over the ratio
+                        of motors, or the coupling of drives that turn with several joints
+    to_force    (d, d)  matrix from the columns of forces to the generalised forces of the drives' coordinates
     """
 
     coordinate: tuple[str, ...]
@@ -261,7 +265,7 @@ class DriveChannels:
         return np.stack([piece[name] for name in self.coordinate], axis=1) @ self.to_drive.T
 
     def forces(self, piece: Piece) -> Floats:
-        """Generalised forces (n, d) [N m], [N]."""
+        """Generalised forces (n, d) of a piece of the record on the drives' coordinates [N m], [N]."""
         return np.stack([piece[name] for name in self.force], axis=1) @ self.to_force.T
 
 
@@ -280,7 +284,7 @@ def drive_channels_of(device: Device, record: Record, side: Side) -> DriveChanne
         words = (name, links.names[joint])
         rows.append(
             [
-                _column(record, quantity, words, alone=len(drives.names) == 1, needed=k < 2)
+                _column(record, quantity, words, alone=len(drives.names) == 1, needed=k < 2)  # no velocity
                 for k, quantity in enumerate(SLIDING if slides else TURNING)
             ]
         )
@@ -294,9 +298,11 @@ def drive_channels_of(device: Device, record: Record, side: Side) -> DriveChanne
 
 
 def _column(record: Record, quantity: str, words: Sequence[str], *, alone: bool, needed: bool) -> str:
-    """The column of a quantity of the drive that goes by these words; "" where there is none, and none is needed.
+    """Name of the column of a drive's quantity, "torque_Nm.shoulder"; "" where there is none, and none is needed.
 
-    Only letters and figures count, since MATLAB's names have no others.
+    words  name of the drive, and of its link: either may follow the quantity. Only letters and figures of names
+           count, since MATLAB's have no others
+    alone  the device has one drive, whose columns may be named by the quantity only
     """
     wanted = {_plain(f"{quantity}.{word}") for word in words} | ({quantity} if alone else set())
     present = [name for name in record.names if _plain(name) in wanted]
@@ -312,6 +318,7 @@ def _column(record: Record, quantity: str, words: Sequence[str], *, alone: bool,
 
 
 def _plain(name: str) -> str:
+    """A name with _ in place of all that is no letter or figure."""
     return re.sub(r"[^0-9a-zA-Z]", "_", name)
 
 
@@ -340,7 +347,7 @@ def check_mechanism(device: Device) -> Mechanism:
 
 
 def samples_left_out(device: Device) -> list[str]:
-    """Parts of the device's file that the inverse dynamics leave out, in words."""
+    """Name the parts of the device's file that the inverse dynamics of the fit leave out, in words."""
     mechanism = device.mechanism
     assert mechanism is not None
     links, driven = mechanism.links, set(mechanism.drives.joint.tolist())

@@ -50,7 +50,7 @@ DIGITS: Final = 12  # of numbers written into a device file
 
 
 def quantile(fit: Regression) -> float:
-    """Deviations from the value to the ends of an interval, by Student's distribution."""
+    """Half width of a 95 % interval [standard deviations], by Student's distribution."""
     from scipy.stats import t
 
     return float(t.ppf(0.5 + 0.5 * LEVEL, fit.freedom))
@@ -65,7 +65,7 @@ def link_mass_estimates(
     assert point.directions is not None
     for mass in masses:
         what = mass.kind.replace("_", " ")
-        way = point.directions[mass.direction]
+        way = point.directions[mass.direction]  # (3,) to move along, or (6,) with the axis to turn about behind
         words = f"about ({_listed(way[-3:])})" if mass.turns else f"along ({_listed(way[:3])})"
         unit = "kg m^2" if mass.turns else "kg"
         low, high = 0.0, inf
@@ -78,10 +78,12 @@ def link_mass_estimates(
 
 
 def _exp(power: float) -> float:
+    """exp(power); inf where that is too large for a number."""
     return float(np.exp(power)) if power < 700.0 else inf
 
 
 def _listed(numbers: Floats) -> str:
+    """Numbers for people, four digits each."""
     return ", ".join(f"{value:.4g}" for value in numbers)
 
 
@@ -89,7 +91,10 @@ def joint_friction_estimates(
     device: Device, mechanism: Mechanism, base: BaseParameters, fit: Regression, beta: Floats
 ) -> Iterator[Estimate]:
     """Dry and viscous friction and offset of each drive. Dry friction stands in the file at the motor, viscous
-    friction at the joint; neither is below 0."""
+    friction at the joint; neither is below 0.
+
+    beta  (b,) base parameters
+    """
     q, deviations, drives = quantile(fit), fit.deviations, mechanism.drives
     d = len(drives.names)
     first = base.parameters.friction.start
@@ -117,7 +122,7 @@ def joint_friction_estimates(
 
 
 def base_estimates(base: BaseParameters, fit: Regression, beta: Floats) -> Iterator[Estimate]:
-    """Masses, first moments and inertias in the combinations that torques tell apart."""
+    """Masses, first moments and inertias in the combinations that torques tell apart, values beta (b,)."""
     q, deviations = quantile(fit), fit.deviations
     for k, j in enumerate(base.kept):
         if j < base.parameters.friction.start:
@@ -128,7 +133,7 @@ def base_estimates(base: BaseParameters, fit: Regression, beta: Floats) -> Itera
 
 
 def delay_estimate(fit: Regression) -> Estimate:
-    """By what the torques act after their time stamps, or after the computer's delay."""
+    """Time by which the torques act after their time stamps, or after the computer's delay."""
     width = quantile(fit) * fit.delay_deviation
     return Estimate("further delay of the torques", fit.delay, fit.delay - width, fit.delay + width, "s")
 
@@ -168,7 +173,11 @@ def link_settings(
 
 
 def _inertia(device: Device, at: str, inertia: Floats, axis: Floats) -> Any:
-    """The inertia in the form that the file has: one number about the joint's axis, three moments, or a matrix."""
+    """The inertia (3, 3) in the form that the file has: one number about the joint's axis, three moments, or a
+    matrix.
+
+    at  path of the link;   inertia  about its centre of mass [kg m²];   axis  (3,) of its joint
+    """
     given = address.get(device.document, f"{at}.inertia_kg_m2") if _given(device, f"{at}.inertia_kg_m2") else None
     if isinstance(given, int | float):
         return _rounded(float(axis @ inertia @ axis))
@@ -179,6 +188,7 @@ def _inertia(device: Device, at: str, inertia: Floats, axis: Floats) -> Any:
 
 
 def _given(device: Device, path: str) -> bool:
+    """Whether the device's file has this key."""
     return address.exists(device.document, path)
 
 
@@ -196,11 +206,12 @@ def _addressable(device: Device, path: str) -> bool:
 
 
 def _rounded(value: float) -> float:
+    """The number with the digits that are written into a device file; nan where it is not finite."""
     return float(f"{float(value):.{DIGITS}g}") if np.isfinite(value) else nan
 
 
 KINDS: Final = ("rigid_mass", "link_side_mass", "motor_side_mass")
-NO_MOTION: Final = 1e-12  # of a lever arm along a direction in which the handle cannot move
+NO_MOTION: Final = 1e-12  # largest lever arm along a direction, below which the handle cannot move along it
 
 
 @dataclass(frozen=True)
@@ -250,7 +261,7 @@ def effective_masses(
             value, gradient = np.nan, np.zeros(len(values))
             if np.max(np.abs(h)) < NO_MOTION:
                 value = np.inf
-            elif _positive(A):
+            elif _positive_definite(A):
                 x = np.linalg.solve(A, h)
                 value = 1.0 / float(h @ x)
                 gradient[used] = value**2 * np.einsum("s,stp,t->p", x, whole[:, :, used], x)
@@ -259,8 +270,12 @@ def effective_masses(
 
 
 def mass_columns(parameters: Parameters, angles: Floats) -> Floats:
-    """The mass matrix (d, d, P') of links and fitted rotors per unit of each inertial parameter, at a posture
-    given by its joint coordinates (n,)."""
+    """The mass matrix per unit of each inertial parameter (d, d, P'), in which it is linear: those of the links,
+    then the inertias of the fitted rotors, P' of them.
+
+    angles  (n,) joint coordinates of the posture
+    """
+    # row s of the states is a unit acceleration of drive s, at rest and without gravity: its torques are column s
     mech = parameters.mech
     c = mech.driven
     at = np.tile(mech.to_drive[0] @ angles[mech.joint[-c:]], (c, 1))
@@ -270,7 +285,8 @@ def mass_columns(parameters: Parameters, angles: Floats) -> Floats:
     return np.asarray(0.5 * (columns + np.swapaxes(columns, 0, 1)))
 
 
-def _positive(A: Floats) -> bool:
+def _positive_definite(A: Floats) -> bool:
+    """Whether a symmetric matrix is positive definite."""
     try:
         np.linalg.cholesky(A)
     except np.linalg.LinAlgError:
@@ -278,16 +294,16 @@ def _positive(A: Floats) -> bool:
     return True
 
 
-WIDE: Final = 1.0  # s: the file's numbers may be wrong by a factor of e, or more
+WIDE: Final = 1.0  # s of the module's docstring: the file's numbers may be wrong by a factor of e, or more
 THIN: Final = 1e-3  # least share of the pseudo-inertia's mean width, of a body that is flat or a rod in the file
-UPPER: Final = np.triu_indices(4, 1)
+UPPER: Final = np.triu_indices(4, 1)  # entries of V above its diagonal
 
 
 @dataclass(frozen=True)
 class ConsistentLinks:
-    """Numbers that bodies can have.
+    """Parameters of links that can exist.
 
-    values     (P,) of all parameters
+    values     (P,) all parameters, friction included
     deviation  root mean square of the base parameters' change, in their standard deviations
     """
 
@@ -298,7 +314,7 @@ class ConsistentLinks:
 def consistent_links(
     base: BaseParameters, mechanism: Mechanism, beta: Floats, information: Floats
 ) -> ConsistentLinks:
-    """All parameters, of links that can exist, for base parameters (b,) of this information (b, b).
+    """All parameters, of links that can exist, nearest to base parameters beta (b,) of this information (b, b).
 
     Links whose mass the file leaves out begin as rods of one mass per length, and that of the base parameters.
     """
@@ -307,7 +323,7 @@ def consistent_links(
     parameters = base.parameters
     file = pseudo_inertias(mechanism, parameters.bodies)
     roots = np.asarray(np.linalg.cholesky(file), dtype=np.float64)
-    rotors = np.array([_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
+    rotors = np.array([_positive_or(mechanism.drives.motor_inertia[i], 1e-6) for i in parameters.rotors])
     whiten = _whitening(information)
     free = np.arange(*parameters.friction.indices(len(parameters.names)))
     own = [base.kept.index(j) if j in base.kept else -1 for j in free]
@@ -318,11 +334,13 @@ def consistent_links(
     G = base.matrix[dynamic]
 
     def residuals(x: Floats) -> Floats:
+        """What the base parameters of coordinates x (count,) miss beta by, whitened, then x over s."""
         return np.concatenate(
             [rest @ (G @ _all_parameters(parameters, roots, rotors, x)[0] - beta[dynamic]), x / WIDE]
         )
 
     def slopes(x: Floats) -> Floats:
+        """Derivatives of `residuals` by x."""
         return np.concatenate(
             [rest @ (G @ _all_parameters(parameters, roots, rotors, x)[1]), np.eye(count) / WIDE]
         )
@@ -341,7 +359,7 @@ def consistent_links(
 
 
 def _whitening(information: Floats) -> Floats:
-    """Give a root W (b, b) of the information, W^T W, of base parameters."""
+    """Give a root W (b, b) of the base parameters' information (b, b), which is W^T W."""
     size = np.sqrt(np.diag(information))
     size = 1.0 / np.where(size > 0.0, size, 1.0)
     eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
@@ -349,11 +367,11 @@ def _whitening(information: Floats) -> Floats:
 
 
 def _without_friction(whiten: Floats, dynamic: Ints, friction: Ints) -> Floats:
-    """Give the columns (b, n) of the information's root for the dynamic base parameters, less what friction can
-    take over: it is free, so that what is left of the information is that of the rest alone.
+    """Give the columns (b, n) of the information's root for the base parameters that are not friction, less their
+    part along the columns of friction, which is fitted freely beside them.
 
     whiten             (b, b) root of the information
-    dynamic, friction  numbers of the base parameters (n,), (k,) that are no friction, and that are
+    dynamic, friction  indices (n,) of the base parameters that are not friction, and (k,) of those that are
     """
     rest = whiten[:, dynamic]
     if len(friction):
@@ -371,7 +389,7 @@ def _all_parameters(parameters: Parameters, roots: Floats, rotors: Floats, x: Fl
     """
     count = parameters.inertial + len(rotors)
     values, slopes = np.zeros(len(parameters.names)), np.zeros((len(parameters.names), count))
-    bodies, by_own = _numbers(roots, x[: parameters.inertial].reshape(-1, PARAMETERS))
+    bodies, by_own = _body_parameters(roots, x[: parameters.inertial].reshape(-1, PARAMETERS))
     values[: parameters.inertial] = bodies.ravel()
     for k in range(len(roots)):
         own = slice(PARAMETERS * k, PARAMETERS * (k + 1))
@@ -382,11 +400,11 @@ def _all_parameters(parameters: Parameters, roots: Floats, rotors: Floats, x: Fl
 
 
 def _shift(whiten: Floats, dynamic: Ints, friction: Ints, moved: Floats) -> Floats:
-    """Give the change (b,) of all base parameters, friction at its best beside links that change the dynamic ones
-    by `moved` (n,).
+    """Give the change (b,) of all base parameters where those that are not friction change by `moved` (n,), and
+    friction follows so that the fit is best.
 
     whiten             (b, b) root of the information
-    dynamic, friction  numbers of the base parameters (n,), (k,) that are no friction, and that are
+    dynamic, friction  indices (n,) of the base parameters that are not friction, and (k,) of those that are
     """
     shift = np.zeros(len(whiten))
     shift[dynamic] = moved
@@ -396,7 +414,11 @@ def _shift(whiten: Floats, dynamic: Ints, friction: Ints, moved: Floats) -> Floa
 
 
 def pseudo_inertias(mechanism: Mechanism, bodies: tuple[int, ...]) -> Floats:
-    """P (w, 4, 4) of the file's links, made positive definite where they are flat, rods, or left out."""
+    """Pseudo-inertias P (w, 4, 4) of the file's links, made positive definite where these are flat, rods, or left
+    out.
+
+    bodies  (w,) indices of the links
+    """
     links, out = mechanism.links, np.empty((len(bodies), 4, 4))
     lengths = np.linalg.norm(links.tip, axis=-1)
     usual = max(float(np.max(lengths, initial=0.0)), 1e-3)
@@ -422,7 +444,7 @@ def pseudo_inertias(mechanism: Mechanism, bodies: tuple[int, ...]) -> Floats:
 
 
 def body_numbers(values: Floats) -> tuple[float, Floats, Floats]:
-    """Mass, centre of mass (3,) and inertia (3, 3) about it, of a body's ten parameters."""
+    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m²], of a body's ten parameters."""
     m, h = float(values[0]), values[1:4]
     xx, yy, zz, xy, xz, yz = values[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -430,8 +452,10 @@ def body_numbers(values: Floats) -> tuple[float, Floats, Floats]:
     return m, center, inertia - m * (center @ center * np.eye(3) - np.outer(center, center))
 
 
-def _numbers(roots: Floats, x: Floats) -> tuple[Floats, Floats]:
+def _body_parameters(roots: Floats, x: Floats) -> tuple[Floats, Floats]:
     """The ten parameters (w, 10) of bodies by their coordinates x (w, 10), and their derivatives (w, 10, 10).
+
+    roots  L (w, 4, 4) of the file's pseudo-inertias
 
     dP = L (dV V^T + V dV^T) L^T,   dV = exp(x_k) e_k e_k^T of a diagonal entry, e_i e_j^T of another
     """
@@ -449,11 +473,12 @@ def _numbers(roots: Floats, x: Floats) -> tuple[Floats, Floats]:
 
 
 def _ten(P: Floats) -> Floats:
-    """The ten parameters (..., 10) of pseudo-inertias (..., 4, 4)."""
+    """The ten parameters (..., 10) of pseudo-inertias P (..., 4, 4): m, h and I of the module's docstring."""
     S, xx, yy, zz = P[..., :3, :3], P[..., 0, 0], P[..., 1, 1], P[..., 2, 2]
     moments = P[..., 3, 3], P[..., 0, 3], P[..., 1, 3], P[..., 2, 3], yy + zz, xx + zz, xx + yy
     return np.stack([*moments, -S[..., 0, 1], -S[..., 0, 2], -S[..., 1, 2]], axis=-1)
 
 
-def _or(value: float, otherwise: float) -> float:
+def _positive_or(value: float, otherwise: float) -> float:
+    """The value where it is finite and above 0, else the other."""
     return float(value) if np.isfinite(value) and value > 0.0 else otherwise

@@ -1,6 +1,6 @@
-"""What the fit of a mechanism's torques must be, and what is said of it where it is not.
+"""Checks of the fit of a mechanism's torques, with what a reader is told where one fails.
 
-Torques beside what each parameter makes of the positions, in the analysed band.
+`TorqueComparison` makes what is fitted: torques, and the torque per unit of each parameter, in the analysed band.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ SHIFT: Final = 0.5  # sampling periods by which torques may run ahead, or behind
 
 
 def length_check(seen: Sequence[Compared], validation: Sequence[Compared], base: BaseParameters) -> Check:
+    """Check that there are enough torques to fit (seen), and enough samples to validate."""
     count = sum(one.torques.size for one in seen)
     left = sum(len(one.time) for one in validation)
     wanted = FEWEST * len(base.kept)
@@ -56,7 +57,7 @@ def length_check(seen: Sequence[Compared], validation: Sequence[Compared], base:
 
 
 def excitation_check(fit: Regression, base: BaseParameters, beta: Floats) -> Check:
-    """How well the record tells the parameters apart."""
+    """Check how well the record tells the parameters apart, values beta (b,), against their deviations."""
     inertial = [k for k, j in enumerate(base.kept) if j < base.parameters.friction.start]
     deviations = fit.deviations
     loose = [k for k in inertial if 1.96 * deviations[k] > abs(beta[k])]
@@ -74,7 +75,10 @@ def excitation_check(fit: Regression, base: BaseParameters, beta: Floats) -> Che
 def positive_check(
     drives: Sequence[str], base: BaseParameters, beta: Floats, angles: Floats, known_rotors: Floats
 ) -> Check | None:
-    """That torques accelerate the joints in their own direction."""
+    """Check that no drive sees a negative inertia; None where none does.
+
+    beta  (b,) base parameters;   angles  (n,) joint coordinates;   known_rotors  as in `TorqueComparison`
+    """
     values = np.zeros(len(base.parameters.names))
     values[list(base.kept)] = beta
     inertial = base.parameters.friction.start
@@ -87,7 +91,10 @@ def positive_check(
 
 
 def timing_check(fit: Regression, period: float, torque: str) -> Check:
-    """That torques act when they are recorded."""
+    """Check that torques act when they are recorded.
+
+    period  of the records [s];   torque  "measured" or "commanded"
+    """
     shift, deviation = fit.delay, fit.delay_deviation
     seen = f"torques act {abs(shift):.2g} s (+-{2.0 * deviation:.1g} s) {'after' if shift > 0.0 else 'before'} "
     if abs(shift) < SHIFT * period or abs(shift) < 4.0 * deviation:
@@ -98,7 +105,8 @@ def timing_check(fit: Regression, period: float, torque: str) -> Check:
 
 
 def gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Check | None:
-    """That the torque has no part that depends on the posture as gravity does."""
+    """Check that what a fit without gravity leaves, base parameters beta (b,), does not depend on the posture as
+    gravity does; None where it does not."""
     best = np.append(beta, fit.delay)
     residual = np.concatenate([one.torques - one.columns @ best for one in seen])
     scale = np.std(residual, axis=0)
@@ -124,7 +132,11 @@ def gravity_check(seen: Sequence[Compared], fit: Regression, beta: Floats) -> Ch
 def remainder_check(
     drives: Sequence[str], seen: Sequence[Compared], base: BaseParameters, best: Floats
 ) -> Check | None:
-    """That no friction of another kind, and no drift, makes up much of what is left of a joint's torque."""
+    """Check that no friction of another kind, and no drift, makes up much of what is left of a joint's torque;
+    None where none does.
+
+    best  (b + 1,) base parameters, and the delay of the torques [s]
+    """
     torques, columns = (np.concatenate([getattr(one, name) for one in seen]) for name in ("torques", "columns"))
     time = np.concatenate([one.time for one in seen])
     causes = list[str]()
@@ -153,7 +165,7 @@ def remainder_check(
 
 
 def _shares_left(X: Floats, residual: Floats, further: Sequence[Floats]) -> Floats:
-    """Share of what columns (n, p) leave that each further column (n,) explains beside them."""
+    """Share (k,) of a residual (n,), fitted by columns X (n, p), that each of k further columns (n,) explains."""
     size = np.linalg.norm(X, axis=0)
     Q = np.linalg.qr(X[:, size > 0.0] / size[size > 0.0])[0]
     G = np.stack([column / max(float(np.linalg.norm(column)), 1e-300) for column in further], axis=1)
@@ -165,7 +177,7 @@ def _shares_left(X: Floats, residual: Floats, further: Sequence[Floats]) -> Floa
 
 
 def consistency_check(links: ConsistentLinks) -> Check:
-    """Whether links that can exist have the fitted base parameters, to within their uncertainty."""
+    """Check that links that can exist have the fitted base parameters, to within their uncertainty."""
     if links.deviation < WORSE:
         reason = f"links that can exist have these base parameters, to {links.deviation:.2g} deviations"
         return Check("physical consistency", True, reason)
@@ -177,12 +189,12 @@ def consistency_check(links: ConsistentLinks) -> Check:
 
 
 def validation_check(drives: Sequence[str], shares: Sequence[float], edge: float) -> Check:
-    """That torques which were not fitted are predicted; refused where no prediction at all would be better.
+    """Check that torques which were not fitted are predicted; refused where no prediction at all would be better.
 
     What is compared has passed a low pass, and the accelerations are the recorded ones: a high share is no proof
     of the numbers, and no reason to call them right.
 
-    edge  of the band in which they are compared [Hz]
+    shares  of each drive's unseen torque that is explained;   edge  of the band in which they are compared [Hz]
     """
     listed = comma_list([f"{name} {100.0 * share:.4g} %" for name, share in zip(drives, shares, strict=True)])
     if min(shares) > POOR:
@@ -271,18 +283,25 @@ class TorqueComparison:
     def _links(
         self, one: TorqueStretch, angles: Floats, rates: Floats, accelerations: Floats, gravity: Floats
     ) -> tuple[Floats, Floats]:
+        """Torques (n, d, 10 w) per unit of each link parameter, and joint coordinates (n, joints), at a stretch's
+        coordinates.
+
+        angles  joint coordinates near the first sample;   rates, accelerations  (n, d) to take;   gravity  (3,)
+        Raises NoAnswerError  where the mechanism cannot be
+        """
         mech = self.base.parameters.mech
         links, places, reached = inertia_regressor(mech, angles, one.coordinates, rates, accelerations, gravity)
         if reached < len(one.time):
-            raise NoAnswerError(self._where(one, reached))
+            raise NoAnswerError(self._no_posture_message(one, reached))
         return links, places
 
-    def _where(self, one: TorqueStretch, row: int) -> str:
+    def _no_posture_message(self, one: TorqueStretch, row: int) -> str:
+        """Message: at which sample the drives stand where the mechanism cannot be."""
         numbers = ", ".join(f"{value:.4g}" for value in one.coordinates[row])
         return f"at {one.time[row]:.6g} s the drives stand at {numbers} (rad or m), where no posture leads"
 
     def first_posture(self, stretch: TorqueStretch) -> Floats:
-        """Joint coordinates (n,) of a posture at the stretch's first sample."""
+        """Joint coordinates (n,) at the stretch's first sample. Raises NoAnswerError where no posture is there."""
         mech = self.base.parameters.mech
         own = mech.joint[-mech.driven :]
         step = stretch.coordinates[0] - mech.to_drive[0] @ self.start[own]
@@ -291,6 +310,6 @@ class TorqueComparison:
             step = np.where(turns, step - 2.0 * np.pi * np.rint(step / (2.0 * np.pi)), step)
         moved = moved_posture(mech, self.start, step)
         if moved is None:
-            raise NoAnswerError(self._where(stretch, 0))
+            raise NoAnswerError(self._no_posture_message(stretch, 0))
         moved[own] = np.linalg.solve(mech.to_drive[0], stretch.coordinates[0])
         return moved

@@ -174,7 +174,7 @@ def _gravity(device: Device, gravity: ArrayLike | None) -> Floats:
 
 @dataclass(frozen=True)
 class _Work:
-    """One identification on its way."""
+    """The steps of one identification, with the arguments of `identify_arm`; gravity (3,) [m/s²]."""
 
     device: Device
     mechanism: Mechanism
@@ -192,18 +192,18 @@ class _Work:
         return self.mechanism.drives.names
 
     def refusal(self, checks: Sequence[Check]) -> ArmIdentification | None:
-        """What failed checks leave."""
+        """The result that failed checks leave, without numbers; None where none has failed."""
         result = refused(KIND, self.device.label, checks)
         return None if result is None else ArmIdentification(KIND, self.device.label, result.checks)
 
     def identified(self) -> ArmIdentification:
-        """Checks, fit, validation."""
+        """Check the records, fit and validate; return the result, without numbers where a check fails."""
         channels = [drive_channels_of(self.device, record, self.side) for record in self.records]
         checks, samplings = self._sampled()
         if stop := self.refusal(checks):
             return stop
         surveys = [self._survey(r, s, c) for r, s, c in zip(self.records, samplings, channels, strict=True)]
-        checks += self._seen(surveys)
+        checks += self._survey_checks(surveys)
         if stop := self.refusal(checks):
             return stop
         band = choose_band([one.coordinates for one in surveys], samplings, self._highest())
@@ -235,9 +235,8 @@ class _Work:
         result = self._result(checks, base, fit, beta, band, validation)
         return self.refusal(result.checks) or result
 
-    # --- before the fit ---------------------------------------------------------------------------------
-
     def _sampled(self) -> tuple[list[Check], list[SampleTimes]]:
+        """Check that records are sampled regularly, with one period; return the samplings not refused, too."""
         checks, samplings = list[Check](), list[SampleTimes]()
         for number, record in enumerate(self.records):
             self.progress("checking", number, len(self.records))
@@ -272,7 +271,8 @@ class _Work:
         assert best is not None
         return MotionSurvey(best, channels.coordinates(best), channels.forces(best))
 
-    def _seen(self, surveys: Sequence[MotionSurvey]) -> list[Check]:
+    def _survey_checks(self, surveys: Sequence[MotionSurvey]) -> list[Check]:
+        """Check the motion and the torques in the first rows of each record."""
         drives, links = self.mechanism.drives, self.mechanism.links
         counts = 2.0 * np.pi / (np.asarray(drives.encoder_counts) * drives.transmission)
         turning = np.array([links.joint[joint] != PRISMATIC for joint in drives.joint], dtype=float)
@@ -304,6 +304,7 @@ class _Work:
         channels: Sequence[DriveChannels],
         surveys: Sequence[MotionSurvey],
     ) -> list[Check]:
+        """Check the stretches' lengths, recorded velocities, and what the model of rigid links leaves out."""
         checks = list[Check]()
         wide, narrow = band.wide, band.narrow
         needed = 2.5 * (4.0 * wide.reach + 2.0 * narrow.reach)
@@ -331,6 +332,7 @@ class _Work:
     def _smoothed(
         self, samplings: Sequence[SampleTimes], channels: Sequence[DriveChannels], band: TorqueBand
     ) -> Iterator[TorqueStretch]:
+        """The stretches of all records, smoothed and thinned; a command acts after the loop's delay."""
         timing = TorqueTiming()
         if self.torque == "commanded":
             controller, T = self.device.controller, band.period
@@ -341,26 +343,27 @@ class _Work:
             yield from smoothed(record, number, sampling, channel, band, timing)
 
     def _start(self) -> Floats:
+        """Joint coordinates (n,) of the operating point's posture."""
         posture = self.point.posture
         assert posture is not None
         return np.asarray(posture.angles)
 
     def _known_rotors(self) -> Floats:
+        """Inertias (d,) at the joints, n^2 J, of rotors that are taken from the file; 0 where they are fitted."""
         drives = self.mechanism.drives
         if self.rotors == "fitted":
             return np.zeros(len(drives.names))
         return np.asarray(drives.motor_inertia * drives.transmission**2)
 
     def _other_gravity(self) -> list[Floats]:
-        """Directions in which there might be gravity, where none is given."""
+        """Gravities (3,) of 1 m/s² along x, y and z, which the residuals are searched for where none is given."""
         return [] if np.any(self.gravity) else list(np.eye(3))
 
     def _refused_with(self, checks: Sequence[Check]) -> ArmIdentification:
+        """The result without numbers of checks of which one has failed."""
         result = self.refusal(checks)
         assert result is not None
         return result
-
-    # --- the fit ------------------------------------------------------------------------------------------
 
     def _regressed(
         self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch], seen: Sequence[Compared]
@@ -375,7 +378,7 @@ class _Work:
         return fit, _unbiased(fit, noisy)
 
     def _noisy(self, comparison: TorqueComparison, fitted: Sequence[TorqueStretch]) -> Iterator[list[Compared]]:
-        """The fitted part with as much noise of the positions again, and then with the same of the other sign."""
+        """The fitted stretches with as much noise again in the positions, of either sign, `PAIRS` times."""
         rng = np.random.default_rng(0)
         for number in range(PAIRS):
             self.progress("noise", number, PAIRS)
@@ -398,6 +401,10 @@ class _Work:
         weights: Sequence[Floats],
         band: TorqueBand,
     ) -> list[Check]:
+        """Check the fit, base parameters beta (b,): signs, excitation, inertias, gravity, friction and timing.
+
+        seen, validation  what was fitted, and what was not;   weights  gravities (3,) that might act
+        """
         by_record = {one.record for one in (*seen, *validation)}
         groups = [[one for one in (*seen, *validation) if one.record == number] for number in sorted(by_record)]
         measured = [np.concatenate([one.torques for one in group]) for group in groups]
@@ -423,8 +430,6 @@ class _Work:
         ]
         return [one for one in checks if one is not None]
 
-    # --- the result ---------------------------------------------------------------------------------------
-
     def _mass_checks(self, rigid: Estimate) -> list[Check]:
         """Whether the first effective mass is of the size that the file gives, where it gives all numbers."""
         if self.device.missing:
@@ -442,11 +447,8 @@ class _Work:
         band: TorqueBand,
         validation: Sequence[Compared],
     ) -> ArmIdentification:
-        """The result of a fit: numbers of the links nearest to the file's with the base parameters found, masses
-        along the directions, friction and delay with their intervals, and the checks of the unseen part.
-
-        beta  (b,) base parameters;   validation  unseen records beside what the fit makes of their motion
-        """
+        """The result of a fit with base parameters beta (b,): links nearest to the file's, masses along the
+        directions, friction and delay with their intervals, and the checks of the unseen part, `validation`."""
         links = consistent_links(base, self.mechanism, beta, fit.information)
         values = np.zeros(len(base.parameters.names))
         values[list(base.kept)] = beta
@@ -480,7 +482,7 @@ class _Work:
         )
 
     def _validated_on(self, validation: Sequence[Compared], band: TorqueBand) -> str:
-        """Say what the share that is explained is of."""
+        """Say which torque the share that is explained belongs to."""
         last = max(one.record for one in validation)
         many = len(self.records) > 1
         what = f"the last record, {self.records[last].label}" if many else "the last 30 % of the record"
@@ -511,7 +513,7 @@ class _Work:
             yield one if determined and np.isfinite(one.value) else other
 
     def _curves(self, validation: Sequence[Compared], best: Floats) -> dict[str, Sequence[Any]]:
-        """Measured and predicted torques of the unseen part, at most 20000 rows."""
+        """Torques of the unseen part, measured and predicted by parameters and delay (b + 1,); thinned."""
         time = np.concatenate([one.time for one in validation])
         measured = np.concatenate([one.torques for one in validation])
         predicted = np.concatenate([one.columns @ best for one in validation])
@@ -526,7 +528,7 @@ class _Work:
 
 
 def _split(stretches: Sequence[TorqueStretch]) -> tuple[list[TorqueStretch], list[TorqueStretch]]:
-    """What is fitted and what is predicted: the last record, or of a single one its last part."""
+    """The stretches that are fitted, and those that are predicted: the last record, of a single one its end."""
     last = stretches[-1].record if stretches else 0
     if stretches and stretches[0].record != last:
         return [one for one in stretches if one.record != last], [one for one in stretches if one.record == last]
@@ -543,12 +545,13 @@ def _split(stretches: Sequence[TorqueStretch]) -> tuple[list[TorqueStretch], lis
 def _compared(
     comparison: TorqueComparison, stretches: Sequence[TorqueStretch], static: Sequence[Floats] = ()
 ) -> list[Compared]:
-    """The stretches that are long enough for the kernel."""
+    """Torques and columns of the stretches that are long enough, further ones of gravities (3,), `static`."""
     least = 2 * comparison.band.narrow.half(comparison.band.step) + 1
     return [comparison.of(one, static) for one in stretches if len(one.time) > least]
 
 
 def _with_noise(stretch: TorqueStretch, noise: tuple[Floats, Floats, Floats], sign: float) -> TorqueStretch:
+    """The stretch with noise of its coordinates, rates and accelerations (n, d) added, times 1 or -1."""
     q, v, a = noise
     return replace(
         stretch,
@@ -559,7 +562,7 @@ def _with_noise(stretch: TorqueStretch, noise: tuple[Floats, Floats, Floats], si
 
 
 def _unbiased(fit: Regression, noisy: Sequence[Sequence[Compared]]) -> Floats:
-    """The parameters, moved back by what the noise of the positions draws them to."""
+    """The parameters (b,), moved back by as much as noise that is added to the positions moves them."""
     whole = len(noisy) - len(noisy) % 2
     if not whole:
         return fit.values
@@ -586,7 +589,7 @@ def error_sources(
 
 
 def _explained(validation: Sequence[Compared], best: Floats) -> tuple[list[float], float]:
-    """Share of each joint's torque that parameters and delay explain, and their mean."""
+    """Share of each joint's torque that parameters and delay (b + 1,) explain, and the mean of the shares."""
     torques = np.concatenate([one.torques for one in validation])
     residuals = np.concatenate([one.torques - one.columns @ best for one in validation])
     variance = np.var(torques, axis=0)

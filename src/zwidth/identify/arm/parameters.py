@@ -58,7 +58,7 @@ class Parameters:
 
     @classmethod
     def of(cls, mechanism: Mechanism, rotors: bool) -> Parameters:
-        """Of one design.
+        """The parameters of a mechanism of one design.
 
         rotors  whether the rotors' inertias are among them; a rotor of 0 in the file is none
         """
@@ -88,7 +88,10 @@ class Parameters:
         return slice(self.inertial + len(self.rotors), len(self.names))
 
     def columns(self, links: Floats, rates: Floats, accelerations: Floats, signs: Floats) -> Floats:
-        """Columns (N, d, P) of the torques, from those of the links (N, d, 10 w), and of the drives (N, d)."""
+        """Torques (N, d, P) per unit of each parameter, in N states.
+
+        links  (N, d, 10 w) those of the links;   rates, accelerations, signs  (N, d) of the drives
+        """
         N, d = rates.shape
         out = np.zeros((N, d, len(self.names)))
         out[:, :, : self.inertial] = links
@@ -105,7 +108,7 @@ class Parameters:
 
     @cached_property
     def order(self) -> list[int]:
-        """The parameters in the order in which they are kept (module docstring)."""
+        """Indices of the parameters in the order in which base parameters are chosen (module docstring)."""
         keys = list[tuple[int, int, int]]()
         for k, i in enumerate(self.bodies):
             axis = np.abs(self.mech.axis[0, i])
@@ -139,7 +142,7 @@ class BaseParameters:
         return tuple(self._name(row) for row in range(len(self.kept)))
 
     def _name(self, row: int) -> str:
-        """The combination, its leading parameter first."""
+        """Name of a combination, its leading parameter first."""
         lead, others = self.kept[row], np.flatnonzero(self.matrix[row])
         text = self.parameters.names[lead]
         for j in others[others != lead]:
@@ -149,7 +152,7 @@ class BaseParameters:
         return text
 
     def determines(self, gradient: Floats) -> bool:
-        """Whether a function of all parameters with this gradient (P,) is one of the base parameters."""
+        """Whether a function of all parameters with this gradient (P,) depends on the base parameters alone."""
         g = gradient[list(self.kept)]
         left = gradient - g @ self.matrix
         return bool(np.max(np.abs(left), initial=0.0) <= 1e-6 * np.max(np.abs(gradient), initial=0.0))
@@ -182,7 +185,10 @@ def base_parameters(parameters: Parameters, start: Floats, gravity: Floats) -> B
 
 
 def _random_columns(parameters: Parameters, start: Floats, gravity: Floats) -> Floats:
-    """Columns (rows, P) of random states near a posture."""
+    """Torques (rows, P) per unit of each parameter, of all drives in random states near a posture.
+
+    start  (n,) joint coordinates of the posture;   gravity  (3,) [m/s²]
+    """
     mech, rng = parameters.mech, np.random.default_rng(0)
     c = mech.driven
     own = mech.joint[-c:]

@@ -138,7 +138,7 @@ def _excess(
     weight: Floats,
     groups: Ints | None,
 ) -> Floats:
-    """By what factors (b + 1,), at least 1, the parameters' variances are larger than of white residuals.
+    """Factors (b + 1,), at least 1, by which the parameters' variances are larger than of white residuals.
 
         (H^-1 J H^-1)_ii / (H^-1)_ii,    J = sum_g s_g s_g^T,   s_g = sum of X_k^T S^-1 r_k over block g
 
@@ -171,7 +171,7 @@ def _excess(
 
 
 def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]:
-    """What the sums say of the parameters with the last one, the delay, at its best."""
+    """The sums, (b, b) and (b,), without their last parameter, the delay, which takes its best value."""
     own, with_others = float(information[-1, -1]), information[:-1, -1]
     if not own > 0.0:
         return information[:-1, :-1], moment[:-1]
@@ -181,7 +181,7 @@ def _without_delay(information: Floats, moment: Floats) -> tuple[Floats, Floats]
 
 
 def _inverse_factor(covariance: Floats) -> Floats:
-    """L^-1 of a covariance L L^T; a variance of 0, of data without errors, is replaced by a small one."""
+    """L^-1 (d, d) of a covariance L L^T; a variance of 0, of data without errors, is replaced by a small one."""
     scale = np.sqrt(np.diag(covariance))
     scale = np.where(scale > 0.0, scale, max(float(np.max(scale, initial=0.0)), 1e-150))
     correlation = covariance / scale[:, None] / scale + 1e-9 * np.eye(len(scale))
@@ -206,7 +206,7 @@ def _sums(
 
 
 def _solve(information: Floats, moment: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Parameters, their covariance, the directions that change nothing and the units of these."""
+    """Solve normal equations (b, b), (b,); return `values`, `covariance`, `unseen` and `size` of `Regression`."""
     length = np.sqrt(np.diag(information))
     size = 1.0 / np.where(length > 0.0, length, 1.0)
     eigenvalues, vectors = np.linalg.eigh(information * size[:, None] * size)
@@ -217,7 +217,7 @@ def _solve(information: Floats, moment: Floats) -> tuple[Floats, Floats, Floats,
 
 
 def _filtered(signals: Floats, whitening: Floats) -> Floats:
-    """Signals (n, d, ...) through each joint's filter, without the first samples."""
+    """Signals (n, d, ...) through each joint's filter, without the first t - 1 samples; filters (d, t)."""
     order = whitening.shape[1] - 1
     n = len(signals) - order
     if n <= 0:
@@ -230,7 +230,10 @@ def _filtered(signals: Floats, whitening: Floats) -> Floats:
 
 
 def _whitening(residuals: Sequence[Floats], sources: Sequence[Floats]) -> Floats:
-    """Filters (d, t) that leave white noise of each joint's residuals."""
+    """Filters (d, t) that leave white noise of each joint's residuals, (n, d) of each stretch.
+
+    sources  as in `regress`
+    """
     d = residuals[0].shape[1]
     lags = min(len(r) for r in residuals) // 3
     if lags < 2 or not sources:
@@ -251,7 +254,7 @@ def _whitening(residuals: Sequence[Floats], sources: Sequence[Floats]) -> Floats
 
 
 def _alike(filters: Sequence[Floats]) -> Floats:
-    """Filters as rows, the shorter ones with zeros behind."""
+    """Filters of several lengths as the rows of a matrix, the shorter ones with zeros behind."""
     longest = max(len(one) for one in filters)
     return np.stack([np.pad(one, (0, longest - len(one))) for one in filters])
 

@@ -61,7 +61,10 @@ class Kernel:
         return int(np.ceil(self.reach / period))
 
     def taps(self, period: float, derivative: int = 0, shift: float = 0.0) -> Floats:
-        """Samples of h, h' or h'' times the period, which a convolution sums; of a delay by `shift` [s]."""
+        """Samples (2 half + 1,) of h, h' or h'' times the period, which a convolution sums.
+
+        derivative  0, 1 or 2 of h;   shift  by which the result is also delayed [s]
+        """
         half = self.half(period)
         t = np.arange(-half, half + 1) * period - shift
         x, s2 = 2.0 * np.pi * self.edge, self.width**2
@@ -88,7 +91,10 @@ class Kernel:
 
 def _exact_for_powers(taps: Floats, g: Floats, t: Floats, derivative: int) -> Floats:
     """Taps that differentiate 1, t and t^2 without error, which ends and rounding would leave on them: a joint
-    that stands at 1 rad would seem to accelerate by 1e-3 rad/s²."""
+    that stands at 1 rad would seem to accelerate by 1e-3 rad/s².
+
+    taps, g, t  (2 half + 1,) kernel's samples, its Gaussian factor, and their times [s];   derivative  0, 1 or 2
+    """
     powers = ((0,), (1,), (0, 2))[derivative]
     wanted = ((1.0,), (-1.0,), (0.0, 2.0))[derivative]
     bumps = np.stack([g * t**power for power in powers])
@@ -99,10 +105,10 @@ def _exact_for_powers(taps: Floats, g: Floats, t: Floats, derivative: int) -> Fl
 
 @dataclass(frozen=True)
 class TorqueBand:
-    """What is analysed.
+    """The band of frequencies in which torques are compared, with the kernels that cut it out.
 
-    edge    of the analysed band [Hz]
-    period  of the record [s];   stride  its samples for one of the smoothed positions
+    edge    upper end of the band [Hz]
+    period  of the record [s];   stride  samples of the record for each smoothed one
     noise   (d,) one-sided density of the positions' floor [rad²/Hz], [m²/Hz]
     motion  edge of the motion's band as seen in the spectrum [Hz]
     """
@@ -126,27 +132,27 @@ class TorqueBand:
 
     @property
     def step(self) -> float:
-        """Of the smoothed positions [s]."""
+        """Sampling period of the smoothed positions [s]."""
         return self.stride * self.period
 
     @property
     def coarse(self) -> int:
-        """Samples of the record for one that is smoothed: records are thinned before, where that is many."""
+        """Samples of the record for each that is kept where long records are thinned before they are smoothed."""
         return max(self.stride // FINE, 1)
 
     @property
     def guard(self) -> Kernel:
-        """The low pass before that: flat over all that the positions' kernel passes."""
+        """The low pass of records before they are thinned by `coarse`: flat over all that `wide` passes."""
         edge = GUARD / (self.coarse * self.period)
         return Kernel(edge, SHARP / edge)
 
     @property
     def thinning(self) -> int:
-        """Smoothed samples for one that is compared."""
+        """Smoothed samples for each that is compared: three in a period of the band's edge."""
         return max(int(1.0 / (3.0 * self.edge * self.step)), 1)
 
     def noise_of(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-        """Positions, velocities and accelerations (count, d) of the floor alone, after smoothing."""
+        """Draw noise of the positions' floor, smoothed: positions, velocities, accelerations (count, d)."""
         kernel, half = self.wide, self.wide.half(self.step)
         size = np.sqrt(self.noise / (2.0 * self.step))
         white = rng.normal(size=(count + 2 * half, len(size))) * size
@@ -155,7 +161,7 @@ class TorqueBand:
 
 
 def convolved(signals: Floats, taps: Floats, down: int = 1) -> Floats:
-    """Columns (n, ...) convolved with taps (2 h + 1,) where they overlap in full, one sample of `down`."""
+    """Signals (n, ...) convolved with taps (t,) where they overlap in full; every `down`-th sample."""
     from scipy.signal import oaconvolve
 
     columns = signals.reshape(len(signals), int(np.prod(signals.shape[1:])))
@@ -195,7 +201,8 @@ def choose_band(
 
 
 def _spectrum(positions: Floats, period: float) -> tuple[Floats, Floats]:
-    """One-sided densities (f, d), averaged over pieces and over five neighbours."""
+    """Frequencies (f,) [Hz] and one-sided densities (f, d) of positions (n, d), averaged over pieces and over five
+    neighbours; without the three lowest frequencies."""
     from scipy.signal import welch
 
     length = min(max(RESOLUTION, len(positions) // 6), len(positions))
@@ -206,7 +213,7 @@ def _spectrum(positions: Floats, period: float) -> tuple[Floats, Floats]:
 
 
 def _floor(frequency: Floats, density: Floats) -> float:
-    """The level of the noise: the least median over parts of the upper half of the spectrum."""
+    """Level of the noise in a density (f,): the least median over parts of the upper half of the spectrum."""
     top = float(frequency[-1])
     edges = np.linspace(0.5, 0.95, 5) * top
     inside = [density[(frequency >= a) & (frequency < b)] for a, b in pairwise(edges)]

@@ -38,7 +38,7 @@ class TorqueStretch:
     forces: Floats
 
     def part(self, rows: slice) -> TorqueStretch:
-        """Some of its samples."""
+        """The stretch with these of its samples only."""
         return TorqueStretch(self.record, *(getattr(self, name)[rows] for name in STRETCH))
 
 
@@ -64,7 +64,10 @@ def smoothed(
     band: TorqueBand,
     timing: TorqueTiming,
 ) -> Iterator[TorqueStretch]:
-    """The stretches of a record, smoothed and thinned; those too short for the kernel are left out."""
+    """The stretches of a record, smoothed and thinned; those too short for the kernel are left out.
+
+    number  of the record among all;   channels  its columns;   timing  when its torques act
+    """
     check_memory(
         6.0 * len(channels.force) * sampling.rows / band.stride,
         f"the smoothed samples of {record.label}",
@@ -85,7 +88,7 @@ def smoothed(
 
 
 def _tables(record: Record, sampling: SampleTimes, channels: DriveChannels) -> Iterator[Table]:
-    """The pieces of the record's stretches."""
+    """Time, coordinates and forces of the record's stretches, piece by piece."""
     starts = set(sampling.runs[:, 0].tolist())
     for piece in sampling.stretches(record):
         if len(piece["row"]):
@@ -123,13 +126,17 @@ def _guarded(tables: Iterator[Table], band: TorqueBand) -> Iterator[Table]:
 
 
 def _joined(parts: Sequence[TorqueStretch]) -> TorqueStretch:
+    """One stretch of parts that follow each other."""
     return TorqueStretch(
         parts[0].record, *(np.concatenate([getattr(one, name) for one in parts]) for name in STRETCH)
     )
 
 
 def _smooth(table: Floats, number: int, band: TorqueBand, period: float, timing: TorqueTiming) -> TorqueStretch:
-    """The smoothed samples of a table that reaches two kernels' halves beyond them."""
+    """The smoothed samples of a table that reaches two kernels' halves beyond them.
+
+    number  of the record;   period  of the table [s]
+    """
     kernel, down, d = band.wide, band.stride // band.coarse, table.shape[1] // 2
     half = kernel.half(period)
     near, middle = slice(half, len(table) - half), slice(2 * half, len(table) - 2 * half, down)
@@ -149,7 +156,7 @@ def _smooth(table: Floats, number: int, band: TorqueBand, period: float, timing:
 
 
 def _signs(rates: Floats, band: TorqueBand, period: float) -> Floats:
-    """Signs of rates, going through 0 in a straight line where noise decides on them."""
+    """Signs (n, d) of rates, going through 0 in a straight line within two deviations of their noise."""
     taps = band.wide.taps(period, 1)
     size = np.sqrt(band.noise / (2.0 * period) * float(taps @ taps))
     return np.clip(rates / np.maximum(2.0 * size, 1e-300), -1.0, 1.0)

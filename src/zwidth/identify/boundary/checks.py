@@ -1,8 +1,7 @@
-"""What a measured boundary must be before numbers are fitted to it: enough points, plausible, of one kind.
+"""Checks of a measured boundary before numbers are fitted to it: enough points, plausible, of one kind.
 
-Whether a measured boundary is that of another sampling period than the device file's.
-
-Whether a fitted boundary explains the measured one, or only comes as near to it as it can.
+After the fit: whether another sampling period than the device file's explains it better (`check_file_period`), and
+whether the fitted boundary explains it, or only comes as near to it as it can (`check_explained`).
 """
 
 from __future__ import annotations
@@ -67,7 +66,7 @@ def _copies(points: BoundaryPoints) -> Flags:
 
 
 def check_points(points: BoundaryPoints, count: int) -> list[Check]:
-    """Whether there are enough points for so many numbers, spread over the boundary."""
+    """Check that there are enough points for `count` numbers, spread over the boundary."""
     edges = points[points.on_edge]
     tried = int(points.of(STABLE, UNSTABLE).sum())
     kinds = [kind for kind in (LOWER, UPPER, TIP, EDGE) if edges.of(kind).any()]
@@ -99,7 +98,7 @@ def check_points(points: BoundaryPoints, count: int) -> list[Check]:
 
 
 def check_magnitudes(points: BoundaryPoints, edge: EdgeChords) -> Check:
-    """Whether stiffness and damping are of the size that the device's own chart has."""
+    """Check that stiffness and damping are of the size that the device's own chart, its edge, has."""
     edges = points[points.on_edge]
     if not len(edge):
         return Check("units", True, "the device as the file has it renders no stable wall to compare with")
@@ -226,7 +225,10 @@ def explained_share_of_points(values: Floats, kinds: NDArray[np.str_], deviation
 
 
 def share_of_points(points: BoundaryPoints, fit_deviations: Floats, scatter: Scatter) -> float:
-    """`explained_share_of_points` of those on the boundary: what was bisected; of unknown edges the damping."""
+    """`explained_share_of_points` of what was bisected of those on the boundary; of unknown edges the damping.
+
+    fit_deviations  (n,) `Deviations.value`
+    """
     edges = points[points.on_edge]
     units = np.where(edges.kind == TIP, scatter.stiffness, scatter.damping)
     deviations = np.where(edges.kind == EDGE, fit_deviations * scatter.damping, fit_deviations)
@@ -283,7 +285,8 @@ def check_explained(model: BoundaryModel, fit: BoundaryFit) -> Check:
 
 
 def _chance(edges: BoundaryPoints, normalised: Floats) -> float:
-    """Probability that scatter is as smooth along the edges as what remains; 1 where there are too few points.
+    """Probability that scatter is as smooth along the edges as what remains, normalised (n,) by its deviation; 1
+    where there are too few points.
 
     Compared is the sum of the squared steps between neighbours on an edge (von Neumann's ratio), over random
     orders of the points of each edge. The orders are the same in every run.
@@ -306,7 +309,7 @@ def _chance(edges: BoundaryPoints, normalised: Floats) -> float:
 
 
 def _offset(r: Floats) -> float:
-    """Probability of so large a mean by scatter alone (Student's test); 1 for fewer than five points."""
+    """Probability that scatter alone gives values (n,) so large a mean (Student's test); 1 for fewer than five."""
     from scipy.stats import t
 
     if len(r) < 5:

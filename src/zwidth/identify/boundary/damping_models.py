@@ -71,8 +71,7 @@ class DampingModel:
 
     name     a key of `NUMBERS`
     start    (k,) numbers to begin a fit with
-    device   that it is of
-    point    where
+    device   whose damping it is;   point  where, and held by whom
     """
 
     name: str
@@ -96,7 +95,7 @@ class DampingModel:
             if name not in (BY_MASS, DRIVE):
                 text = f"{TITLES[name]}: nothing of the device vibrates; possible are {BY_MASS} and {DRIVE}"
                 raise fail(device.label, "damping_models", text)
-            flexible = np.array([0.01 / plant.mass.shape[0]])
+            flexible = np.array([0.01 / plant.mass.shape[0]])  # Hz: a start for a device that does not vibrate
         w = 2.0 * pi * float(flexible[0])
         at_drive = float(plant.actuator @ plant.mass @ plant.actuator)
         start = {
@@ -121,7 +120,7 @@ class DampingModel:
         return [(what, unit, path if path.startswith(has) else "") for what, unit, path in NUMBERS[self.name]]
 
     def chart(self, device: Device, numbers: Floats) -> Chart:
-        """Exact chart of a device like the model's own with these numbers. Raises ValueError."""
+        """Exact chart of a device like the model's own with numbers (k,) of the model. Raises ValueError."""
         from zwidth.chart.chart import stability_chart
         from zwidth.chart.hysteretic_response import hysteretic_chart
 
@@ -129,7 +128,7 @@ class DampingModel:
         return hysteretic_chart(loop) if self.name == HYSTERETIC else stability_chart(loop, decay=False)
 
     def edge(self, device: Device, numbers: Floats, thinned: int) -> EdgeChords:
-        """The edge of that chart, so many chords made one; with a loss factor see `chart.hysteretic_edge`."""
+        """The edge of `chart`, `thinned` chords made one; with a loss factor all of `hysteretic_edge`."""
         from zwidth.chart.hysteretic_response import hysteretic_edge
 
         if self.name == HYSTERETIC:
@@ -180,7 +179,7 @@ def models_of(names: str | Sequence[str], device: Device, point: OperatingPoint)
 
 
 def _of_mechanism(name: str, numbers: Floats) -> Damping | None:
-    """The damping of a mechanism's file; None where it has none such."""
+    """The damping of a mechanism by a model's name and numbers (k,); None where a file has no such damping."""
     match name:
         case "modal":
             return ModalDamping(float(numbers[0]))
@@ -194,7 +193,7 @@ def _of_mechanism(name: str, numbers: Floats) -> Damping | None:
 
 
 def _damped(plant: Plant, name: str, numbers: Floats) -> Plant:
-    """A plant with the model's damping added to what it has."""
+    """A plant with damping by a model's name and numbers (k,) added to what it has."""
     M, K, a = plant.mass, plant.stiffness, plant.actuator
     match name:
         case "modal":

@@ -30,9 +30,9 @@ COARSE_STEP: Final = 1e-4  # of derivatives of charts that are interpolated
 
 @dataclass(frozen=True)
 class BoundaryFit:
-    """A fit of a boundary.
+    """A device's numbers fitted to a boundary.
 
-    parameters  what was varied
+    parameters  the numbers that were varied
     fit         vector of the numbers, ends of their intervals, and what remains in units of the scatter
     scatter     standard deviations that remain
     deviations  of the points on the boundary
@@ -51,7 +51,7 @@ class BoundaryFit:
         return self.fit.values
 
     def ends(self, i: int) -> tuple[float, float, float]:
-        """A number and the ends of its interval; the bound that the file sets where the data set none."""
+        """The i-th number and the ends of its interval; the bound that the file sets where the data set none."""
         low, high = self.fit.low.copy(), self.fit.high.copy()
         given = self.parameters
         limited = ~given.positive & np.isfinite(given.lower) & np.isneginf(low)
@@ -62,7 +62,7 @@ class BoundaryFit:
 
 
 def search_ranges(points: BoundaryPoints) -> Scatter:
-    """How far the measured points reach: in stiffness, in damping, in frequency; each above 0."""
+    """How far the measured points reach in stiffness, damping and frequency, each above 0: as a `Scatter`."""
     edges = points[points.on_edge]
     frequency = edges.frequency[edges.frequency > 0.0]
     reach = [
@@ -119,6 +119,7 @@ def _fit(
     freedom: Floats | None = None,
     widening: Floats | float = 1.0,
 ) -> Fit:
+    """Fit the numbers with a known scatter, from a start (p,); the other arguments as in `fit_least_squares`."""
     return fit_least_squares(
         lambda vector: model.residuals(vector, scatter),
         start,
@@ -134,7 +135,7 @@ def _fit(
 
 
 def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: Scatter) -> Floats:
-    """The best of the fits that begin at the nearest of several vectors.
+    """Vector (p,) of the best of the fits that begin at the nearest of several vectors.
 
     The sum of the deviations' sizes is compared, not of their squares: far from the truth one point would rule.
     """
@@ -185,10 +186,12 @@ def _parts(model: BoundaryModel) -> dict[str, Flags]:
 
 
 def _scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) -> Scatter:
-    """Standard deviations of what remains, of each kind of points.
+    """Standard deviations of what remains, of each kind of points, after a fit with the scatter `before`.
 
     Of a kind with few points it is at least in the same proportion to the measured range as those of the others:
     few points that happen to lie well would rule the fit.
+
+    reach  of the points, `search_ranges`
     """
     freedom, parts = _freedom_by_kind(model, fit.values, before), _parts(model)
     own = dict[str, float]()
@@ -210,7 +213,7 @@ def _scatter(model: BoundaryModel, fit: Fit, before: Scatter, reach: Scatter) ->
 
 
 def _shares(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, Floats]:
-    """In which shares (p,) the kinds of points tell each number; 0 of a number that they do not tell."""
+    """Kind of points -> share (p,) of each number's variance that stems from them; 0 where they do not tell it."""
     jacobian = derivatives(model, vector, scatter)
     parts = _parts(model)
     information = jacobian[np.any(list(parts.values()), axis=0)]
@@ -222,7 +225,7 @@ def _shares(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str,
 
 
 def _freedom_by_kind(model: BoundaryModel, vector: Floats, scatter: Scatter) -> dict[str, float]:
-    """Number of points of each kind, less the numbers that are told by them."""
+    """Kind of points -> number of points, less the numbers that are told by them."""
     shares, parts = _shares(model, vector, scatter), _parts(model)
     return {name: float(np.sum(part)) - float(np.sum(shares[name])) for name, part in parts.items()}
 

@@ -1,9 +1,10 @@
 """Numbers of a device from a measured stability boundary: damping, delay, operator, whichever are named.
 
-The points are compared with the exact chart (`boundary_model`); where dry friction makes the boundary hang on the
-amplitude, with trials on the simulated device (`boundary_trials`). The scatter is estimated from what remains.
+The points are compared with the exact chart (`model`); where dry friction makes the boundary hang on the
+amplitude, with trials on the simulated device (`trials`). The scatter is estimated from what remains.
 
-Which of several models of damping explains a measured boundary best, and whether the points can tell.
+`compare_models` says which of several models of damping explains a measured boundary best, and whether the points
+can tell.
 """
 
 from __future__ import annotations
@@ -152,7 +153,7 @@ def _validated(
     plan    of the trials; None where the chart was compared
     """
     model, fit = comparison.model, comparison.best
-    checks += [*_alike(fit), check_explained(model, fit)]
+    checks += [*_check_told_apart(fit), check_explained(model, fit)]
     if (nothing := refused(KIND, device.label, checks)) is not None:
         return nothing
     if plan is None:
@@ -199,6 +200,7 @@ def _route(point: OperatingPoint, plan: TrialPlan | None) -> Check:
 def _model(
     points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan | None, report: Progress
 ) -> BoundaryModel:
+    """The points beside exact edges, or, with a plan of trials, beside simulated ones."""
     model = BoundaryModel(points, parameters.edge)
     return model if plan is None else model_by_trials(model, parameters, plan, report)
 
@@ -238,8 +240,9 @@ def _moves_boundary(model: BoundaryModel, parameters: BoundaryParameters) -> Che
     return Check("numbers", True, f"the boundary moves with {comma_list(names)}")
 
 
-def _alike(fit: BoundaryFit) -> list[Check]:
-    """A warning for each pair of numbers of which the points tell little more than a combination."""
+def _check_told_apart(fit: BoundaryFit) -> list[Check]:
+    """A warning for each pair of numbers of which the points tell little more than a combination; a failed check
+    of numbers that they do not tell at all."""
     names = [what for what, _, _ in fit.parameters.named]
     C = fit.fit.covariance
     size = np.sqrt(np.diag(C))
@@ -263,7 +266,8 @@ def _alike(fit: BoundaryFit) -> list[Check]:
 
 
 def _validate(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, str]:
-    """Share of the spread of every third point that a fit to the others explains."""
+    """Share of the spread of every third point that a fit to the others explains, nan of too few points; and which
+    points these are, a sentence."""
     edges = int(model.points.on_edge.sum())
     kept = without_points(model.points)
     left = int(np.sum(kept & model.points.on_edge))
@@ -280,6 +284,7 @@ def _validate(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, str]:
 
 
 def _estimates(fit: BoundaryFit) -> tuple[Estimate, ...]:
+    """The fitted numbers with their intervals."""
     ends = [fit.ends(i) for i in range(len(fit.vector))]
     return tuple(
         Estimate(what, *its, unit, path)
@@ -288,10 +293,10 @@ def _estimates(fit: BoundaryFit) -> tuple[Estimate, ...]:
 
 
 def _remarks(model: BoundaryModel, fit: BoundaryFit, records: Sequence[Record]) -> list[str]:
-    """Points that lie far from the others' scatter."""
+    """A sentence that names the points which lie far beyond the others' scatter; [] where none does."""
     edges = model.points[model.points.on_edge]
     normalised = fit.deviations.value / model.units(fit.scatter)
-    typical = 1.4826 * float(np.median(np.abs(normalised)))
+    typical = 1.4826 * float(np.median(np.abs(normalised)))  # robust standard deviation
     far = np.abs(normalised) > OUTLIER * typical if typical > ROUNDING else np.zeros(len(edges), dtype=bool)
     places = [
         f"{records[edges.record[i]].place(int(edges.row[i]))} of {records[edges.record[i]].label}"
@@ -329,7 +334,10 @@ def _curves(model: BoundaryModel, fit: BoundaryFit) -> dict[str, list[Any]]:
 def _details(
     model: BoundaryModel, fit: BoundaryFit, comparison: DampingComparison, plan: TrialPlan | None
 ) -> dict[str, Any]:
+    """The result's further numbers by key: scatter, damping models, and the charts before and after the fit."""
+
     def outline(vector: Floats) -> list[dict[str, list[float]]]:
+        """Arcs of the exact chart's boundary with numbers (p,); [] where there is no chart."""
         try:
             arcs = fit.parameters.chart(vector).boundary
         except (ValueError, ArithmeticError, np.linalg.LinAlgError):
@@ -393,7 +401,7 @@ class DampingComparison:
 
     @property
     def differences(self) -> list[float]:
-        """Of Akaike's criterion, of each model from the best."""
+        """Akaike's criterion of each model less that of the best one."""
         return [one.criterion - self.models[0].criterion for one in self.models]
 
     @property
@@ -474,7 +482,11 @@ def compare_models(
 
 
 def _start(parameters: BoundaryParameters, before: Sequence[FittedModel]) -> Floats | None:
-    """A loss factor begins at twice the damping ratio that was fitted, as a search is slow; None: search."""
+    """Vector (p,) from which a loss factor is fitted: twice the damping ratio that was fitted before, as a search
+    is slow; None, so that a start is searched for, of other models.
+
+    before  the models that were fitted already
+    """
     if parameters.damping is None or parameters.damping.name != HYSTERETIC:
         return None
     modal = [one.fit.vector for one in before if one.name == MODAL]
@@ -484,6 +496,7 @@ def _start(parameters: BoundaryParameters, before: Sequence[FittedModel]) -> Flo
 def _fitted(
     model: BoundaryModel, parameters: BoundaryParameters, start: Floats | None, *, profiled: bool
 ) -> FittedModel:
+    """Fit a model from a start (p,), None: the best of several; with its criteria and share explained."""
     fit = fit_boundary(model, parameters, start=start, profiled=profiled)
     minus_twice, count, kinds = log_likelihood(model, fit)
     k = len(fit.vector) + kinds

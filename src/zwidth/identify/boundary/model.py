@@ -10,7 +10,7 @@ units of the scatter, so that
 
 has the sum of squares that the likelihood asks for: 0 far on the right side, |d| far on the wrong one.
 
-How much a measured point of a boundary weighs beside the others, by the ends and number of its own trials.
+`relative_scatter` weighs a measured point of a boundary beside the others, by ends and number of its own trials.
 """
 
 from __future__ import annotations
@@ -29,13 +29,12 @@ from zwidth.identify.boundary.points import EDGE, LOWER, STABLE, TIP, UNSTABLE, 
 EdgeOf = Callable[[Floats], EdgeChords]
 
 NO_EDGE: Final = EdgeChords(np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2)))
+MOST_EDGES: Final = 64  # that a model keeps in memory
 
 
 class Scatter(NamedTuple):
-    """Standard deviation of what was measured.
-
-    stiffness [N/m] of tips;  damping [N s/m] of lower and upper edges;  frequency [Hz]
-    """
+    """Standard deviations of measured points: stiffness of tips [N/m], damping of lower and upper edges [N s/m],
+    and frequency [Hz]."""
 
     stiffness: float
     damping: float
@@ -43,7 +42,7 @@ class Scatter(NamedTuple):
 
 
 class Deviations(NamedTuple):
-    """Measured less exact, of the points on the boundary (n,) and of those with a frequency.
+    """Deviations, measured less exact, of the n points on the boundary.
 
     value      along what was bisected [N s/m], [N/m]; in units of the scatter for a point of an unknown edge
     missing    (n,) whether the chart has no such edge on the point's line; value is then the distance to where it
@@ -71,10 +70,10 @@ class BoundaryModel:
     _edges: dict[bytes, EdgeChords] = field(default_factory=dict, repr=False)
 
     def chords(self, vector: Floats) -> EdgeChords:
-        """The chart's edge; none where there is no such device, or where its chart cannot be closed."""
+        """The chart's edge for numbers (p,); none where there is no such device, or its chart cannot be closed."""
         key = np.asarray(vector, dtype=float).tobytes()
         if key not in self._edges:
-            if len(self._edges) > 64:
+            if len(self._edges) > MOST_EDGES:
                 self._edges.clear()
             try:
                 self._edges[key] = self.edge_of(vector)
@@ -136,11 +135,11 @@ class BoundaryModel:
 
     @cached_property
     def relative(self) -> Floats:
-        """See `relative_scatter`, (n,) of the points on the boundary."""
+        """Scatter (n,) of each point on the boundary over the usual one of its kind, by `relative_scatter`."""
         return relative_scatter(self.points[self.points.on_edge])
 
     def _inequalities(self, vector: Floats, scatter: Scatter) -> Floats:
-        """sqrt(-2 ln Phi(d)) of the walls that were tried."""
+        """Residuals sqrt(-2 ln Phi(d)) (m,) of the walls that were tried, see the module's docstring."""
         from scipy.special import log_ndtr
 
         if not self.points.of(STABLE, UNSTABLE).any():
@@ -160,7 +159,10 @@ class BoundaryModel:
 
 
 def _nearest_walls(chords: EdgeChords, chosen: Floats, edge: str) -> Floats:
-    """Where the edge comes nearest to lines that it does not cross (m, 2); the origin where there is no edge."""
+    """Walls (m, 2) of the edge nearest to lines that it does not cross; the origin where there is no edge.
+
+    chosen  (m,) the lines: damping of a tip [N s/m], else stiffness [N/m]
+    """
     across = 1 if edge == TIP else 0
     if not len(chords):
         return np.zeros((len(chosen), 2))

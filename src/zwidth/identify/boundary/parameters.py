@@ -1,6 +1,5 @@
-"""The numbers that a measured boundary is fitted with: those that the user names, and those of a damping model.
-
-Numbers of a device file as a vector that an optimiser varies.
+"""The numbers that a measured boundary is fitted with, as a vector that an optimiser varies: those of the device
+file that the user names (`DeviceNumbers`), and those of a damping model.
 """
 
 from __future__ import annotations
@@ -89,7 +88,7 @@ class BoundaryParameters:
         return own if self.damping is None else own + self.damping.numbers
 
     def values(self, vector: Floats) -> Floats:
-        """The numbers (..., p) of vectors; inf where a logarithm, of an interval without bound, is too large."""
+        """The numbers (..., p) of vectors (..., p); inf where a logarithm, as of an open end, is too large."""
         given = np.asarray(vector, dtype=float)
         with np.errstate(over="ignore"):
             return np.where(self.positive, np.exp(np.where(self.positive, given, 0.0)), given)
@@ -108,7 +107,7 @@ class BoundaryParameters:
         return self._chart_of(self.device_with(vector), vector)
 
     def edge(self, vector: Floats) -> EdgeChords:
-        """The edge of that chart. Raises ValueError where there is none."""
+        """The edge of `chart`. Raises ValueError where there is none."""
         from zwidth.chart.hysteretic_response import hysteretic_edge
 
         device = self.device_with(vector)
@@ -119,6 +118,7 @@ class BoundaryParameters:
         return EdgeChords.of(self._chart_of(device, vector)).thinned(THINNED)
 
     def _chart_of(self, device: Device, vector: Floats) -> Chart:
+        """Exact chart of a device, with the numbers of the damping model in the vector (p,) where there is one."""
         from zwidth.chart.point_chart import chart_at
 
         if self.damping is not None:
@@ -137,6 +137,7 @@ class BoundaryParameters:
         return self.device_with(vector).operator
 
     def _damping_numbers(self, vector: Floats) -> Floats:
+        """The numbers (k,) of the damping model, which stand behind those of the file."""
         return self.values(vector)[len(self.numbers.paths) :]
 
     def other_starts(self, i: int) -> Floats:
@@ -149,13 +150,13 @@ class BoundaryParameters:
         return np.asarray(tried[(tried > self.lower[i]) & (tried < self.upper[i])])
 
     def near_starts(self, i: int) -> Floats:
-        """The same close to the file's value, of a positive number; none of another."""
+        """Values of the vector's i-th number, a positive one, close to the file's from which a fit may begin."""
         tried = self.start[i] + np.log(NEAR if self.positive[i] else ())
         return np.asarray(tried[(tried > self.lower[i]) & (tried < self.upper[i])])
 
     def _size(self, i: int) -> float:
-        """By how much a number must change for the largest stiffness of the chart to change by a hundredth; one of
-        the size of the number itself where it is not 0."""
+        """A usual change of the i-th number: 0.3 of it; where it is 0, the power of ten by which it must change
+        for the largest stiffness of the chart to change by a hundredth."""
         if self.start[i] != 0.0:
             return 0.3 * abs(float(self.start[i]))
         try:
@@ -174,11 +175,13 @@ class BoundaryParameters:
 
 
 def _bounds(numbers: DeviceNumbers, i: int) -> tuple[float, float]:
-    """Bounds of a number's place in the vector; infinite where the file sets none."""
+    """Bounds of the i-th number as the vector has it, by which values the file allows; infinite where it sets
+    none. Raises DeviceError for a number that cannot be varied alone."""
     vector = numbers.vector(numbers.start)
     start = float(vector[i])
 
     def allowed(value: float) -> bool:
+        """Whether there is a device with this value of the number."""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ImplausibleNumber)
@@ -251,16 +254,16 @@ class DeviceNumbers:
         return cls(device, tuple(full), start, start > 0.0)
 
     def vector(self, values: ArrayLike) -> Floats:
-        """Values (..., p) as the optimiser has them."""
+        """What an optimiser varies (..., p) for values (..., p): logarithms of the positive ones."""
         given = np.asarray(values, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.positive, np.log(given), given)
 
     def values(self, vector: ArrayLike) -> Floats:
-        """Values (..., p) of what the optimiser has."""
+        """Values (..., p) of what an optimiser varies (..., p)."""
         given = np.asarray(vector, dtype=float)
         return np.where(self.positive, np.exp(np.where(self.positive, given, 0.0)), given)
 
     def device_with(self, vector: ArrayLike) -> Device:
-        """The device with these numbers. Raises DeviceError where there is no such device."""
+        """The device with the numbers of a vector (p,). Raises DeviceError where there is no such device."""
         return self.device.with_(dict(zip(self.paths, self.values(vector).tolist(), strict=True)))

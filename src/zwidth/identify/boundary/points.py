@@ -146,14 +146,15 @@ def read_boundary_points(records: Sequence[Record]) -> BoundaryPoints:
 
 
 def _points_of(record: Record, index: int) -> BoundaryPoints:
+    """The points of a record, the `index`-th of all. Raises DeviceError as `read_boundary_points` does."""
     columns = record.columns()
     count = len(next(iter(columns.values()), ()))
     nothing = np.full(count, np.nan)
     K, B = (_walls(record, columns, names) for names in (STIFFNESS, DAMPING))
     kind = _kinds(record, columns, count)
-    spreads = [columns.get(name, nothing) for name in SPREADS]
+    damping_low, damping_high, stiffness_low, stiffness_high = (columns.get(name, nothing) for name in SPREADS)
     tip = kind == TIP
-    low, high = (np.where(tip, spreads[2 + side], spreads[side]) for side in (0, 1))
+    low, high = np.where(tip, stiffness_low, damping_low), np.where(tip, stiffness_high, damping_high)
     if len(crossed := np.flatnonzero(low > high)):
         row = int(crossed[0])
         raise record.fault(
@@ -179,7 +180,7 @@ def _points_of(record: Record, index: int) -> BoundaryPoints:
 
 
 def _walls(record: Record, columns: dict[str, NDArray[Any]], names: tuple[str, ...]) -> Floats:
-    """Stiffness or damping of the rows; an empty cell stays nan."""
+    """Stiffness or damping of the rows, in the column that is there of these names; an empty cell stays nan."""
     name = next(name for name in names if name in columns)
     values = columns[name]
     beyond = np.flatnonzero(~(np.abs(np.nan_to_num(values)) <= LARGEST) | np.isinf(values))
@@ -194,7 +195,7 @@ def _walls(record: Record, columns: dict[str, NDArray[Any]], names: tuple[str, .
 
 
 def _kinds(record: Record, columns: dict[str, NDArray[Any]], count: int) -> NDArray[np.str_]:
-    """What each row is; a row of which no column says anything lies on the boundary."""
+    """`BoundaryPoints.kind` of each row (n,); a row of which no column says anything lies on the boundary."""
     kind = np.full(count, EDGE, dtype="U8")
     for name in ("kind", "verdict", "edge"):  # lower, upper and tip say more than boundary
         for row, word in enumerate(_plain_words(columns[name]) if name in columns else ()):

@@ -102,7 +102,7 @@ class TrialPlan:
 
     @property
     def sentence(self) -> str:
-        """What the points are compared with, and why."""
+        """What the points are compared with, and why, in words."""
         pushes = [one.push for one in self.disturbing if one.push > 0.0]
         moves = [one.disturbance for one in self.disturbing if not one.push > 0.0]
         hows = list[str]()
@@ -195,7 +195,7 @@ class SimulatedEdges:
     slopes: Floats
 
     def values(self, vector: Floats) -> Floats:
-        """What is bisected (n,) at the edge, of the device with these numbers."""
+        """Damping, or stiffness of a tip, at the edge (n,), of the device with numbers (p,) of a vector."""
         return np.asarray(self.at.value + self.slopes @ (vector - self.centre))
 
     def only(self, some: Flags) -> SimulatedEdges:
@@ -205,7 +205,7 @@ class SimulatedEdges:
 
 @dataclass
 class TrialModel(BoundaryModel):
-    """Points beside simulated edges; lost: points at which the trials have none."""
+    """Points of a boundary beside edges `simulated` by trials; `lost`: points at which the trials have none."""
 
     simulated: SimulatedEdges = field(kw_only=True)
     lost: BoundaryPoints = field(kw_only=True)
@@ -276,7 +276,7 @@ def model_by_trials(
 def _around(
     model: BoundaryModel, parameters: BoundaryParameters, plan: TrialPlan, x: Floats, slopes: Floats
 ) -> TrialModel:
-    """Simulated edges at numbers x, that move with them by known slopes (n, p)."""
+    """The model with edges simulated at numbers x (p,), which move with them by known slopes (n, p)."""
     at = _simulated(model.points, parameters, plan, x)
     known = np.isfinite(at.value) & np.isfinite(slopes).all(axis=1)
     edges = SimulatedEdges(x, at, slopes).only(known)
@@ -284,8 +284,8 @@ def _around(
 
 
 def _slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> Floats:
-    """How the simulated edges (n, p) move with each number, by central differences; nan where they are not the
-    same edge on both sides."""
+    """Derivatives (n, p) of the simulated edges by the numbers at x (p,), by central differences; nan where they
+    are not the same edge on both sides."""
     slopes = []
     for i in range(len(x)):
         ends, places = list[EdgeCrossing](), []
@@ -302,9 +302,10 @@ def _slopes(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialP
 
 
 def _simulated(points: BoundaryPoints, parameters: BoundaryParameters, plan: TrialPlan, x: Floats) -> EdgeCrossing:
-    """What the trials find at the points and at the walls that were tried, each disturbed in its own way."""
+    """What trials with numbers x (p,) find at the points and at the walls that were tried, each disturbed in its
+    own way."""
     chart = parameters.edge(x)
-    _, K1, _, B1 = chart.box
+    _, K1, _, B1 = chart.box  # largest stiffness [N/m] and damping [N s/m] of the chart's edge
     tip = chart.first[int(np.argmax(chart.first[:, 0]))] if len(chart) else np.array([K1, B1])
     place = StableExtent(float(tip[0]), max(float(tip[1]), 0.05 * B1), B1, True)
     found = EdgeCrossing(
@@ -318,8 +319,11 @@ def _simulated(points: BoundaryPoints, parameters: BoundaryParameters, plan: Tri
 
 
 def _crossings(points: BoundaryPoints, trial: StabilityTrial, place: StableExtent) -> EdgeCrossing:
-    """What one trial finds at points: along damping, or along stiffness for a tip; a wall that was tried is taken
-    to the nearest edge along damping, and along stiffness where no damping is stable."""
+    """The edges that one trial finds at points: along damping, or along stiffness for a tip; a wall that was tried
+    is taken to the nearest edge along damping, and along stiffness where no damping is stable.
+
+    place  where stable walls are looked for
+    """
     ends = dict[tuple[str, float], tuple[float, float]]()
     along = points.kind != TIP
     if along.any():

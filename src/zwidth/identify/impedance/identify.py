@@ -192,6 +192,7 @@ def _identification(device: Device, checks: Sequence[Check], states: Sequence[_S
 
 
 def _wall(device: Device, stiffness: float | None, damping: float | None) -> tuple[float, float] | None:
+    """Stiffness [N/m] and damping [N s/m] of the wall; None without a stiffness. Raises DeviceError."""
     if stiffness is None:
         if damping is not None:
             raise fail(device.label, "damping", "is of a wall; give its stiffness, too")
@@ -269,7 +270,11 @@ def _state(
     point: OperatingPoint,
     wall: tuple[float, float] | None,
 ) -> tuple[_State | None, Check]:
-    """The spectra of one state of the wall, and whether force and motion are coherent in it."""
+    """The spectra and the impedance in one state of the wall, None where force and motion are not coherent in it;
+    and the check of that.
+
+    length  of a segment [samples]
+    """
     first = _spectra_of_part(name, records, samplings, length, (0.0, FIRST_PART))
     second = _spectra_of_part(name, records, samplings, length, (FIRST_PART, 1.0))
     spectra = merged_sums([first, second])
@@ -328,7 +333,8 @@ def _spectra_of_part(
 def _predicted(
     name: str, point: OperatingPoint, wall: tuple[float, float] | None, frequency: Floats
 ) -> Complexes | None:
-    """What `felt` predicts; None where the device has no model or no handle, or where the wall is not known."""
+    """Impedance (k,) that `felt` predicts in a state of the wall [N s/m]; None where the device has no model or no
+    handle, or where the wall is not known."""
     from zwidth.errors import FeedbackError, HandleError
     from zwidth.measures.handle_impedance import felt_impedance, free_impedance
 
@@ -342,7 +348,7 @@ def _predicted(
 
 
 def _check_against(state: _State, wall: tuple[float, float] | None) -> list[Check]:
-    """Whether the measured impedance has the size and the sense of the predicted one."""
+    """Check that the measured impedance has the size and the sense of the predicted one."""
     if state.predicted is None:
         text = (
             "no prediction to compare with; a device with a model, its handle, and the wall's stiffness give one"
@@ -394,6 +400,7 @@ def _low_frequency_hint(state: _State, wall: tuple[float, float] | None) -> str:
 
 
 def _decibels(Z: Complexes, P: Complexes) -> Floats:
+    """Ratio |Z|/|P| (k,) of two impedances [dB]."""
     return np.asarray(20.0 * np.log10(np.abs(Z) / np.abs(P)))
 
 
@@ -454,6 +461,7 @@ def _sentences(state: _State) -> list[str]:
 
 
 def _columns_of(state: _State) -> dict[str, list[Any]]:
+    """Columns of a state's impedance with its band and the predicted one, one frequency a row."""
     Z, P = state.impedance, state.predicted
     predicted = np.full(len(Z), complex(np.nan, np.nan)) if P is None else P
     return {
@@ -479,6 +487,7 @@ def _curves(states: Sequence[_State]) -> dict[str, list[Any]]:
 
 
 def _details(states: Sequence[_State]) -> dict[str, Any]:
+    """The result's further keys and values: segments, octaves, and the width in dB."""
     bands: dict[str, list[OctaveBand]] = {state.name: octave_bands(state.impedance) for state in states}
     return {
         "segment_samples": {state.name: state.first.length for state in states},

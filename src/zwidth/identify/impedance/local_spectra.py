@@ -56,7 +56,7 @@ class LocalSpectra:
 
     @property
     def freedom(self) -> int:
-        """The same beyond the coefficients: those from which the noise is known."""
+        """Complex values beyond the response's coefficients, `values` less these: those that tell the noise."""
         return self.values - TERMS
 
     @property
@@ -94,7 +94,7 @@ class LocalSpectra:
 
 @cache
 def _projections() -> Floats:
-    """(9, 18): from the values of a window to those that a segment keeps of u r^p, 6 for each power p."""
+    """Matrix (9, 18) from the values u of a window to those that a segment keeps of u r^p, 6 for each power p."""
     r = np.arange(-HALF, HALF + 1) / HALF
     powers = r[:, None] ** np.arange(TERMS)
     kept = np.linalg.qr(powers, mode="complete")[0][:, TERMS:]
@@ -149,7 +149,7 @@ def local_spectra(stretches: Iterable[Piece], period: float, length: int, names:
 
 
 def _add(gram: Complexes, values: Floats, length: int) -> None:
-    """Add the products of segments (2, count length + 2) end to end."""
+    """Add to `LocalSpectra.gram` the products of segments end to end, force and position (2, count length + 2)."""
     from scipy.fft import rfft
 
     force = values[0, :-DIFFERENCES].reshape(-1, length)
@@ -167,7 +167,7 @@ def _add(gram: Complexes, values: Floats, length: int) -> None:
 
 
 def _kept(values: Complexes, turn: Complexes) -> Complexes:
-    """What a segment keeps of its windows: (n, 3, 6) of the powers of r."""
+    """What a segment keeps (n, 3, 6) of its windows, 6 values for each power of r; turn: `_projections`."""
     # copied: a product with overlapping rows is ten times slower
     windows = np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(values, 2 * HALF + 1)[::STRIDE])
     return np.asarray((windows @ turn).reshape(-1, TERMS, KEPT))

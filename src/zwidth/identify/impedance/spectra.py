@@ -80,7 +80,7 @@ class MeasuredImpedance:
         return np.abs(self.value) + self.half_width()
 
     def only(self, some: Flags) -> MeasuredImpedance:
-        """Some of the frequencies."""
+        """The impedance at the frequencies for which `some` (k,) is true."""
         return replace(
             self,
             frequency=self.frequency[some],
@@ -92,7 +92,8 @@ class MeasuredImpedance:
 
 
 def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, level: float = LEVEL) -> Floats:
-    """What holds an error with a level: a bias of up to `bias`, and chance of a deviation in 1 or 2 components."""
+    """Half widths (k,) that hold an error with a level: a bias of up to `bias` (k,), and chance of this deviation
+    (k,), known from `freedom` complex values, in each of `size` components, 1 or 2."""
     from scipy.stats import chi2
     from scipy.stats import f as fisher
 
@@ -106,7 +107,8 @@ def _half_width(deviation: Floats, bias: Floats, freedom: float, size: int, leve
 
 @lru_cache(maxsize=256)
 def _shifted(level: float, size: int) -> tuple[Floats, Floats]:
-    """Shifts, and what an error of deviation 1 about each of them stays within with a level."""
+    """Shifts (m,) from 0 to `FAR`, and the size (m,) that an error of deviation 1 in each of `size` components
+    about each of them stays within, with a level."""
     from scipy.special import chndtrix
 
     shifts = FAR * np.linspace(0.0, 1.0, SHIFTS) ** 2
@@ -196,7 +198,7 @@ OFF: Final = ("off", "0", "0.0", "false", "no", "free", "none")
 
 
 def wall_states(words: NDArray[np.str_]) -> NDArray[np.str_]:
-    """on, off, or "" for what is neither."""
+    """State of the wall (n,) by the words of its column (n,): "on", "off", or "" for what is neither."""
     plain = np.char.lower(np.char.strip(words.astype(str)))
     return np.where(np.isin(plain, ON), "on", np.where(np.isin(plain, OFF), "off", ""))
 

@@ -23,15 +23,16 @@ DELAY: Final = 6  # index of the force's delay behind the six numbers of the mot
 DRIFTS: Final = (7, 8, 9)  # indices of the bias's drift: even, bent and S-shaped
 COUNT: Final = 10  # numbers
 ONE: Final = np.eye(COUNT)  # ONE[MASS]: weights of the mass alone in a sum over the numbers
+VISCOUS, DRY = slice(1, 3), slice(3, 5)  # among the numbers: viscous and dry friction, forward and backward
 STEP: Final = 1e-6  # of a derivative, of parameters in units of their effect
 MOST_STEPS: Final = 400  # of the optimiser: in a narrow bent valley, as of a joint that hardly slides, it creeps
 ARRIVED: Final = 1e-8  # relative fall of the sum of squares that ends it
 RIDGES: Final = (0.0, 1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4)  # of Levenberg and Marquardt, tried in this order
-GROWTH: Final = 5.0  # logarithm of it, within a window
-LONGEST_DELAY: Final = (-1.0, 6.0)  # of the force, samples
+GROWTH: Final = 5.0  # logarithm of the factor by which a motion may grow within a window
+LONGEST_DELAY: Final = (-1.0, 6.0)  # least and largest delay of the force, samples
 BLOCKS: Final = 24  # of consecutive samples, of all windows together, at least
 SHARES: Final = (1.0, 0.3, 0.0)  # of a step that a window's start may take
-LEVERAGE: Final = 1e-9  # short of 1, from which one block alone determines a direction
+LEVERAGE: Final = 1e-9  # a block of a leverage within this of 1 determines a direction alone
 LEAST_SHARE: Final = 1e-3  # of a variance that must be seen in the blocks' changes
 LEAST_MASS: Final = 1e-3  # times b T: a mass that stops within a thousandth of a sample
 
@@ -60,12 +61,12 @@ class Windows:
     clock: Floats
 
     def chosen(self, which: Flags) -> Windows:
-        """Some of the windows."""
+        """The windows for which `which` (W,) is true."""
         names = ("first", "length", "period", "time", "run")
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
     def cut(self, parts: int) -> Windows:
-        """Each window cut into so many, one behind the other."""
+        """Each window cut into so many parts, one behind the other; fewer where a part had less than 8 samples."""
         edges = [np.linspace(0, n, min(parts, max(n // 8, 1)) + 1).astype(np.int64) for n in self.length]
         many = np.array([len(e) - 1 for e in edges])
         offsets = np.concatenate([e[:-1] for e in edges])
@@ -95,12 +96,12 @@ class Windows:
 
 @dataclass(frozen=True)
 class JointNumbers:
-    """What the motion hangs on.
+    """The ten numbers that a motion follows from, and which of them are fitted.
 
     values   (10,) m, b forward and backward, F forward and backward, k, the force's delay [s], and the drift of
              the bias in three shapes, `Windows.drifts`
-    free     those that are fitted
-    tied     index of each number that follows another instead: backward ones where the joint never slid backward
+    free     indices of those that are fitted
+    tied     (index, other) of each number that is set to another one: backward ones where the joint never slid so
     """
 
     values: Floats
@@ -122,7 +123,8 @@ class JointNumbers:
 
 
 def predict(windows: Windows, values: Floats, starts: Floats) -> Floats:
-    """Positions at `windows.rows` [m or rad], from the starts (W, 2) of position and velocity."""
+    """Positions at `windows.rows` [m or rad] by the numbers `values` (10,), from position and velocity at each
+    window's first sample, starts (W, 2)."""
     out = np.zeros(len(windows.position))
     drift = values[list(DRIFTS)]
     follow_windows(
@@ -181,7 +183,7 @@ class JointFit:
 
     @property
     def sum_of_squares(self) -> float:
-        """Of what remains."""
+        """Sum of the squared residuals."""
         return float(np.sum(self.residuals**2))
 
     def combination(self, weights: Floats) -> tuple[float, float, float]:
@@ -216,7 +218,10 @@ class JointFit:
 
 
 class _Search:
-    """Levenberg and Marquardt over the free numbers and the windows' starts."""
+    """Levenberg and Marquardt's search over the free numbers and the windows' starts (W, 2).
+
+    blocks  into how many the samples are cut for `Blocks`, at least; 0: one for each window
+    """
 
     def __init__(self, windows: Windows, numbers: JointNumbers, starts: Floats, blocks: int) -> None:
         self.windows, self.numbers, self.starts = windows, numbers, starts
@@ -228,7 +233,7 @@ class _Search:
         self.scales = scales(windows)
 
     def linearised(self) -> tuple[Blocks, Floats]:
-        """Sums over the blocks at the present numbers, and what remains."""
+        """Sums over the blocks at the present numbers, and what these leave of the readings (n,)."""
         p = len(self.numbers.free)
         base = predict(self.windows, self.numbers.values, self.starts)
         columns = np.empty((len(base), p + 2))
@@ -258,7 +263,10 @@ class _Search:
         )
 
     def run(self, most: int = MOST_STEPS) -> tuple[Blocks, Floats, bool]:
-        """Search until the sum of squares falls no more."""
+        """Search until the sum of squares falls no more, in at most so many steps.
+
+        Returns  `linearised` at the end, and whether the search arrived
+        """
         ridge = 1
         for _ in range(most):
             blocks, left = self.linearised()
@@ -278,7 +286,8 @@ class _Search:
         return *self.linearised(), False
 
     def _best_step(self, step: Floats, along: Floats) -> tuple[JointNumbers, Floats, float]:
-        """The numbers a step further; each window's start as far along its step as predicts it best."""
+        """The numbers a step (p,) further; each window's start as far along its step, (W, 2), as predicts it best;
+        and the sum of squares there."""
         numbers = self._moved(step)
         guesses = [self.starts + share * along for share in SHARES]
         squares = np.array([squares_of(self.windows, numbers, guess) for guess in guesses])
@@ -302,21 +311,23 @@ class _Search:
 
 
 def bounded(values: Floats, windows: Windows) -> Floats:
-    """The numbers within what can be meant: a mass above 0, a delay of a few samples, and no friction or
-    spring that drives the joint so that its motion grows by more than some orders within a window."""
+    """The numbers (10,) within what can be meant: a mass above 0, a delay of a few samples, and no friction or
+    spring that drives the joint so that its motion grows by more than `GROWTH` within a window."""
     T, span = float(np.mean(windows.period)), float(np.max(windows.length * windows.period))
-    least = max(LEAST_MASS * max(abs(values[1]), abs(values[2])) * T, 1e-6 * scales(windows)[MASS])
+    forward, backward = values[VISCOUS]
+    least = max(LEAST_MASS * max(abs(forward), abs(backward)) * T, 1e-6 * scales(windows)[MASS])
     m = max(float(values[MASS]), least)
     after = values.copy()
     after[MASS] = m
-    after[1:3] = np.maximum(after[1:3], -GROWTH * m / span)
+    after[VISCOUS] = np.maximum(after[VISCOUS], -GROWTH * m / span)
     after[STIFFNESS] = max(float(after[STIFFNESS]), -m * (GROWTH / span) ** 2)
     after[DELAY] = np.clip(after[DELAY], LONGEST_DELAY[0] * T, LONGEST_DELAY[1] * T)
     return after
 
 
 def scales(windows: Windows) -> Floats:
-    """Sizes (12,) of the ten numbers and of a start by what the record has of force, motion and time."""
+    """Usual sizes (12,) of the ten numbers, and of a start's position and velocity, by the record's force, motion
+    and time: units in which a search takes its steps."""
     y, T = windows.position, float(np.mean(windows.period))
     x = max(
         float(np.max([np.ptp(y[a : a + n]) for a, n in zip(windows.first, windows.length, strict=True)])), 1e-300
@@ -330,7 +341,7 @@ def scales(windows: Windows) -> Floats:
 
 
 def assembled_windows(blocks: Blocks, count: int) -> Floats:
-    """Normal matrix of the free numbers and the starts of all windows."""
+    """Normal matrix (p + 2 W, p + 2 W) of the free numbers and of the starts of all windows, `count` W."""
     p = blocks.gram.shape[-1] - 2
     whole = np.zeros((p + 2 * count, p + 2 * count))
     for gram, w in zip(blocks.gram, blocks.window, strict=True):
@@ -356,7 +367,7 @@ class Arrow:
 
     @classmethod
     def of(cls, blocks: Blocks, count: int) -> Arrow:
-        """Of so many windows."""
+        """The normal equations of sums over blocks, of `count` windows W."""
         p = blocks.gram.shape[-1] - 2
         mixed, starts, slopes = np.zeros((count, p, 2)), np.zeros((count, 2, 2)), np.zeros((count, 2))
         np.add.at(mixed, blocks.window, blocks.gram[:, :p, p:])
@@ -432,7 +443,8 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
     residuals: the sum of squares then has the right mean where they are independent (Bell and McCaffrey 2002,
     known at second hand), and it holds for any correlation within blocks. Leaving blocks out one by one, a
     jackknife, has the power -1 in its place, too wide with the degrees of freedom of `JointFit.combination`.
-    Returns  `covariance`, `working`, `changes` and `weights` of `JointFit`
+    count, free  number of windows, and of free numbers
+    Returns      `covariance`, `working`, `changes` and `weights` of `JointFit`
     """
     whole = assembled_windows(blocks, count)
     size = np.sqrt(np.maximum(np.diag(whole), 1e-300))
@@ -460,7 +472,7 @@ def block_spread(blocks: Blocks, count: int, free: int) -> tuple[Floats, Floats,
 
 
 def _enlarged(S: Floats, P: Floats) -> Floats:
-    """(1 - S P)^-1/2 (G, q, q), through the symmetric matrix R S R with R the root of P."""
+    """(1 - S P)^-1/2 (G, q, q) of `block_spread`, S and P (G, q, q), through R S R with R the root of P."""
     values, vectors = np.linalg.eigh(P)
     root = np.sqrt(np.maximum(values, 0.0))
     R = (vectors * root[:, None, :]) @ np.swapaxes(vectors, 1, 2)
@@ -473,7 +485,7 @@ def _enlarged(S: Floats, P: Floats) -> Floats:
 
 
 def _inverse(scaled: Floats) -> tuple[Floats, Flags]:
-    """Inverse of a normal matrix, and which parameters it leaves undetermined."""
+    """Inverse of a normal matrix (q, q) with diagonal 1, and which parameters (q,) it leaves undetermined."""
     values, vectors = np.linalg.eigh(scaled)
     felt = values > 1e-11
     inverse = (vectors[:, felt] / values[felt]) @ vectors[:, felt].T

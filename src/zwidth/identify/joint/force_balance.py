@@ -10,9 +10,8 @@ the other way round on the motion, goes with the acceleration:
 Noise of the force is in the left side here, and draws no number anywhere; noise of the position draws the mass
 towards 0. Neither makes a mass out of nothing more often than the level of the test says.
 
-Why no mass with friction explains a motion: a sense reversed, records that differ, perhaps columns swapped.
-
-What a record of one joint's motion must show before friction or mass is fitted to it.
+`reason_of_misfit` says why no mass with friction explains a motion: a sense reversed, records that differ, perhaps
+columns swapped. `checks_of` checks a record of one joint's motion before friction or mass is fitted to it.
 """
 
 from __future__ import annotations
@@ -38,13 +37,13 @@ BY_CHANCE: Final = 5e-4  # probability that noise alone passes for a mass: a lar
 OVERLAP: Final = 2.0  # rows that share each sample: so many fewer of them are independent
 MEMORY: Final = 0.1  # share of the rows over which errors may go together: with less, slow noise seems to be none
 FEWEST_FREE: Final = 3.0  # degrees of freedom below which a variance says little
-NUMBERS: Final = (MASS, 1, 3, 4, STIFFNESS)  # of the columns of a balance
+NUMBERS: Final = (MASS, 1, 3, 4, STIFFNESS)  # indices of the numbers m, b, F_f, F_b and k, columns of a balance
 TINY: Final = 1e-9  # share of the largest column below which one is rounding
 
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """The force by the motion.
+    """The recorded force regressed on the motion.
 
     values      (10,) numbers as `fit.JointNumbers` has them, 0 where the balance has none
     covariance  (10, 10) of their errors
@@ -113,7 +112,11 @@ def force_balance(windows: Windows, resolution: float, *, delay: float = 0.0, sp
 def _balanced(
     windows: Windows, size: int, resolution: float, late: int, spring: bool, moving: float, level: float
 ) -> ForceBalance | None:
-    """The balance over segments of so many samples, of which a share moves; None of too few."""
+    """The balance over segments of so many samples; None of too few.
+
+    late    delay of the force [samples];   moving  share of a segment that must be motion
+    level   probability with which noise alone passes for a mass, or for a force that depends on the motion
+    """
     from scipy.stats import f as f_distribution
     from scipy.stats import t
 
@@ -151,7 +154,8 @@ def _balanced(
 
 
 def _alike(motion: Floats) -> list[tuple[int, int]]:
-    """Numbers that follow another: viscous friction backward, and a level in whose direction nothing slid."""
+    """(index, other) of numbers that follow another: viscous friction backward, and dry friction of a direction in
+    which nothing slid. motion (s, c): columns of `NUMBERS`."""
     pairs = [(2, 1)]
     forward, backward = np.any(motion[:, 2] != 0.0), np.any(motion[:, 3] != 0.0)
     return pairs + ([(4, 3)] if not backward else [] if forward else [(3, 4)])
@@ -246,7 +250,10 @@ def reason_of_misfit(
 
 def _turned(windows: Windows, reversed_: Windows, motion: JointMotion, numbers: JointNumbers) -> bool:
     """Whether the force of the whole record falls with the acceleration, and explains the motion with its sign
-    turned."""
+    turned.
+
+    reversed_  the windows with the force's sign turned
+    """
     if not force_balance(windows, motion.resolution).against_mass:
         return False
     some = _some(np.ones(len(windows.first), dtype=bool))
@@ -273,7 +280,7 @@ def _explained(windows: Windows, motion: JointMotion, numbers: JointNumbers) -> 
 
 
 def _some(which: Flags) -> Flags:
-    """Of these windows at most six, evenly spread."""
+    """Which windows (W,) are looked at of these (W,): at most six, evenly spread."""
     places = np.flatnonzero(which)
     kept = places[np.unique(np.linspace(0, len(places) - 1, min(MOST, len(places))).astype(int))]
     return np.isin(np.arange(len(which)), kept)
@@ -297,8 +304,9 @@ FEWEST_COUNTS: Final = 10.0  # steps of the encoder
 FEWEST_WINDOWS: Final = 4  # with motion
 ONE_WAY: Final = 0.03  # share of the travel that must go the other way
 STUCK, MOSTLY_STUCK = 0.97, 0.6  # share of the windows in which nothing moves
+# units in which a position may be recorded by mistake, and how many times larger its numbers are then
 SLIPS: Final = (("degrees", 180.0 / np.pi), ("a thousandth of the unit", 1000.0), ("a millionth of it", 1e6))
-SLIP: Final = 0.1  # by which a ratio may miss that of two units
+SLIP: Final = 0.1  # relative difference of a ratio from one of these
 FAR: Final = 20.0  # times the drive's largest torque: no command, but another unit
 LONGEST: Final = 5.0  # m, of a travel
 MOST_TURNS: Final = 1000.0  # rad, of a motor's travel
@@ -374,7 +382,7 @@ def check_units(motion: JointMotion, joint: Joint) -> Check:
 
 
 def _slip(ratio: float, *, angular: bool) -> str:
-    """The unit that a ratio of two steps is that of; "" where it is none."""
+    """Unit in which readings seem to be, by the ratio of their step to the file's; "" where it is no such unit."""
     for name, factor in SLIPS:
         if (name == "degrees") <= angular and abs(ratio / factor - 1.0) < SLIP:
             return name
@@ -436,7 +444,10 @@ def check_amount(windows: Windows) -> Check:
 
 
 def travels(windows: Windows, resolution: float) -> tuple[float, float]:
-    """Travel forward and backward in all windows, without what moves by less than two steps [m or rad]."""
+    """Travel forward and backward in all windows, without what moves by less than two steps [m or rad].
+
+    resolution  a step [m or rad]
+    """
     forward = backward = 0.0
     for first, length in zip(windows.first, windows.length, strict=True):
         y = windows.position[first : first + length]

@@ -91,8 +91,8 @@ def identification(
     """What was fitted of a joint as a result."""
     time, measured, predicted = fitted.unseen_motion
     velocity, friction = friction_points(fitted)
-    v = fitted.fit.numbers.values
-    lines = np.array([[v[3], v[1]], [v[4], v[2]]])
+    _, viscous_forward, viscous_backward, dry_forward, dry_backward, *_ = fitted.fit.numbers.values
+    lines = np.array([[dry_forward, viscous_forward], [dry_backward, viscous_backward]])
     lines[[not fitted.forward, not fitted.backward]] = np.nan
     position = fitted.joint.position
     remarks, details = remarks_of(fitted)
@@ -119,7 +119,10 @@ def identification(
 def _estimate(
     fitted: FittedJoint, name: str, quantity: str, weights: Any, *, key: str = "", least: float = -np.inf
 ) -> Estimate:
-    """A sum over the numbers as an estimate, in the file's key where it has one; no less than `least`."""
+    """A sum over the numbers, weights (10,), as an estimate, in the file's key where it has one.
+
+    quantity  that `Joint.unit` names;   key  of `Joint.paths`;   least  value below which it is not given
+    """
     value, low, high = fitted.interval(np.asarray(weights, dtype=float))
     path, factor = fitted.joint.paths.get(key, ("", 1.0))
     unit = fitted.joint.unit(quantity)
@@ -190,7 +193,7 @@ def untold_mass(fitted: FittedJoint) -> str:
 
 
 def usual_speed(fitted: FittedJoint, side: float) -> float:
-    """Median speed at which the joint slides to a side, in the fitted windows [m/s or rad/s]."""
+    """Median speed at which the joint slides to a side, 1 forward or -1, in the fitted windows [m/s or rad/s]."""
     windows, resolution = fitted.fit.windows, fitted.motion.resolution
     speeds = list[Floats]()
     for first, length, T in zip(windows.first, windows.length, windows.period, strict=True):
@@ -275,7 +278,7 @@ def check_drift(fitted: FittedJoint) -> list[Check]:
     """Whether the bias drifts: a warning, or nothing."""
     if not {*DRIFTS} & {*fitted.fit.numbers.free}:
         return []
-    value, low, high = fitted.fit.interval(ONE[DRIFTS[0]] + 2.0 * ONE[DRIFTS[2]])
+    value, low, high = fitted.fit.interval(ONE[DRIFTS[0]] + 2.0 * ONE[DRIFTS[2]])  # growth, see `Windows.drifts`
     unit = fitted.joint.unit("force") if not fitted.unit_mass else f"{fitted.joint.unit('position')}/s²"
     ends = f"{low:.3g} to {high:.3g}" if isfinite(high) else "without bounds"
     return [

@@ -278,9 +278,10 @@ def _limited(motion: JointMotion, joint: Joint) -> JointMotion:
 
 
 def _numbers(motion: JointMotion, forward: bool, backward: bool, mass: float, spring: bool) -> JointNumbers:
-    """Which numbers are fitted: those of a direction only where the joint slides so."""
+    """The numbers to begin with, 0 but for the mass, and which are fitted: friction of a direction only where the
+    joint slides so, else it is tied to the other direction's."""
     free: tuple[int, ...] = (MASS, DELAY) if motion.driven else ()
-    free += (1, 3) if forward else ()
+    free += (1, 3) if forward else ()  # viscous and dry friction
     free += (2, 4) if backward else ()
     free += (STIFFNESS, DRIFTS[0]) if spring else (DRIFTS[0],)
     tied = () if forward and backward else ((2, 1), (4, 3)) if forward else ((1, 2), (3, 4))
@@ -288,12 +289,12 @@ def _numbers(motion: JointMotion, forward: bool, backward: bool, mass: float, sp
 
 
 def _unseen(windows: Windows) -> Flags:
-    """Every third window."""
+    """Which windows (W,) are kept for validation: every third."""
     return np.asarray(np.arange(len(windows.first)) % UNSEEN == UNSEEN - 1)
 
 
 def _mean_square(fit: JointFit, motion: JointMotion) -> float:
-    """Usual square of what remains, at least that of the noise."""
+    """Median of the windows' mean squared residuals, at least that of the readings' noise [m² or rad²]."""
     edges = np.cumsum(fit.windows.length) - fit.windows.length
     means = np.add.reduceat(fit.residuals**2, edges) / fit.windows.length
     return max(float(np.median(means)), motion.deviation**2)
@@ -302,7 +303,11 @@ def _mean_square(fit: JointFit, motion: JointMotion) -> float:
 def _fit(
     windows: Windows, motion: JointMotion, numbers: JointNumbers, spring: bool | None
 ) -> tuple[JointFit, tuple[float, ...]]:
-    """The fit, without windows that follow no such model, and with a spring where there is one."""
+    """The fit without windows that follow no such model, and with a spring where there is one; and the times of
+    the windows that were left out [s].
+
+    spring  whether one acts; None: where the data show one
+    """
     seen = windows.chosen(~_unseen(windows))
     guess, starts = search_guess(seen, numbers, motion.resolution, motion.deviation)
     fit = fit_joint(seen, guess, starts)
@@ -325,8 +330,8 @@ def _fit(
 
 
 def not_shown(fit: JointFit, numbers: Sequence[int]) -> list[int]:
-    """Those of some numbers that the data do not tell from 0, by Student's test, a bent drift together with its
-    even part.
+    """Indices of those among some numbers that the data do not tell from 0, by Student's test, a bent drift
+    together with its even part.
 
     Of two that look alike, as a spring and a drift do where the joint creeps one way, neither need be shown by
     itself, and one of them is there all the same: both are kept where 0 for both of them is as unlikely, by the F
@@ -355,7 +360,7 @@ def not_shown(fit: JointFit, numbers: Sequence[int]) -> list[int]:
 
 
 def _no_minimum(fit: JointFit) -> Check:
-    """What failed where the search has not ended: intervals hold about the best numbers only."""
+    """The failed check of a search that has not arrived, as intervals hold about the best numbers only."""
     count = len(fit.windows.first)
     return Check(
         "search",
@@ -367,7 +372,10 @@ def _no_minimum(fit: JointFit) -> Check:
 
 
 def _check_model(fitted: FittedJoint, windows: Windows, numbers: JointNumbers, records: Sequence[Record]) -> Check:
-    """That one mass with friction predicts the windows that were not fitted; else why not."""
+    """Check that one mass with friction predicts the windows that were not fitted; else say why not.
+
+    windows  all of them;   numbers  which are fitted
+    """
     count = len(windows.first)
     text = f"{100.0 * max(fitted.explained, 0.0):.4g} % of the motion in unseen windows is predicted"
     times = ", ".join(f"{t:.4g}" for t in sorted(fitted.outlying)[:5])

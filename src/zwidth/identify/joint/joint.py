@@ -40,8 +40,8 @@ class Joint:
     step        of its encoder [m or rad]; nan where not known
     limit       largest force or torque that its drive gives; inf where there is none
     lower, upper  ends of its travel; infinite where there are none
-    mass        that the file says is moved; nan where it says none
-    paths       quantity -> path in the device file, and by what the number at the joint is multiplied there
+    mass        or inertia that the file says is moved [kg or kg m²]; nan where it says none
+    paths       quantity -> path in the device file, and factor from the number at the joint to the one there
     remarks     sentences about what the numbers mean
     """
 
@@ -68,16 +68,16 @@ class Joint:
 
     @property
     def command(self) -> str:
-        """Column of a commanded one."""
+        """Column of a commanded force or torque."""
         return "torque_command_Nm" if self.angular else "force_command_N"
 
     @property
     def mass_name(self) -> str:
-        """What resists acceleration."""
+        """Name, for people, of what resists acceleration."""
         return "effective inertia" if self.angular else "effective mass"
 
     def unit(self, quantity: str) -> str:
-        """In words, of "mass", "damping", "force", "stiffness" or "position"."""
+        """Unit in words of "mass", "damping", "force", "stiffness" or "position"."""
         return (ANGULAR if self.angular else LINEAR)[quantity]
 
     def force_column(self, record: Record) -> tuple[str, float]:
@@ -166,8 +166,9 @@ def _of_plant(device: Device, name: str | None) -> Joint:
 def _of_single_coordinate(plant: Plant, document: dict[str, Any], step: float, limit: float) -> Joint:
     """Give the joint of a plant of one coordinate: its mass at the encoder [kg], and the paths of its numbers.
 
-    step, limit  of the encoder [m]; largest force [N]
+    document     of the device file;   step, limit  of the encoder [m]; largest force [N]
     """
+    # the file's numbers are those of the coordinate q: position s q at the encoder, force a f on the coordinate
     s, a = float(plant.sensor[0]), float(plant.actuator[0])
     numbers = table(document, "plant")
     ends = {
@@ -191,27 +192,29 @@ def _of_single_coordinate(plant: Plant, document: dict[str, Any], step: float, l
     )
 
 
-def _path(member: LegMember, key: str, document: dict[str, Any]) -> str:
+def _path_in_file(member: LegMember, key: str, document: dict[str, Any]) -> str:
+    """Path of a key of a link or drive in the device file: "mechanism.drives.shoulder.coulomb_Nm"."""
     return dotted(("mechanism", *member.path, key), document)
 
 
 def _link_paths(link: LegMember, document: dict[str, Any], ratio: float) -> dict[str, tuple[str, float]]:
-    """Keys of a joint's own damper and spring; numbers at the motor are larger there by the ratio's square."""
+    """`Joint.paths` of a joint's own damper and spring; from numbers at the motor (ratio, not 1) by its square."""
     along = link.entry.get("joint") == "prismatic"
     damping, stiffness = ("Ns_per_m", "N_per_m") if along else ("Nms_per_rad", "Nm_per_rad")
     return {
-        "damping": (_path(link, f"joint_damping_{damping}", document), ratio**2),
-        "stiffness": (_path(link, f"joint_stiffness_{stiffness}", document), ratio**2),
+        "damping": (_path_in_file(link, f"joint_damping_{damping}", document), ratio**2),
+        "stiffness": (_path_in_file(link, f"joint_stiffness_{stiffness}", document), ratio**2),
     }
 
 
 def _at_motor(device: Device, index: int, drive: LegMember, links: dict[str, LegMember]) -> Joint:
+    """The joint read at the shaft of a drive's motor, with its numbers there; the drive's index, links by name."""
     assert device.mechanism is not None
     drives, entry = device.mechanism.drives, drive.entry
     name, link = entry["name"], links[entry["joint"]]
     ratio = float(np.asarray(drives.transmission)[..., index])
     counts = float(np.asarray(drives.encoder_counts)[..., index])
-    paths = {"coulomb": (_path(drive, "coulomb_Nm", device.document), 1.0)}
+    paths = {"coulomb": (_path_in_file(drive, "coulomb_Nm", device.document), 1.0)}
     remarks = [
         f"all numbers are those at the shaft of motor '{name}': angle and torque of the motor, not of the joint"
     ]
@@ -231,13 +234,15 @@ def _at_motor(device: Device, index: int, drive: LegMember, links: dict[str, Leg
         per_ampere=float(np.asarray(drives.torque_constant)[..., index]),
         step=2.0 * pi / counts if counts > 0.0 else nan,
         limit=float(np.asarray(drives.torque_limit)[..., index]),
-        mass=_moved(device, index),
+        mass=_inertia_at_motor(device, index),
         paths=paths,
         remarks=tuple(remarks),
     )
 
 
 def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMember]]) -> Joint:
+    """The joint read at a link itself, with the numbers of the motor that turns it (index and drive by name)
+    reflected there. Raises DeviceError for a joint that neither turns nor slides."""
     entry, document = link.entry, device.document
     name, kind = entry["name"], entry.get("joint")
     if kind not in ("revolute", "prismatic"):
@@ -246,7 +251,8 @@ def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMe
         )
     angular = kind == "revolute"
     lower, upper = entry.get("limits_rad" if angular else "limits_m", (-inf, inf))
-    paths = {"coulomb": (_path(link, "joint_coulomb_Nm" if angular else "joint_coulomb_N", document), 1.0)}
+    coulomb = "joint_coulomb_Nm" if angular else "joint_coulomb_N"
+    paths = {"coulomb": (_path_in_file(link, coulomb, document), 1.0)}
     paths |= _link_paths(link, document, 1.0)
     numbers: dict[str, float] = {}
     remarks = [f"all numbers are those of joint '{name}' itself, rotor and links reflected there"]
@@ -261,9 +267,9 @@ def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMe
             "per_ampere": ratio * float(np.asarray(of.torque_constant)[..., index]),
             "step": 2.0 * pi / counts / ratio if counts > 0.0 else nan,
             "limit": ratio * float(np.asarray(of.torque_limit)[..., index]),
-            "mass": ratio**2 * _moved(device, index),
+            "mass": ratio**2 * _inertia_at_motor(device, index),
         }
-        numbers = {key: value for key, value in numbers.items() if value == value}
+        numbers = {key: value for key, value in numbers.items() if value == value}  # without nan
         if drive.entry.get("coulomb_Nm"):
             remarks.append(
                 f"what was identified includes coulomb_Nm of motor '{drive.entry['name']}'; remove it there"
@@ -279,7 +285,7 @@ def _at_link(device: Device, link: LegMember, drives: dict[str, tuple[int, LegMe
     )
 
 
-def _moved(device: Device, index: int) -> float:
+def _inertia_at_motor(device: Device, index: int) -> float:
     """Inertia at the shaft of a motor by the file, all other drives standing [kg m²]; nan where it gives none."""
     from zwidth.errors import PostureError
 

@@ -19,7 +19,7 @@ MOST_TURNS: Final = 8  # reversals within one part of an interval; more are thos
 def flow(
     mass: float, damping: float, stiffness: float, h: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Transition of position and velocity over h, and what a unit force held meanwhile adds to them.
+    """Transition of position and velocity over a time h [s], and what a unit force held meanwhile adds to them.
 
     m x'' + b x' + k x = f;  exp(A h) by its series after halving h, which is exact for any sign and size of b and
     k, joined again by squaring.
@@ -61,7 +61,8 @@ def flow(
 def turning_time(
     mass: float, damping: float, stiffness: float, push: float, x: float, v: float, h: float, guess: float
 ) -> float:
-    """When, within h, the velocity v becomes 0 under a constant push: Newton's method kept within a bracket."""
+    """Time from 0 to h [s] at which the velocity becomes 0, from position x and velocity v at 0, under a constant
+    push (the force less dry friction): Newton's method from a guess, kept within a bracket."""
     low, high, t = 0.0, h, guess
     for _ in range(60):
         p11, p12, p21, p22, g1, g2 = flow(mass, damping, stiffness, t)
@@ -84,7 +85,11 @@ def turning_time(
 
 @compiled_lean
 def direction_of(x: float, v: float, force: float, numbers: Floats) -> int:
-    """Direction in which the joint slides: 1 or -1, and 0 where its friction holds it."""
+    """Direction in which the joint slides at position x and velocity v: 1 forward, -1 backward, 0 where dry
+    friction holds it against the force.
+
+    numbers  (6,) as in `after_part`: [3] and [4] dry friction forward and backward, [5] the spring's stiffness
+    """
     if v > 0.0:
         return 1
     if v < 0.0:
@@ -97,9 +102,9 @@ def direction_of(x: float, v: float, force: float, numbers: Floats) -> int:
 
 @compiled_lean
 def after_part(x: float, v: float, force: float, h: float, numbers: Floats, steps: Floats) -> tuple[float, float]:
-    """Position and velocity after a part of an interval, h long, under a constant force.
+    """Position and velocity, from x and v, after a part of an interval, h long [s], under a constant force.
 
-    numbers  (6,)    m, b forward and backward, F forward and backward, k
+    numbers  (6,)    m, b forward and backward, F forward and backward, k, as in `follow_windows`
     steps    (2, 6)  `flow` over h, forward and backward
     """
     left = h

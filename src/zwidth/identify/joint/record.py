@@ -29,7 +29,8 @@ STANDING: Final = 3.0  # steps within which a window that stands moves
 class RecordSection:
     """Consecutive samples without a gap.
 
-    time of the first [s];  period [s];  record, run  numbers of the record, and of the stretch over all records
+    time, period  of the first sample [s]; sampling period [s]
+    record, run   numbers of the record, and of the stretch over all records
     position, force, command  (n,); force of zeros where nothing drives, command empty where there is none
     """
 
@@ -73,7 +74,7 @@ class JointMotion:
 
     @property
     def time(self) -> Floats:
-        """Time of each reading [s]."""
+        """Time of each reading (n,), all sections one behind the other [s]."""
         return np.concatenate([one.time + one.period * np.arange(len(one.position)) for one in self.sections])
 
     @property
@@ -83,12 +84,12 @@ class JointMotion:
 
     @property
     def positions(self) -> Floats:
-        """All readings that are kept."""
+        """All readings (n,) that are kept [m or rad]."""
         return np.concatenate([one.position for one in self.sections])
 
     @property
     def forces(self) -> Floats:
-        """All forces that are kept."""
+        """All forces (n,) that are kept [N or N m]."""
         return np.concatenate([one.force for one in self.sections])
 
 
@@ -136,7 +137,10 @@ def read_motion(records: Sequence[Record], samplings: Sequence[SampleTimes], joi
 
 
 def planned_sections(runs: Ints, total: int) -> list[tuple[int, int, int]]:
-    """First row, the one behind the last, and the stretch of each section that is kept of one record."""
+    """First row, the one behind the last, and the number of the stretch, of each section that is kept of a record.
+
+    runs   (s, 2) first row, and the one behind the last, of its stretches;   total  samples of all records
+    """
     long = [(int(a), int(b), n) for n, (a, b) in enumerate(runs) if b - a >= FEWEST + BEFORE]
     if total <= MOST:
         return long
@@ -158,6 +162,7 @@ def noise_of(sections: Sequence[RecordSection]) -> float:
     instants at which the force jumps.
     """
     sixths = np.concatenate([np.diff(one.position, 6) for one in sections])
+    # 0.6745: median of |x| of normal numbers of variance 1; 924: variance of their sixth differences
     return float(np.median(np.abs(sixths)) / (0.6745 * np.sqrt(924.0))) if len(sixths) else 0.0
 
 
@@ -185,6 +190,7 @@ def _bend(y: Floats) -> float:
 
 
 def _cut(motion: JointMotion, length: int) -> Windows:
+    """All sections cut into windows of about `length` samples; first samples are left for a force that is late."""
     first, lengths, period, time, run = list[int](), list[int](), list[float](), list[float](), list[int]()
     row, before = 0, BEFORE if motion.driven else 0
     for one in motion.sections:

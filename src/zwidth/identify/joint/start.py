@@ -10,15 +10,26 @@ from typing import Final
 import numpy as np
 
 from zwidth.arrays import Floats, Ints
-from zwidth.identify.joint.fit import MASS, STIFFNESS, JointNumbers, Windows, approach, bounded, predict, scales
+from zwidth.identify.joint.fit import (
+    DRY,
+    MASS,
+    STIFFNESS,
+    VISCOUS,
+    JointNumbers,
+    Windows,
+    approach,
+    bounded,
+    predict,
+    scales,
+)
 
 SHORTEST: Final = 12  # samples of a weighting function
 MOVING: Final = 0.7  # share of it that must be motion
-PARTS: Final = (8, 2, 1)
-TRIES: Final = 3
-OUTLYING: Final = 9.0
 PARTLY: Final = 0.2  # the same where nothing moves for longer
-FEWEST_ROWS: Final = 8
+PARTS: Final = (8, 2, 1)  # into which windows are cut, search after search
+TRIES: Final = 3  # of other starts for windows that are badly predicted
+OUTLYING: Final = 9.0  # times the median of the windows' mean squares, above which a window is badly predicted
+FEWEST_ROWS: Final = 8  # segments of a balance
 GOOD: Final = 1.5  # times the noise, that the right numbers leave
 LEVELS: Final = (0.3, 0.6, 0.85)  # shares of the forces below which a joint may stand
 MOST_GUESSES: Final = 8
@@ -28,7 +39,7 @@ DELAYS: Final = (0, 1, 2, 3, 4, 5)  # samples
 
 @dataclass(frozen=True)
 class Guess:
-    """A first guess.
+    """A first guess of a joint's numbers, by a weighted balance of forces.
 
     values     (10,) as `fit.JointNumbers` has them
     explained  share of the weighted force that is explained
@@ -62,7 +73,8 @@ def weighted_balance(
 
 
 def force_balance_rows(windows: Windows, size: int, step: float, moving: float) -> tuple[Floats, Ints, Floats]:
-    """The motion's side of `weighted_balance`: its rows (s, 5), their samples (s, size), and periods (s,) [s]."""
+    """The motion's side of `weighted_balance`: its rows (s, 5), the samples (s, size) of each, and its sampling
+    period (s,) [s]."""
     weight, slope, bend = weighting(size)
     reach = max(size // 8, 1)
     starts = [
@@ -104,7 +116,7 @@ def first_guess(
 ) -> Guess | None:
     """The numbers that balance the weighted forces best, over delays of the force; None of too few segments.
 
-    Of free motion all numbers are those over the mass.
+    Of free motion all numbers are those over the mass. size, step and moving as in `weighted_balance`.
     """
     delays = DELAYS if windows.driven else DELAYS[:1]
     A, forces = weighted_balance(windows, size, step, delays, moving)
@@ -119,6 +131,8 @@ def first_guess(
 
 
 def _balanced(A: Floats, f: Floats, driven: bool, delay: float) -> Guess:
+    """The guess by least squares of forces f (s,) by rows A (s, c) of m, b, F forward and backward, perhaps k, all
+    over the mass and without m where nothing drives; with this delay of the force [s]."""
     norms = np.linalg.norm(A, axis=0)
     used = norms > 0.0
     scaled = A[:, used] / norms[used]
@@ -193,7 +207,8 @@ def search_guess(
 def _followed(
     windows: Windows, short: Windows, begun: tuple[JointNumbers, Floats, Floats]
 ) -> tuple[JointNumbers, Floats, Floats]:
-    """From short windows to the whole ones; windows that are badly predicted then begin anew."""
+    """Follow numbers, starts and sums of squares from short windows to the whole ones; windows that are badly
+    predicted then begin anew."""
     numbers, starts, squares = begun
     before = short
     for parts in PARTS[1:]:
@@ -224,14 +239,14 @@ def _guesses(windows: Windows, numbers: JointNumbers, step: float) -> Iterator[J
     for given in values or [np.eye(len(sizes))[MASS] * sizes]:
         one = given[: len(numbers.values)].copy()
         one[MASS] = max(one[MASS], 1e-3 * sizes[MASS])
-        one[1:3] = np.maximum(one[1:3], 0.0)
-        one[3:5] += max(-0.5 * float(np.sum(one[3:5])), 0.0)
+        one[VISCOUS] = np.maximum(one[VISCOUS], 0.0)
+        one[DRY] += max(-0.5 * float(np.sum(one[DRY])), 0.0)  # their mean is not below 0
         yield numbers.with_free(bounded(one, windows)[list(numbers.free)])
 
 
 def _in_bursts(windows: Windows, share: float) -> Floats:
-    """Numbers of a joint that stands until the force is above this share of all forces, and then moves in bursts
-    of half a period of the force."""
+    """Numbers (10,) of a joint that stands until the force is above this share of all forces, and then moves in
+    bursts of half a period of the force."""
     sizes = np.abs(windows.force[windows.rows])
     level, most = float(np.quantile(sizes, share)), float(np.max(sizes))
     signs = np.sign(windows.force[windows.rows] - np.mean(windows.force[windows.rows]))

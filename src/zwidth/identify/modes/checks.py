@@ -1,11 +1,10 @@
-"""What a record must be before modes are fitted to it, each said with what was seen.
+"""Checks of a record before modes are fitted to it, each said with what was seen.
 
-Whether the response hangs on the amplitude, as that of a device with friction does.
-
-Coulomb friction f_c on a motion of amplitude X at w takes the energy of a damper 4 f_c/(pi w X), and at motions so
+`amplitude_check`: whether the response hangs on the amplitude, as that of a device with friction does. Coulomb
+friction f_c on a motion of amplitude X at w takes the energy of a damper 4 f_c/(pi w X), and at motions so
 small that it sticks it is a spring. Both fall as the amplitude rises, which tells them from a damper and a spring.
 
-Whether a response tells anything of the hand that holds the device.
+`hand_check`: whether a response tells anything of the hand that holds the device.
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ def _saturation_check(source: Source, levels: Levels, limit: float) -> Check:
 
 
 def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
-    """Which lines are excited, and whether they are enough."""
+    """Check that enough lines are excited; and which (n,) are."""
     power = spectra.power("force")
     excited = power > EXCITED * max(float(power.max(initial=0.0)), 1e-300)
     f = spectra.frequency[excited]
@@ -121,7 +120,11 @@ def force_excitation_check(spectra: Spectra, label: str) -> tuple[Check, Flags]:
 
 
 def coherence_check(spectra: Spectra, excited: Flags, closed: bool) -> tuple[Check, float]:
-    """Above which frequency the coherence has collapsed for good [Hz], inf where it has not."""
+    """Check that the position follows the force (closed: the reference); and the frequency above which the
+    coherence has collapsed for good [Hz], inf where it has not.
+
+    excited  (n,) lines with force
+    """
     into = "reference" if closed else "force"
     coherence = np.where(excited, spectra.coherence(into, "position"), 0.0)
     smooth = np.convolve(coherence, np.ones(9) / 9.0, mode="same") if len(coherence) > 20 else coherence
@@ -160,7 +163,11 @@ def slope_of(spectra: Spectra) -> tuple[float, float]:
 
 
 def order_check(slope: float, ratio: float, names: tuple[str, str]) -> Check:
-    """Whether force and position are not swapped: a response falls over frequency, its inverse rises."""
+    """Check that force and position, columns `names`, are not swapped: a response falls over frequency, its
+    inverse rises.
+
+    slope, ratio  of `slope_of`
+    """
     swapped = slope > RISING and ratio > 4.0
     reason = f"the response goes with frequency to the power {slope:.2g}"
     if swapped:
@@ -169,7 +176,7 @@ def order_check(slope: float, ratio: float, names: tuple[str, str]) -> Check:
 
 
 def feedback_check(force: Floats, position: Floats, period: float, free: bool) -> Check:
-    """Whether the force does not follow the position, as that of a centring spring does.
+    """Check that the force does not follow the position, as that of a centring spring does.
 
     Where nothing else excites the device, such a force leaves U/Y = -k, whatever the device is: a constant,
     against the position. No device without feedback has this at the lowest frequencies: a free mass has -m w^2,
@@ -199,9 +206,11 @@ def feedback_check(force: Floats, position: Floats, period: float, free: bool) -
 def sign_and_unit_checks(
     spectra: Spectra, excited: Flags, value: Complexes, own: Complexes, turns: bool
 ) -> list[Check]:
-    """The response against that of the device as its file has it: its sign, and whether the units are plausible.
+    """Check the response (n,) against that of the device as its file has it: its sign, and whether the units are
+    plausible.
 
-    own  (n,) response of the device at the spectra's frequencies
+    excited  (n,) lines with force;   value  (n,) response [m/N]
+    own      (n,) response of the device at the spectra's frequencies;   turns  under a torque
     """
     coherence = spectra.coherence("force", "position")
     good = np.flatnonzero(excited & (coherence > TRUSTED) & (np.abs(value) > 0.0))
@@ -237,7 +246,7 @@ def sign_and_unit_checks(
 
 
 def flip_check(gains: Sequence[tuple[str, float]]) -> Check:
-    """Whether stretches of a record, and records, have one sign.
+    """Check that stretches of a record, and records, have one sign.
 
     gains  what each stretch is, and how many times as far as by the first one's response it moves
     """
@@ -257,7 +266,7 @@ def flip_check(gains: Sequence[tuple[str, float]]) -> Check:
 
 
 def shift_check(low: float, high: float, misfit: float) -> Check:
-    """Whether the position does not move before the force is commanded.
+    """Check that the position does not move before the force is commanded.
 
     low, high  interval of the delay [samples]
     misfit     of the modes it is from, in standard deviations: where they do not explain the response, as that of
@@ -275,7 +284,7 @@ def shift_check(low: float, high: float, misfit: float) -> Check:
 
 
 def resolution_check(fit: ModalFit, line: float) -> Check:
-    """Whether each resonance is wider than what a stretch tells apart, `line` [Hz]."""
+    """Check that each resonance is wider than what a stretch tells apart, twice the distance `line` [Hz]."""
     f, width = fit.rates / (2.0 * np.pi), 2.0 * fit.ratios * fit.rates / (2.0 * np.pi)
     narrow = np.flatnonzero(width < 2.0 * line)
     if not len(f):
@@ -339,6 +348,8 @@ def amplitude_check(
 def _friction(a: RecordResponse, b: RecordResponse, known: Flags, force_a: float, force_b: float) -> float:
     """Coulomb friction [N] by which two sine sweeps of unlike force differ, by least squares.
 
+    a, b  their responses;   known  bands of both;   force_a, force_b  amplitudes F [N]
+
     |1/P_a| - |1/P_b| along the direction of i z^d:   Im (1/P_a - 1/P_b) = 4 f_c/pi (1/X_a - 1/X_b),  X = |P| F
     """
     Pa, Pb = a.value[known], b.value[known]
@@ -352,7 +363,7 @@ SEEN: Final = 25.0  # sum of squares, in the noise's variances, by which the han
 
 
 def hand_check(data: RecordResponse, model: SampledModel, point: OperatingPoint) -> Check:
-    """Whether the hand changes the response by more than the noise: what a hand as in the file does to it."""
+    """Check that a hand as in the file changes the response by more than the noise."""
     alone = sampled_response(without_hand(point), data.theta)
     held = model.response(model.vector(model.start), data.theta)
     seen = float(np.sum(data.apply(held - alone) ** 2))

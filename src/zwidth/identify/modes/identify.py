@@ -2,9 +2,8 @@
 
 Noise, a sweep, a multisine or steps: whatever moves the device over the frequencies of its resonances. What is
 fitted is the response of the device's own sampled loop, with hold, delay and lag, to the lines of the record's
-transform, in which nothing leaks (`modes_local`); Welch's averaged spectra are for the checks and the figure.
-
-The part of the records that is fitted, and the part that the fit is validated on, in bands about the poles.
+transform, in which nothing leaks (`local_response`); Welch's averaged spectra are for the checks and the figure.
+`FittedData` parts the records into what is fitted and what the fit is validated on, in bands about the poles.
 """
 
 from __future__ import annotations
@@ -122,7 +121,7 @@ def identify_modes(
     if result := refused("modes", device.label, checks):
         return result
     survey = survey_of(sources, segment, progress)
-    seen = _saw(device, point, sources, survey, estimator)
+    seen = _check_survey(device, point, sources, survey, estimator)
     checks += seen.checks
     if result := refused("modes", device.label, checks):
         return result
@@ -145,6 +144,7 @@ def identify_modes(
 def _check_options(
     device: Device, records: Sequence[Record], fitted: str, estimator: str | None, segment: int | None
 ) -> None:
+    """Raise DeviceError for options of `identify_modes` that are not allowed, or do not go with the columns."""
     if not records:
         raise fail(device.label, "records", "are none; give at least one")
     if fitted not in get_args(Fitted):
@@ -166,6 +166,7 @@ def _check_options(
 
 
 def _sources(device: Device, point: OperatingPoint, records: Sequence[Record]) -> tuple[list[Source], list[Check]]:
+    """The records with a regular sampling as sources, kept in memory where they are short; the check of each."""
     sources, checks = list[Source](), list[Check]()
     for record in records:
         sampling, check = check_sampling(record, point.loop.period)
@@ -182,7 +183,10 @@ def _sources(device: Device, point: OperatingPoint, records: Sequence[Record]) -
 
 @dataclass(frozen=True)
 class _Seen:
-    """The checks of the survey, the response by averaged spectra, and the highest frequency to use [Hz]."""
+    """The checks of the survey, and the response (n,) [m/N] by averaged spectra, with its estimator and coherence.
+
+    excited  (n,) lines with force;   top  highest frequency to use [Hz]
+    """
 
     checks: list[Check]
     estimator: str
@@ -192,11 +196,10 @@ class _Seen:
     top: float
 
 
-def _saw(
+def _check_survey(
     device: Device, point: OperatingPoint, sources: Sequence[Source], survey: Survey, estimator: Estimator | None
 ) -> _Seen:
-    """Checks of each record before anything is fitted (levels, excitation, steps of the encoder, force limits),
-    and what of it may be fitted."""
+    """Check levels, excitation, feedback and units of the records, and say up to which frequency to fit them."""
     checks = _checks_of_levels(device, point, sources, survey.levels)
     nothing = np.zeros(0)
     closed = bool(sources[0].channels.reference)
@@ -260,6 +263,7 @@ def _feedback_or_reference(point: OperatingPoint, loudest: Stretch, period: floa
 
 
 def _input_check(channels: Channels) -> Check:
+    """Say which column is taken for the command; always passed."""
     if channels.measured:
         text = f"the response is from {channels.force}, what was commanded; {channels.measured} was measured"
     else:
@@ -268,9 +272,6 @@ def _input_check(channels: Channels) -> Check:
             f"command_{channels.force.partition('_')[2]} beside it"
         )
     return Check("input", True, text)
-
-
-# --- the fit ----------------------------------------------------------------------------------------------------
 
 
 def _fitted(
@@ -405,6 +406,7 @@ def _damping_remark(difference: float) -> str:
 
 
 def _misfit_check(found: PhysicalFit, numbers: SampledModel, response: RecordResponse, period: float) -> Check:
+    """Warn that the device's model leaves more than the noise, and near which frequency most; period [s]."""
     own = numbers.response(found.fit.values, 2.0 * np.pi * response.middle * period)
     off = np.abs(own - response.value) / response.deviation
     worst = float(response.middle[int(np.nanargmax(off))])
@@ -443,7 +445,10 @@ ALMOST: Final = 0.9995  # of half the sampling rate, up to which is fitted
 
 @dataclass
 class FittedData:
-    """The records as lines of transforms, a part of them for the fit, the rest for the validation."""
+    """The records as lines of transforms, a part of them for the fit, the rest for the validation.
+
+    top  highest frequency [Hz];   noise  by which lines weigh, None: alike;   dropped  records that are not used
+    """
 
     sources: Sequence[Source]
     survey: Survey
@@ -454,10 +459,12 @@ class FittedData:
 
     @property
     def period(self) -> float:
+        """Sampling period [s]."""
         return self.sources[0].sampling.period
 
     @property
     def closed(self) -> bool:
+        """Whether a loop centres the device, whose reference is recorded."""
         return bool(self.sources[0].channels.reference)
 
     @property
@@ -473,7 +480,7 @@ class FittedData:
 
     @property
     def _cut(self) -> bool:
-        """Whether the last part of each stretch is."""
+        """Whether the last part of each stretch is for the validation."""
         return self.survey.covered and not self._whole
 
     @property
@@ -514,6 +521,7 @@ class FittedData:
                     self.progress("transforming records", n, self.survey.stretches)
 
     def _lines(self, stretch: Stretch, first: int = 0, last: int | None = None) -> Lines:
+        """Lines of the samples `first` to `last`, this one not included, of a stretch."""
         part = slice(first, last)
         reference = None if stretch.reference is None else stretch.reference[part]
         return transformed(stretch.force[part], stretch.position[part], reference, self.period)

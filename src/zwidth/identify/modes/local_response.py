@@ -41,8 +41,8 @@ LOWEST: Final = (
     128  # lines that are always kept one by one: a free device moves so far there that no polynomial does
 )
 BLOCK: Final = 64  # lines that share a transient where they are kept one by one
-NODES: Final = np.cos((2 * np.arange(TERMS) + 1) * np.pi / (2 * TERMS))
-TO_LEGENDRE: Final = np.linalg.inv(legendre.legvander(NODES, DEGREE))
+NODES: Final = np.cos((2 * np.arange(TERMS) + 1) * np.pi / (2 * TERMS))  # Chebyshev's, in a band from -1 to 1
+TO_LEGENDRE: Final = np.linalg.inv(legendre.legvander(NODES, DEGREE))  # values there -> Legendre coefficients
 NEIGHBOURS: Final = 300.0  # lines over which the noise is averaged
 EXACT: Final = 1e-18  # of the power: what is taken for noise where a record has none
 ALIKE: Final = 1e-6  # of a ringing column, what must be left of it beside the smooth ones
@@ -68,7 +68,7 @@ class FrequencyBand:
 
     @property
     def middle(self) -> float:
-        """Of the band [Hz]."""
+        """Middle of the band [Hz]."""
         return 0.5 * (self.low + self.high)
 
 
@@ -88,6 +88,7 @@ def bands(
     least = FEWEST * line
 
     def about(start: float, end: float, reach: float = 2.0 * BLOCK * line) -> tuple[complex, ...]:
+        """Poles whose frequency, as sampling folds it, is within `reach` of start to end [Hz]."""
         return tuple(complex(p) for p, at_ in zip(poles, folded, strict=True) if start - reach < at_ < end + reach)
 
     edges = np.arange(low, min(max(singles, LOWEST * line), 0.5 * high), BLOCK * line)
@@ -132,6 +133,7 @@ class BandSums:
     regressors, crossed  (b, 5, 5), (b, 5): X^H X and X^H Y where there is a reference
     power                (b,) |Y|^2 projected; where lines are single, what no smooth P leaves of it
     lines                (b,) number of lines, less those that the transients, and that P, take
+    rows                 of single lines: band, target (r,), frequencies (m,) [Hz], matrix (r, m) from P to target
     """
 
     information: Complexes
@@ -145,7 +147,7 @@ class BandSums:
 
     @classmethod
     def empty(cls, count: int) -> BandSums:
-        """Nothing yet, of so many bands."""
+        """Sums of nothing yet, for so many bands."""
         square, row = (count, TERMS, TERMS), (count, TERMS)
         return cls(
             np.zeros(square, complex),
@@ -163,6 +165,7 @@ class BandedRecord:
 
     where       the bands
     period      [s]
+    reference   whether the reference stands in for the regressors, as a loop feeds the reading back
     noise       function of frequency [Hz] -> relative power of the noise within a band; lines weigh by its inverse
     """
 
@@ -184,6 +187,7 @@ class BandedRecord:
                 self._add_band(b, band, lines, int(a), int(e))
 
     def _add_band(self, b: int, band: FrequencyBand, lines: Lines, a: int, e: int) -> None:
+        """Add the lines a to e - 1 of a stretch to the sums of band b, the transient projected out."""
         f = lines.frequency[a:e]
         U, Y, R = (part[a:e] for part in (lines.force, lines.position, lines.reference))
         weight = 1.0 / np.sqrt(self.noise(f) / self.noise(band.middle))
@@ -211,7 +215,7 @@ class BandedRecord:
         sums.crossed[b] += X.conj().T @ y
 
     def _add_single(self, b: int, band: FrequencyBand, lines: Lines, a: int, e: int) -> None:
-        """Lines one by one, less what a transient of the pole can be."""
+        """Add the lines a to e - 1 of a stretch to band b one by one, less what transients of its poles can be."""
         if e - a < SMOOTH + 5 + 4 * len(band.poles) or (self.reference and not band.search):
             return  # feedback would bias single lines: they serve to look for the poles alone
         f, U, Y = lines.frequency[a:e], lines.force[a:e], lines.position[a:e]
@@ -233,8 +237,11 @@ class BandedRecord:
         self.sums.lines[b] += max(len(y) - known.shape[1], 0)
 
     def _ringing(self, band: FrequencyBand, frequency: Floats) -> Complexes:
-        """What transients of the poles near a band are at its lines, four columns (n, 4 p) for each pole: of the
-        pole and of its conjugate, and of their squares, as they are not known exactly; two of a real one."""
+        """Transients (n, c) that the poles near a band leave at its lines, frequencies (n,) [Hz].
+
+        Of a pole p in z four columns: 1/(z - p), and its square since p is not known exactly, and both of the
+        conjugate pole; of a real one two.
+        """
         z = np.exp(2j * np.pi * frequency * self.period)
         columns = [np.zeros((len(z), 0), dtype=complex)]
         for p in np.exp(np.array(band.poles, dtype=complex) * self.period):
@@ -245,7 +252,7 @@ class BandedRecord:
 
 
 def _basis(smooth: Floats | Complexes, ringing: Complexes) -> Complexes:
-    """An orthonormal basis (n, r) of smooth columns (n, s) and of ringing ones (n, p).
+    """An orthonormal basis (n, r) of smooth columns (n, s) and of the transients of poles, ringing ones (n, p).
 
     The ringing of a pole far from the lines is smooth among them. Directions in which it is nothing else are left
     out: rounding would choose them.
@@ -301,7 +308,7 @@ class Lines:
         return 2.0 * np.pi * self.period * self.frequency
 
     def where(self, kept: Flags) -> Lines:
-        """Some of the lines."""
+        """The lines for which `kept` (n,) is true."""
         return Lines(
             self.frequency[kept], self.force[kept], self.position[kept], self.reference[kept], self.period
         )
@@ -312,11 +319,11 @@ class Lines:
         return self.where(np.zeros(len(self.frequency), dtype=bool))
 
     def without(self, remainder: int, modulus: int) -> Lines:
-        """All but every modulus-th line."""
+        """All lines but those whose number leaves this remainder."""
         return self.where(np.arange(len(self.frequency)) % modulus != remainder)
 
     def only(self, remainder: int, modulus: int) -> Lines:
-        """Every modulus-th line."""
+        """The lines whose number leaves this remainder: every modulus-th one."""
         return self.where(np.arange(len(self.frequency)) % modulus == remainder)
 
 
@@ -470,7 +477,7 @@ def _solve_band(sums: BandSums, b: int, reference: bool) -> tuple[Complexes, Com
 
 
 def _inverse(matrix: Complexes) -> tuple[Complexes, int]:
-    """Pseudo-inverse of a positive semidefinite matrix, and its rank."""
+    """Pseudo-inverse of a positive semidefinite matrix (5, 5), and its rank."""
     size, axes = np.linalg.eigh(matrix)
     kept = size > WEAKEST * max(float(size[-1]), 0.0)
     if size[-1] <= 0.0:
@@ -481,6 +488,8 @@ def _inverse(matrix: Complexes) -> tuple[Complexes, int]:
 
 def _noise(middle: Floats, rests: Floats, counts: Floats, period: float) -> NoiseCurve:
     """The noise of bands from what is left in them, each averaged over some 300 lines of its neighbours.
+
+    middle  (b,) ascending [Hz];   rests, counts  (b,) power that is left, and lines in which it is
 
     The logarithm of a mean of c exponential powers is by psi(c) - ln c too low, and has the variance 1/c. A slope
     over frequency is followed where it is clear, and goes on below the lowest band.

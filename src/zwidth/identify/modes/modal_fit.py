@@ -70,6 +70,7 @@ class ModalFit:
 
     @property
     def _before(self) -> int:
+        """Entries of `vector` before those of the modes: the delay, and the brake."""
         return 2 if self.base == "free, braked" else 1
 
     @property
@@ -221,12 +222,13 @@ def _on_base(data: RecordResponse, fit: ModalFit, base: str) -> ModalFit:
 
 
 def _first_brake(base: str, data: RecordResponse, period: float) -> list[float]:
+    """Entry ln a of `ModalFit.vector` to begin with, at the lowest angle; [] of a base without a brake."""
     return [float(np.log(data.theta.min() / period))] if base == "free, braked" else []
 
 
 def _with_mode(data: RecordResponse, fit: ModalFit) -> list[ModalFit]:
-    """One more mode, where it lowers the sum of squares most, below half the sampling rate and above, which
-    sampling makes look much alike."""
+    """Fits with one more mode, where it lowers the sum of squares most: one below half the sampling rate and one
+    above, which sampling makes look much alike."""
     columns = data.apply(fit.columns(fit.vector, data.theta))
     q, _ = np.linalg.qr(columns)
     rest = data.target - q @ (q.T @ data.target)
@@ -238,7 +240,7 @@ def _with_mode(data: RecordResponse, fit: ModalFit) -> list[ModalFit]:
     gain = np.empty(len(pairs))
     for first in range(0, len(pairs), TRIED):
         part = slice(first, first + TRIED)
-        rows = data.apply(_rows(pairs[part], fit.period, float(fit.vector[0]), data.theta))
+        rows = data.apply(_held_responses(pairs[part], fit.period, float(fit.vector[0]), data.theta))
         rows -= q @ (q.T @ rows)
         size = np.sum(rows**2, axis=0)
         gain[part] = (rest @ rows) ** 2 / np.where(size > 0.0, size, np.inf)
@@ -256,7 +258,7 @@ def _solved(
     damping: Damping = "viscous",
     coupled: bool = False,
 ) -> ModalFit:
-    """The residues that fit best."""
+    """The fit with the residues that explain the response best, for poles and delay of `ModalFit.vector`."""
     columns = data.apply(_columns(base, damping, period, vector, data.theta, coupled))
     size = np.linalg.norm(columns, axis=0)
     size[size == 0.0] = 1.0
@@ -266,11 +268,12 @@ def _solved(
 
 
 def _residuals(data: RecordResponse, fit: ModalFit) -> Callable[[Floats], Floats]:
-    """What is left when the residues are chosen best, as a function of poles and delay (variable projection;
-    Golub and Pereyra 1973)."""
+    """The function from poles and delay, `ModalFit.vector`, to what is left (r,) when the residues are chosen best
+    (variable projection; Golub and Pereyra 1973)."""
     rows_of = _RowsOfColumns(data, fit)
 
     def left(vector: Floats) -> Floats:
+        """The target (r,) less its projection on the columns' rows."""
         rows = rows_of(vector)
         q, _ = np.linalg.qr(rows / np.maximum(np.linalg.norm(rows, axis=0), 1e-300))
         return np.asarray(data.target - q @ (q.T @ data.target))
@@ -279,6 +282,7 @@ def _residuals(data: RecordResponse, fit: ModalFit) -> Callable[[Floats], Floats
 
 
 def _limits(fit: ModalFit, data: RecordResponse) -> tuple[Floats, Floats]:
+    """Bounds of `ModalFit.vector` within which a search stays."""
     T = fit.period
     slowest, fastest = np.log(SLOWEST * data.theta.min() / T), np.log(FOLDED[1] * np.pi / T)
     braked = fit.base == "free, braked"
@@ -290,6 +294,7 @@ def _limits(fit: ModalFit, data: RecordResponse) -> tuple[Floats, Floats]:
 
 
 def _refined(data: RecordResponse, fit: ModalFit) -> ModalFit:
+    """The fit with the poles and the delay, near its own, that explain the response best; modes stay as many."""
     from scipy.optimize import least_squares
 
     low, high = _limits(fit, data)
@@ -404,9 +409,10 @@ def _column(
 ) -> Complexes:
     """Response (n,) of one column behind a delay in samples."""
     if column.velocity:
-        both = _rows([(column.decay, column.squared), column.less], period, delay, theta, column.velocity)
+        pairs = [(column.decay, column.squared), column.less]
+        both = _held_responses(pairs, period, delay, theta, column.velocity)
         return np.asarray(both[:, 0] - both[:, 1])
-    own = _rows([(column.decay, column.squared)], period, delay, theta)[:, 0]
+    own = _held_responses([(column.decay, column.squared)], period, delay, theta)[:, 0]
     if column.loss is not None and aliased is not None:
         own = own + _added_by_loss(*column.loss, aliased)
     return own
@@ -415,7 +421,8 @@ def _column(
 class _RowsOfColumns:
     """Rows (r, c) that a local response makes of a fit's columns, for many choices of poles and delay.
 
-    A search changes one pole at a time: the columns of the others are kept.
+    A search changes one pole at a time: the rows (r,) of the other columns are kept, by column and delay, and
+    `_aliased_hold` of the last delay.
     """
 
     def __init__(self, data: RecordResponse, fit: ModalFit) -> None:
@@ -424,13 +431,15 @@ class _RowsOfColumns:
         self.aliased = dict[float, tuple[Floats, Complexes]]()
 
     def __call__(self, vector: Floats) -> Floats:
+        """Rows (r, c) for poles and delay, `ModalFit.vector`."""
         fit, delay = self.fit, float(vector[0])
         columns = _columns_of(fit.base, fit.damping, fit.period, vector, fit.coupled)
         if len(self.kept) > MOST_KEPT:
             self.kept.clear()
-        return np.column_stack([self._rows(column, delay) for column in columns])
+        return np.column_stack([self._rows_of(column, delay) for column in columns])
 
-    def _rows(self, column: _Column, delay: float) -> Floats:
+    def _rows_of(self, column: _Column, delay: float) -> Floats:
+        """Rows (r,) of one column behind a delay in samples, kept from before where they are."""
         key = column, delay
         if key not in self.kept:
             theta, period = self.data.theta, self.fit.period
@@ -440,10 +449,13 @@ class _RowsOfColumns:
         return self.kept[key]
 
 
-def _rows(
+def _held_responses(
     pairs: Sequence[tuple[float, float]], period: float, delay: float, theta: Floats, velocity: float = 0.0
 ) -> Complexes:
-    """Held responses (n, c) of pairs of a and w^2 behind a delay, as `loop.factor_response` has them."""
+    """Held and sampled responses (n, c) of 1/(s^2 + 2 a s + w^2), of c pairs a, w^2, at angles (n,).
+
+    delay     [samples];   velocity  factor of the velocity, which is given in place of the motion; 0: the motion
+    """
     whole, fraction = split_delay(delay)
     d = (2j * np.sin(0.5 * theta) * np.exp(0.5j * theta))[:, None]
     z = 1.0 + d
@@ -457,8 +469,8 @@ def _rows(
 
 
 def _aliased_hold(period: float, delay: float, theta: Floats) -> tuple[Floats, Complexes]:
-    """Rates (n, k) that sampling folds onto angles (n,), and the held and delayed response of 1 at each of them,
-    over the period."""
+    """Angular frequencies (n, k) that sampling folds onto angles (n,) [rad/s], and the response of hold and delay
+    [samples] at each of them, over the period."""
     w = (theta[:, None] + 2.0 * np.pi * np.arange(-ALIASES, ALIASES + 1)) / period
     hold = np.exp(-1j * w * delay * period) * -np.expm1(-1j * theta)[:, None] / (1j * w * period)
     return w, np.asarray(hold)

@@ -74,7 +74,7 @@ class SampledModel:
 
     @property
     def start(self) -> Floats:
-        """Values (p,) of the file."""
+        """Values (p,) from which the numbers are looked for, `Quantity.start`."""
         return np.array([one.start for one in self.quantities])
 
     def vector(self, values: Floats) -> Floats:
@@ -136,7 +136,10 @@ def filter_lag(controller: Controller) -> float:
 
 
 def _delays(device: Device, controller: Controller, full: Sequence[str]) -> list[Quantity]:
-    """The sum of delay, lag of the actuator and of the filter, and the lag by itself where it is named."""
+    """The delays to identify: the sum of delay, actuator's and filter's lag, and the actuator's lag by itself.
+
+    full  paths that are named: the sum with a path of the delay or with (), the lag with its own path only
+    """
     T, lag, own = controller.sampling_period, controller.actuator_time_constant, filter_lag(controller)
     path = DELAYS[1] if device.document.get("loop", {}).get("delay_s") is not None else DELAYS[0]
     unit = T if path == DELAYS[0] else 1.0
@@ -153,8 +156,9 @@ def _delays(device: Device, controller: Controller, full: Sequence[str]) -> list
     return found
 
 
-def _timed(controller: Controller, quantities: Sequence[Quantity], values: Floats) -> Controller:
-    """The computer with the delays among these values."""
+def _with_delays(controller: Controller, quantities: Sequence[Quantity], values: Floats) -> Controller:
+    """The controller with other delays, quantities of `_delays` and their values (d,) [s]: from the sum the
+    actuator's and the filter's lag are taken off."""
     given = {one.entries[0][0]: float(v) for one, v in zip(quantities, values, strict=True)}
     lag = given.get(LAG, controller.actuator_time_constant)
     total = next((given[path] for path in DELAYS if path in given), None)
@@ -168,6 +172,8 @@ def _timed(controller: Controller, quantities: Sequence[Quantity], values: Float
 
 
 def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> SampledModel:
+    """The model of a plant given by matrices, in those of its masses, springs, dampers, loss factor and delays
+    that the paths `full` name; (): in all of them. Raises DeviceError for another path."""
     plant, controller = point.ungripped_plant, point.loop.controller
     timing = _delays(device, controller, full)
     shapes = list[tuple[str, Any]]()  # what each quantity does to the plant
@@ -188,6 +194,7 @@ def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> 
     count = len(quantities)
 
     def loop_of(values: Floats) -> Loop:
+        """The loop with values (p,) of the plant's numbers, then of its delays."""
         matrices = {name: matrix.copy() for name, matrix in fixed.items()}
         loss = eta or 0.0
         for (name, shape), value in zip(shapes, values[:count], strict=True):
@@ -198,7 +205,7 @@ def _plant_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> 
         hysteresis = loss * matrices["stiffness"] if eta else None
         changed = replace(plant, **matrices, hysteresis=hysteresis)
         held = point.attach_operator(changed) if point.operator is not None else changed
-        return Loop(held, _timed(controller, timing, values[count:]))
+        return Loop(held, _with_delays(controller, timing, values[count:]))
 
     return SampledModel((*quantities, *timing), loop_of)
 
@@ -222,8 +229,10 @@ def _remainder(plant: Plant, quantities: Sequence[Quantity], shapes: Sequence[tu
 def _elements(
     device: Device, plant: Plant, key: str, full: Sequence[str]
 ) -> list[tuple[str, Floats, tuple[tuple[str, float, float], ...], float]]:
-    """The masses, springs or dampers of which a matrix consists: name, what one unit of it is in the matrix,
-    the numbers of the file that it makes, and its value.
+    """The masses, springs or dampers of which a matrix consists: name, what one unit of it is in the matrix
+    (n, n), the numbers of the file that it makes (`Quantity.entries`), and its value.
+
+    key   of the matrix in the file;   full  paths that are named, of which others are left out; (): none is
 
     A spring between two coordinates is four entries of the matrix, which go together; so are a damper and, without
     the signs, a coupled mass. What is 0 in the file is not there, but for a damper beside each spring: to say that
@@ -241,6 +250,7 @@ def _elements(
     least = NOTHING * max(float(np.abs(matrix).max()), 1e-300)
 
     def entry(i: int, j: int, factor: float) -> tuple[tuple[str, float, float], ...]:
+        """`Quantity.entries` of the matrix's entry i, j; () where the file does not write the matrix."""
         if given is None:
             return ()
         return ((path if not isinstance(given, list) else f"{path}.{i}.{j}", factor, 0.0),)
@@ -271,14 +281,17 @@ def _elements(
             what = f"of coordinate {i}" if name == "mass" else f"of coordinate {i} to the ground"
             found.append((what if n > 1 else "", shape, entry(i, i, 1.0), ground))
     if full and path not in wanted:
-        found = [one for one in found if any(entry[0] in wanted for entry in one[2])]
-    if any(one[3] < 0.0 for one in found):
+        found = [one for one in found if any(own in wanted for own, _, _ in one[2])]
+    if any(value < 0.0 for *_, value in found):
         raise fail(device.label, path, "holds a negative spring or damper, which cannot be identified here")
     return found
 
 
 def _first_damping(plant: Plant, shape: Floats) -> float:
-    """A damper to start from [N s/m]: 2 % of critical damping of the masses and springs about it."""
+    """A damper to start from [N s/m]: 2 % of critical damping of the masses and springs at its coordinates.
+
+    shape  (n, n) what one unit of it is in the damping matrix
+    """
     at = np.diag(shape) > 0.0
     mass, stiffness = np.diag(plant.mass)[at].min(), np.abs(np.diag(plant.stiffness)[at]).max()
     return float(2.0 * FIRST_RATIO * np.sqrt(mass * max(stiffness, mass)))
@@ -288,6 +301,8 @@ def _first_damping(plant: Plant, shape: Floats) -> float:
 
 
 def _hand_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> SampledModel:
+    """The model of a held device, in those of the hand's five numbers that the paths `full` name; (): in all.
+    Raises DeviceError for another path, and for a hand that is no such chain."""
     operator = point.operator
     assert operator is not None
     if point.arm is not None:
@@ -305,6 +320,7 @@ def _hand_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> S
         quantities.append(Quantity(name, unit, value, value or 1.0, True, ((f"operator.{key}", 1.0, 0.0),)))
 
     def loop_of(values: Floats) -> Loop:
+        """The loop held by a hand with these values (p,)."""
         changed: dict[str, Any] = {_attribute(key): float(value) for key, value in zip(keys, values, strict=True)}
         return Loop(attach(bare, replace(operator, **changed)), controller)
 
@@ -325,6 +341,8 @@ def without_hand(point: OperatingPoint) -> Loop:
 
 
 def _file_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> SampledModel:
+    """The model of any device, in the numbers of its file at the paths `full`, or in `_usual` ones where none is
+    named; the file is read anew for each choice of values. Raises DeviceError for what is no number."""
     controller = point.loop.controller
     timing = _delays(device, controller, full)
     chosen = [path for path in full if path not in DELAYS and path != LAG] or _usual(device) * (not full)
@@ -341,16 +359,17 @@ def _file_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> S
     count = len(quantities)
 
     def loop_of(values: Floats) -> Loop:
+        """The loop of the device with values (p,) of the file's numbers, then of the delays."""
         settings = {one.entries[0][0]: float(v) for one, v in zip(quantities, values[:count], strict=False)}
         changed = device.with_(settings) if settings else device
         loop = changed.at_point(point).loop
-        return Loop(loop.plant, _timed(loop.controller, timing, values[count:]))
+        return Loop(loop.plant, _with_delays(loop.controller, timing, values[count:]))
 
     return SampledModel((*quantities, *timing), loop_of)
 
 
 def _usual(device: Device) -> list[str]:
-    """What is identified of a mechanism where nothing is named."""
+    """Paths of what is identified of a mechanism where none is named: stiffness of the drives, damping ratio."""
     mechanism = device.document.get("mechanism", {})
     found = list[str]()
     for index, drive in enumerate(mechanism.get("drives", [])):

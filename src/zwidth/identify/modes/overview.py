@@ -21,6 +21,7 @@ from zwidth.progress import Progress
 UNSEEN: Final = 4  # a fourth of the data is for the validation
 COVERED: Final = 0.3  # share of a band's power that the fitted part must have
 LONGEST_SEGMENT: Final = 1 << 16  # samples, where nothing is said
+COHERENT: Final = 0.3  # coherence above which a response says something
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def _times_as_far(first: Spectra, other: Spectra) -> float:
     """How many times as far a stretch moves as another one's response says, where both have force."""
     into = "reference" if "reference" in first.channels else "force"
     response = first.response(into, "position") * (first.z - 1.0) ** 2
-    known = first.coherence(into, "position") > 0.3
+    known = first.coherence(into, "position") > COHERENT
     weight = known * other.power(into)
     moved = np.sum(np.real(np.conj(response) * other.of("position", into)) * known)
     return float(moved / max(float(np.sum(np.abs(response) ** 2 * weight)), 1e-300)) if known.any() else 1.0
@@ -104,7 +105,10 @@ def _band_powers(force: Floats, longest: int) -> Floats:
 
 
 def _covers(powers: Sequence[Floats]) -> bool:
-    """Whether what is fitted is excited wherever what is for validation is, and wherever all of it is."""
+    """Whether the fitted part has its share of the force's power in every band of frequencies that is excited.
+
+    powers  `_band_powers` of each stretch
+    """
     if not powers:
         return False
     if len(powers) >= 2 * UNSEEN:
@@ -125,7 +129,7 @@ def peaks(spectra: Spectra) -> Complexes:
     value = spectra.response("force", "position") * (spectra.z - 1.0) ** 2
     coherence = spectra.coherence("force", "position")
     size = np.log(np.maximum(np.abs(value), 1e-300))
-    size = np.where(coherence > 0.3, size, size[coherence > 0.3].min(initial=0.0))
+    size = np.where(coherence > COHERENT, size, size[coherence > COHERENT].min(initial=0.0))
     at, about = find_peaks(size, prominence=0.7, width=1, rel_height=0.5)
     order = np.argsort(about["prominences"])[::-1][:8]
     step = 1.0 / (spectra.length * spectra.period)
@@ -134,7 +138,7 @@ def peaks(spectra: Spectra) -> Complexes:
 
 
 SAME: Final = 1e-4  # power of the difference to a period before, over that of the force, that is none
-FEWEST_PERIODS: Final = 3
+FEWEST_PERIODS: Final = 3  # of a force that is called periodic
 SEARCHED: Final = 1 << 18  # samples in which a period is looked for
 LINE: Final = 1e-4  # power of a line, over the largest, that is excited
 CLEAR: Final = 3.0  # times its noise, that a line's mean is there
@@ -242,7 +246,7 @@ def _distortion_remarks(
 
 
 def _lines(values: Floats, period: int, count: int) -> Complexes:
-    """Transforms (k, n) of the last k whole periods of a signal."""
+    """Transforms (k, n) of the last k whole periods [samples] of a signal, `count` of them at most."""
     last = values[len(values) - count * period :] if len(values) >= count * period else values
     whole = len(last) // period
     return np.asarray(np.fft.rfft(last[len(last) - whole * period :].reshape(whole, period), axis=1))
@@ -365,7 +369,7 @@ def merged_spectra(several: Sequence[Spectra]) -> Spectra:
 
 
 class _Sums:
-    """Running sums of the spectra of segments."""
+    """Running sums of the auto- and cross-spectra of segments of `length` samples, see `Spectra.matrix`."""
 
     def __init__(self, channels: int, length: int) -> None:
         self.matrix: Complexes = np.zeros((length // 2 + 1, channels, channels), dtype=np.complex128)
@@ -373,7 +377,7 @@ class _Sums:
         self._window = np.hanning(length + 1)[:-1]
 
     def add(self, values: Sequence[Floats], order: Sequence[int]) -> None:
-        """Add the segments of channels (c, n)."""
+        """Add the segments of channels (c, n), each differenced as often as `order` (c,) says."""
         L, hop = self.length, self.length // 2
         n = len(values[0]) - max(order, default=0)
         if n < L:
@@ -393,6 +397,7 @@ class _Sums:
         self.count += count
 
     def _transform(self, row: Floats, starts: range) -> Complexes:
+        """Transforms (s, k) of the segments with numbers `starts` of a channel, less their mean, windowed."""
         from scipy.fft import rfft
 
         L, hop = self.length, self.length // 2

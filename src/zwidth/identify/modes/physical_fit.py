@@ -1,6 +1,5 @@
-"""Masses, springs, dampers and delays of a device, fitted to a response through the device's own sampled loop.
-
-Estimates of modes, and of numbers of a device file, from what was fitted.
+"""Masses, springs, dampers and delays of a device, fitted to a response through the device's own sampled loop; and
+the estimates of modes, and of numbers of the device file, from what was fitted.
 """
 
 from __future__ import annotations
@@ -42,8 +41,8 @@ DAMPED: Final = (0.1, 1.0, 10.0)  # times the damping of a mode about half the s
 RIVAL: Final = 8.0  # by which a sum of squares may exceed the least one, and still set an interval's end
 RIVALS, ELSEWHERE = 3, 0.3  # such minima at most, and how far from each other in logarithms
 HEAVY: Final = 10.0  # weight of a mode's frequency beside that of a point of the response
-LOST_START: Final = 50.0
-LOST: Final = 1e6  # residual where there is no such device
+LOST_START: Final = 50.0  # the same of the logarithms by which starts are compared
+LOST: Final = 1e6  # each residual where there is no such device
 SPRINGS: Final = ("N/m", "N m/rad")
 DAMPERS: Final = ("N s/m", "N m s/rad")
 
@@ -96,6 +95,7 @@ def fit_model(data: RecordResponse, model: SampledModel, modal: ModalFit, period
 
 
 def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
+    """Bounds (p,) of what the optimiser varies; period [s]."""
     low, high = np.empty((2, len(model.quantities)))
     for i, one in enumerate(model.quantities):
         if one.positive:
@@ -106,7 +106,10 @@ def _limits(model: SampledModel, period: float) -> tuple[Floats, Floats]:
 
 
 def _lowest(minima: Sequence[tuple[Floats, float]]) -> list[Floats]:
-    """The lowest minimum, and some others elsewhere that are hardly higher."""
+    """Places (p,) of the lowest minimum, and of some others elsewhere that are hardly higher.
+
+    minima  place and sum of squares of each
+    """
     found = list[Floats]()
     least = min(height for _, height in minima)
     for x, height in sorted(minima, key=lambda one: one[1]):
@@ -213,6 +216,7 @@ class _Search:
         wanted, rates = self.modal.response(theta), self.modal.clear_rates
 
         def off(x: Floats) -> Floats:
+            """What parameters leave of the response's logarithm, and of those of the modes' frequencies."""
             P = self.model.response(x, theta)
             if not np.isfinite(P).all() or np.any(P == 0.0):
                 return np.full(2 * len(theta) + len(rates), LOST_START)
@@ -233,11 +237,15 @@ class _Search:
 
 TOLD: Final = 100.0  # ratio of an interval's ends beyond which the data do not tell a number
 LARGEST: Final = 700.0  # of which the exponential is a number
-NORMAL: Final = 1.959963984540054
+NORMAL: Final = 1.959963984540054  # half width of the normal distribution's 95 % interval [standard deviations]
 
 
 def modal_estimates(fit: ModalFit, profiled: Fit, spread: Floats, lossy: bool, turns: bool) -> list[Estimate]:
-    """Frequency, damping ratio or loss factor, and residue of each mode."""
+    """Frequency, damping ratio or loss factor, and residue of each mode.
+
+    profiled  intervals of `fit.vector`;   spread  standard deviations of `fit.residues`
+    lossy     loss factors, not damping ratios;   turns  the motion is a turn, under a torque
+    """
     found = list[Estimate]()
     before = len(profiled.values) - 2 * fit.count
     order = np.argsort(fit.rates)
@@ -287,7 +295,7 @@ def device_estimates(
         timing = bool(one.entries) and one.entries[0][0] in DELAYS
         if not told[k]:
             estimates.append(Estimate(one.name, value, low, high, one.unit))
-            remarks.append(_not_told(one.name, low, high, unit_text(one.unit), model.hand))
+            remarks.append(_untold_remark(one.name, low, high, unit_text(one.unit), model.hand))
             continue
         # no number of the file by itself: it makes several, or a part of one
         composed = timing or len(one.entries) != 1 or len(paths[one.entries[0][0]]) > 1
@@ -306,7 +314,7 @@ def device_estimates(
             unit = ("samples" if path == DELAYS[0] else "s") if timing else one.unit
             entry = _entry(device, model, found, path, paths[path], timing)
             estimates.append(Estimate(name, *entry, unit, path, within))
-    remarks += _sum_of_delays(device, model, told)
+    remarks += _delay_remarks(model, told)
     return estimates, remarks
 
 
@@ -316,12 +324,14 @@ def _matrices(paths: Iterable[str]) -> str:
 
 
 def _is_told(low: float, high: float, positive: bool) -> bool:
+    """Whether an interval tells a number: it has an end, and of a positive one the ends are within `TOLD`."""
     if not positive:
         return isfinite(high)
     return low > 0.0 and isfinite(high) and high / low < TOLD
 
 
-def _not_told(name: str, low: float, high: float, unit: str, hand: bool) -> str:
+def _untold_remark(name: str, low: float, high: float, unit: str, hand: bool) -> str:
+    """Remark that the data do not tell a number, of a hand that the device hides it; with the bounds they set."""
     bound = f"above {low:.3g} {unit}" if low > 0.0 else ""
     bound = " and ".join(filter(None, (bound, f"below {high:.3g} {unit}" if isfinite(high) else "")))
     why = "the device hides it" if hand else "the data do not tell it"
@@ -336,7 +346,10 @@ def _entry(
     parts: Sequence[tuple[int, float, float]],
     timing: bool,
 ) -> tuple[float, float, float]:
-    """Value and interval of a number of the file, of all that it sums."""
+    """Value and ends of the interval of the file's number at a path.
+
+    parts   index of each quantity that the number sums, factor and offset;   timing  it is the delay
+    """
     if timing or len(parts) == 1:
         k, factor, offset = parts[0]
         base = offset
@@ -356,14 +369,15 @@ def _entry(
 
 
 def _rest(device: Device, model: SampledModel, path: str, parts: Sequence[tuple[int, float, float]]) -> float:
-    """What a number of the file holds beside what was identified of it."""
+    """What the file's number at a path holds beside the identified quantities, `parts` as in `_entry`."""
     given = address.get(device.document, path)
     own = float(given) if isinstance(given, int | float) else 0.0
     rest = own - sum(factor * model.quantities[k].given for k, factor, _ in parts)
     return rest if abs(rest) > 1e-9 * abs(own) else 0.0
 
 
-def _sum_of_delays(device: Device, model: SampledModel, told: Sequence[bool]) -> list[str]:
+def _delay_remarks(model: SampledModel, told: Sequence[bool]) -> list[str]:
+    """Remark on delays that appear as their sum alone; [] where none was identified. told (p,): by the data."""
     names = [one.entries[0][0] if one.entries else "" for one in model.quantities]
     if not any(name in DELAYS for name in names):
         return []

@@ -72,7 +72,7 @@ def channels_of(device: Device, point: OperatingPoint, record: Record) -> Channe
 
 @dataclass
 class Source:
-    """A record's stretches, again and again: from memory where they are few, else from the file."""
+    """A record whose stretches are gone through several times: from memory after `keep`, else from the file."""
 
     record: Record
     sampling: SampleTimes
@@ -92,6 +92,7 @@ class Source:
         return next(self.stretches(), None)
 
     def _read(self) -> Iterator[Stretch]:
+        """Read the stretches from the record, as `stretches` gives them."""
         held = dict[str, Floats]()
         for piece, goes_on in joined(self.sampling.stretches(self.record)):
             part = {field_: piece[name] for field_, name in self.channels.names.items()}
@@ -116,12 +117,14 @@ def _stretch(columns: dict[str, Floats]) -> Iterator[Stretch]:
 
 @dataclass
 class Levels:
-    """Running sums of the values in a record's columns.
+    """Running sums of the values in a record's columns, (2,) of force and position.
 
     count            samples
-    low, high, mean, square   of force and position: (2,) each, `mean` and `square` as sums about the first sample
+    low, high        (2,) least and largest
+    origin           (2,) first sample;   total, square  (2,) sums of the differences to it, and of their squares
     at_limit         samples at the largest or the least force
-    longest          stretch of samples [samples]
+    longest          stretch [samples]
+    drift            largest change of position along the straight line through a stretch
     """
 
     count: int = 0
@@ -135,7 +138,7 @@ class Levels:
     drift: float = 0.0
 
     def add(self, stretch: Stretch) -> None:
-        """Count a stretch."""
+        """Add the samples of a stretch."""
         both = np.array([stretch.force, stretch.position])
         if self.origin is None:
             self.origin = both[:, 0].copy()

@@ -70,7 +70,7 @@ class Record(ABC):
 
 
 class ArrayRecord(Record):
-    """A record of arrays."""
+    """A record of arrays (n,) by column; those of the columns `text` hold words."""
 
     def __init__(self, columns: Mapping[str, ArrayLike], label: str, text: Sequence[str] = ()) -> None:
         self.label, self.names, self.text = label, tuple(columns), tuple(text)
@@ -94,6 +94,8 @@ class CsvRecord(Record):
 
     Text takes long to read as numbers: what the first pass over the whole file reads is kept as numbers in a
     temporary file, from which all later passes read. A file that changes in between is not read again.
+
+    header  all columns of the file;   names  those that are read;   text  columns that hold words where they are
     """
 
     def __init__(self, path: Path, header: Sequence[str], names: Sequence[str], text: Sequence[str]) -> None:
@@ -235,6 +237,7 @@ def record_of(columns: Mapping[str, ArrayLike] | Any, wanted: Columns, label: st
 
 
 def _matlab(path: Path, head: bytes, wanted: Columns) -> Record:
+    """The record in a .mat file, `head` its first bytes. Raises DeviceError for a format that is not read."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
@@ -251,11 +254,12 @@ def _matlab(path: Path, head: bytes, wanted: Columns) -> Record:
 
 
 def _is_column(value: Any) -> bool:
+    """Whether a variable of a .mat file is a column of numbers or of words."""
     return isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiuU"
 
 
 def _all_digits(release: str) -> dict[str, Any]:
-    """What makes a release of pandas read every digit: before 3.1 half of all numbers are off in the last one."""
+    """Options for a release of pandas to read every digit: before 3.1 half of all numbers are off in the last."""
     major, minor = (int(part) for part in release.split(".")[:2])
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
@@ -321,11 +325,12 @@ def averaged_rows(record: Record, most: int = MOST_ROWS) -> AveragedRows:
 
 
 def _joined(pieces: list[Piece], names: Sequence[str]) -> Piece:
+    """The columns of several pieces, one behind the other; empty ones of no pieces."""
     return {name: np.concatenate([one[name] for one in pieces] or [np.zeros(0)]) for name in names}
 
 
 def _averaged(piece: Piece, count: int, together: int) -> Piece:
-    """The first `count` rows in means of so many."""
+    """The first `count` rows of a piece, each `together` of them replaced by their mean."""
     if together == 1:
         return {name: values[:count] for name, values in piece.items()}
     return {name: values[:count].reshape(-1, together).mean(axis=1) for name, values in piece.items()}
@@ -415,6 +420,7 @@ class TableWriter:
         return places
 
     def _drop(self) -> None:
+        """Close the temporary file and write no more."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None
@@ -522,7 +528,7 @@ def plain_name(name: str) -> str:
 
 
 def _no_header(names: Sequence[str]) -> str:
-    """What stands where the names of columns should; "" where names do."""
+    """Message: what stands where the names of columns should; "" where names do."""
     if names and names[0].startswith(("#", "%", "//")):
         return "the line is a comment; begin with the line that names the columns"
     try:

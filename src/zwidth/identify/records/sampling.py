@@ -1,6 +1,7 @@
 """When the samples of a record were taken: their period, jitter and gaps.
 
-Whether a record's period and the mass that it tells are of the size that the device file gives.
+`check_periods` and `check_mass_in_file`: whether a record's period, and the mass that it tells, are of the size
+that the device file gives.
 """
 
 from __future__ import annotations
@@ -127,7 +128,7 @@ def check_sampling(record: Record, period: float | None = None) -> tuple[SampleT
     sampling = _sample_times(usual, sums, row, missing, edges)
     if period is not None and abs(sampling.period / period - 1.0) > SAME_PERIOD:
         return _failed(_fault_of_period(record, sampling.period, period))
-    return sampling, Check("sampling", True, _sentence(sampling))
+    return sampling, Check("sampling", True, _sampling_sentence(sampling))
 
 
 def _failed(reason: str) -> tuple[None, Check]:
@@ -201,7 +202,8 @@ def _usual_step(time: Floats) -> float:
     return float(np.mean(alike)) if middle > 0.0 else middle
 
 
-def _sentence(sampling: SampleTimes) -> str:
+def _sampling_sentence(sampling: SampleTimes) -> str:
+    """Rows, period, jitter and missing samples of a record in words."""
     gaps = len(sampling.runs) - 1
     lost = f", {plural(sampling.missing, 'sample')} missing in {plural(gaps, 'gap')}" if sampling.missing else ""
     jitter = (

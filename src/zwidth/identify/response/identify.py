@@ -1,10 +1,8 @@
 """From raw sweeps of a device to its response, as a [response] reads it, with the chart that follows.
 
-What a response from raw sweeps must be before its chart is believed: columns, units, runs that agree.
-
-The longest stretch of a record of a sweep without a gap, block by block, and what its checks want to know.
-
-Two parts of a record must excite the same frequencies for one to be predicted from the other.
+The response is checked before its chart is believed: columns, units, runs that agree. `SweepBlocks` reads the
+longest stretch of a sweep without a gap, block by block; `shared_excitation` tells whether two parts of it have
+the same frequencies, without which one is not predicted from the other.
 """
 
 from __future__ import annotations
@@ -158,13 +156,14 @@ def _charted(
 
 
 def _named(what: str, record: Record, records: Sequence[Record]) -> str:
+    """Name of a check, with the record's label in front where there are several records."""
     return what if len(records) == 1 else f"{record.label}: {what}"
 
 
 def _reported(
     sweep: SweepBlocks, length: int, name: str, progress: Progress | None
 ) -> Iterator[tuple[Floats, Floats]]:
-    """The blocks of a sweep, with progress."""
+    """Force and position of a sweep in blocks of `length` samples, with reports of its name to `progress`."""
     for number, block in enumerate(sweep.blocks(length)):
         if progress is not None:
             progress(f"transforming {name}", number, len(sweep) // length)
@@ -172,7 +171,7 @@ def _reported(
 
 
 def _gaps(kept: int, rows: int) -> Check:
-    """Whether the longest stretch without a gap is most of the record."""
+    """Check that the longest stretch without a gap, `kept` rows, is half of the record's rows or more."""
     said = (
         "no sample is missing"
         if kept == rows
@@ -183,7 +182,8 @@ def _gaps(kept: int, rows: int) -> Check:
 
 
 def _check_sweep(sweep: SweepBlocks) -> list[Check]:
-    """Is something excited, does it move, and is the force free to take its values?"""
+    """Check that the force changes, that the position moves by enough counts, and that the force is not clipped;
+    [] of a sweep without samples."""
     if not len(sweep):
         return []
     seen = SweepRange.of(sweep, FIRST_LEVELS)
@@ -215,7 +215,7 @@ def _together(responses: Sequence[Response]) -> Response:
 
 
 def _usable(response: Response) -> Check:
-    """From where to where the response can be relied on."""
+    """Check that enough frequencies are coherent, and say from where to where."""
     assert response.coherence is not None
     good = response.coherence >= LEAST_COHERENCE
     share = float(np.mean(good))
@@ -255,7 +255,7 @@ def _chart(response: Response, controller: Controller) -> tuple[MeasuredChart | 
 
 
 def _unknown_below(response: Response) -> str:
-    """That low frequencies, which one sweep passes in no time, are not known, and what helps; "" if they are."""
+    """Hint that low frequencies, which one sweep passes in no time, are not known; "" where they are."""
     assert response.coherence is not None
     lowest = float(response.frequency[response.coherence >= LEAST_COHERENCE][0])
     if lowest <= UNKNOWN_BELOW * float(response.frequency[0]):
@@ -267,11 +267,13 @@ def _unknown_below(response: Response) -> str:
 
 
 def _largest_stiffness(chart: MeasuredChart) -> Estimate:
+    """Largest stiffness that is stable by the response, from what is beyond doubt to what may be."""
     high = chart.band.stiffness_high if chart.band is not None else chart.stiffness_max_nominal
     return Estimate("largest stiffness", chart.stiffness_max_nominal, chart.stiffness_max, high, "N/m")
 
 
 def _remarks(chart: MeasuredChart, device: Device, response: Response) -> list[str]:
+    """Sentences on the interval, on the keys that the response's file needs, and on the file's own model."""
     said = (
         [f"{response.note}; the interval holds what is stable beyond doubt, and what may be"]
         if response.note
@@ -300,7 +302,7 @@ def _shares_of_others(
 
 
 def _validated_on(sweeps: int, once: bool) -> str:
-    """What the share that is explained is of."""
+    """Which motion the share that is explained belongs to, in words."""
     where = "at the frequencies that can be relied on"
     if once and sweeps == 1:
         return "nothing: the sweep has each frequency at one time only"
@@ -318,7 +320,7 @@ def _share_explained(response: Response, unseen: SweepBlocks, length: int, perio
 
     length  of the blocks that are transformed at once, at most [samples]
     """
-    m = 2
+    m = 2  # differences of the position
     assert response.coherence is not None
     good = response.coherence >= LEAST_COHERENCE
     known, value = response.frequency[good], response.value[good]
@@ -390,6 +392,7 @@ def _copies(responses: Sequence[Response], labels: Sequence[str]) -> list[Check]
 
 
 def _coherent(response: Response) -> Flags:
+    """Which frequencies (n,) of a response can be relied on."""
     assert response.coherence is not None
     return (response.coherence >= LEAST_COHERENCE) & (np.abs(response.value) > 0.0) & (response.frequency > 0.0)
 
@@ -403,7 +406,8 @@ def _gain(first: Response, other: Response) -> float:
 
 
 def _units(device: Device, f: Floats, size: Floats) -> list[Check]:
-    """Whether the response (n,) is off by the factor of a unit from that of the file's model."""
+    """Check that the response's magnitude (n,) [m/N], at frequencies f (n,) [Hz], is not off by the factor of a
+    unit from that of the file's model; [] where it is not."""
     if device.response is not None or device.missing:
         return []
     loop = device.at().loop
@@ -502,9 +506,9 @@ class SweepBlocks:
 
 @dataclass(frozen=True)
 class SweepRange:
-    """What the samples of a sweep take for values.
+    """Values that the samples of a sweep take.
 
-    force, position    smallest and largest
+    force, position    smallest and largest [N], [m]
     at_largest, at_smallest  samples at the largest and at the smallest force
     levels             different forces among the first samples
     step               of the encoder, read off the first samples; 0 where none shows
@@ -552,7 +556,7 @@ def shared_excitation(sweep: SweepBlocks, cut: int) -> float:
 
 
 def _spectrum(sweep: SweepBlocks, length: int) -> Floats:
-    """Summed spectra (k,) of the force without its mean."""
+    """Power spectra (k,) of the force without its mean, summed over windowed segments of `length` samples."""
     window, total = np.hanning(length + 2)[1:-1], np.zeros(length // 2 + 1)
     for force, _ in sweep.blocks(length):
         total += np.abs(np.fft.rfft(window * (force - np.mean(force)))) ** 2

@@ -59,6 +59,7 @@ class StrokeRun:
     kept: Flags = field(init=False)
 
     def __post_init__(self) -> None:
+        """Find the spikes of both columns; none in a run of too few rows."""
         good = np.ones(len(self.angle), dtype=bool)
         if len(self.angle) >= FEWEST_ROWS:
             for values in (self.angle, self.torque):
@@ -106,10 +107,12 @@ def check_runs(
 
 
 def _coarsest(found: Sequence[Resolution]) -> Resolution:
+    """The largest step and the largest noise of several runs."""
     return Resolution(max(one.step for one in found), max(one.noise for one in found))
 
 
 def _rows(runs: Sequence[StrokeRun]) -> Check:
+    """Check that every run has enough readings."""
     short = [run for run in runs if len(run.angle) < FEWEST_ROWS]
     total = sum(len(run.angle) * run.together for run in runs)
     if short:
@@ -125,6 +128,7 @@ def _rows(runs: Sequence[StrokeRun]) -> Check:
 
 
 def _constant(runs: Sequence[StrokeRun]) -> Check | None:
+    """The failed check of a column that is constant; None where none is."""
     for run in runs:
         for name, values in (("torque_Nm", run.torque), ("angle_rad", run.angle)):
             if np.ptp(values) == 0.0:
@@ -137,6 +141,7 @@ def _constant(runs: Sequence[StrokeRun]) -> Check | None:
 
 
 def _missing(runs: Sequence[StrokeRun]) -> Check:
+    """Check that few readings are spikes, and say what is left out."""
     left_out = sum(run.left_out for run in runs)
     spikes = sum(int(np.count_nonzero(~run.kept)) for run in runs)
     total = sum(len(run.angle) for run in runs)
@@ -153,6 +158,7 @@ def _missing(runs: Sequence[StrokeRun]) -> Check:
 
 
 def _units(runs: Sequence[StrokeRun]) -> Check:
+    """Check that the angle of a blocked drive, in radians, runs over less than half a turn."""
     span = max(float(np.ptp(run.angle[run.kept])) for run in runs)
     if span > WIDEST:
         return Check(
@@ -165,6 +171,7 @@ def _units(runs: Sequence[StrokeRun]) -> Check:
 
 
 def _motion(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
+    """Check that the angle runs over many counts and beyond its noise, in every run."""
     span = min(float(np.ptp(run.angle[run.kept])) for run in runs)
     if resolution.step and span < FEWEST_COUNTS * resolution.step:
         return Check(
@@ -189,6 +196,7 @@ def _motion(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
 
 
 def _signs(runs: Sequence[StrokeRun]) -> Check:
+    """Check that the torque grows with the angle in every run."""
     slopes = [float(np.polyfit(run.angle[run.kept], run.torque[run.kept], 1)[0]) for run in runs]
     falling = [run.label for run, slope in zip(runs, slopes, strict=True) if slope <= 0.0]
     if not falling:
@@ -205,6 +213,7 @@ def _signs(runs: Sequence[StrokeRun]) -> Check:
 
 
 def _strokes(strokes: Strokes) -> Check:
+    """Check that the spring was both loaded and unloaded."""
     ways = set(strokes.sign.tolist())
     if strokes.count < 2 or len(ways) < 2:
         return Check(
@@ -218,7 +227,7 @@ def _strokes(strokes: Strokes) -> Check:
 
 
 def _hysteresis(strokes: Strokes) -> Check:
-    """The torque must be larger on the way up: the loop takes energy."""
+    """Check that the torque is larger on the way up: the loop takes energy."""
     columns = np.stack([strokes.angle, strokes.sign, np.ones_like(strokes.sign)], axis=1)
     solved, rest, *_ = np.linalg.lstsq(columns, strokes.torque, rcond=None)
     spread = float(np.sqrt(rest[0] / len(strokes.sign))) if len(rest) else 0.0
@@ -235,7 +244,7 @@ def _hysteresis(strokes: Strokes) -> Check:
 
 
 def _ends(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
-    """Neither column may stand still at its end while the other one goes on."""
+    """Check that neither column stands still at its end while the other one goes on."""
     for run in runs:
         pairs = (("angle_rad", run.angle, run.torque), ("torque_Nm", run.torque, run.angle))
         for name, values, others in pairs:
@@ -256,8 +265,9 @@ def _ends(runs: Sequence[StrokeRun], resolution: Resolution) -> Check:
 
 
 def _held_share(values: Floats, others: Floats, end: float, margin: float) -> float:
-    """Share of its range over which the other column rises while this one is at its upper end; 0 where it is
-    little. Only before the other column's own turning point, since behind it friction holds the shaft."""
+    """Share of its range over which the other column (n,) rises while this one is at its upper end, within a
+    margin; 0 where it is little. Only before the other column's own turning point, since behind it friction holds
+    the shaft."""
     at_end = values >= end - margin
     if resolution_of(others).noise > NOISY * float(np.ptp(others)):
         others = smoothed_torque(
@@ -274,6 +284,7 @@ def _held_share(values: Floats, others: Floats, end: float, margin: float) -> fl
 
 
 def _plausible(strokes: Strokes, known: float) -> Check:
+    """Check that the stiffness is within a factor of 20 of the file's [N m/rad]."""
     slope = float(np.polyfit(strokes.angle, strokes.torque, 1)[0])
     times = slope / known
     if 1.0 / UNLIKELY < times < UNLIKELY:
@@ -292,6 +303,7 @@ def _plausible(strokes: Strokes, known: float) -> Check:
 
 
 def _sides(strokes: Strokes) -> tuple[Check, bool]:
+    """Check whether the spring was bent both ways; and whether it was."""
     high, low = float(np.max(strokes.torque)), float(np.min(strokes.torque))
     lesser = min(max(high, 0.0), max(-low, 0.0)) / (high - low)
     if lesser < ONE_SIDED:

@@ -3,7 +3,7 @@
 The link is blocked, the motor pulls at its transmission, slowly, up and down; or the motor is blocked and the link
 is loaded. The thesis measures its Table 3.3 so (section 3.1.3, Fig. 3.5).
 
-The drive of a mechanism that a measurement is of.
+`drive_named` finds the drive of a mechanism that was measured.
 """
 
 from __future__ import annotations
@@ -98,7 +98,10 @@ class _Scale:
 
 
 def _identify_drive(device: Device, drive: Drive, runs: list[StrokeRun], side: str, prefix: str) -> Identification:
-    """The spring of one drive."""
+    """Check the runs of one drive, fit its spring, and predict what was not fitted.
+
+    side    "motor" or "link", where the runs were measured;   prefix  of all names where there are several drives
+    """
     scale = _Scale(1.0, 1.0)
     if side == "link":
         ratio = drive.table.get("transmission_ratio")
@@ -133,7 +136,7 @@ def _identify_drive(device: Device, drive: Drive, runs: list[StrokeRun], side: s
 
 
 def _strokes(runs: Sequence[StrokeRun], resolution: Resolution) -> Strokes:
-    """The strokes of all runs."""
+    """The strokes of all runs, numbered one behind the other."""
     parts, first = list[Strokes](), 0
     for number, run in enumerate(runs):
         parts.append(strokes_of(run.torque[run.kept], run.angle[run.kept], resolution, number, first))
@@ -266,6 +269,7 @@ def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str
 
 def _curves(drive: Drive, fit: SpringFit, strokes: Strokes, unseen: Strokes) -> dict[str, Any]:
     """Averages of the strokes, and what the fit says of each: columns of equal length."""
+    # stroke and time, below 1, name a bin
     held_out = np.isin(strokes.stroke * 1e6 + strokes.time, unseen.stroke * 1e6 + unseen.time)
     return {
         "drive": [drive.name] * len(strokes.angle),
@@ -278,6 +282,7 @@ def _curves(drive: Drive, fit: SpringFit, strokes: Strokes, unseen: Strokes) -> 
 
 
 def _parts(strokes: Strokes) -> str:
+    """How many strokes there are, in words; of few strokes how many averages."""
     return plural(strokes.count, "stroke") if strokes.count > 2 else plural(len(strokes.angle), "average")
 
 

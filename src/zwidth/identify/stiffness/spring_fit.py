@@ -13,8 +13,7 @@ with a rest angle for each record, s the sign of the motion and t the time, for 
 Torque is regressed on angle: a rounded angle plus its error is the true one, with an error that hardly depends on
 the rounded one (Berkson's case), which leaves slopes unbiased.
 
-Strokes of a slow back-and-forth motion: between turning points, without the stretch that stands still.
-
+`strokes_of` cuts a slow back-and-forth motion into strokes between turning points, without what stands still.
 After a turn dry friction holds the shaft until the torque has changed by twice its size; what is read there says
 nothing of the spring. What is left of each stroke is averaged in a few bins, which takes most of the noise out of
 the angle: a noisy angle would make the fitted spring too soft.
@@ -66,15 +65,16 @@ class SpringFit:
     outliers: Flags
 
     def __getitem__(self, name: str) -> float:
+        """Value of a parameter; 0 of one that was not fitted."""
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
 
     def combination(self, gradient: dict[str, float]) -> float:
-        """Standard error of a function of the parameters with this gradient."""
+        """Standard error of a function of the parameters with this gradient, derivatives by their names."""
         g = np.array([gradient.get(name, 0.0) for name in self.names])
         return float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
 
     def half_width(self, gradient: dict[str, float]) -> float:
-        """Half of its 95 % interval."""
+        """Half width of the 95 % interval of a function of the parameters with this gradient."""
         from scipy.stats import t
 
         return float(t.ppf(0.975, self.freedom)) * self.combination(gradient)
@@ -162,7 +162,8 @@ def _is_seen(fit: SpringFit, name: str, strokes: Strokes) -> bool:
 
 
 def _elastic(x: dict[str, float], d: Floats, reach: Floats | float = 0.0) -> Floats:
-    """Mean torque of a spring bent by angles spread evenly over d +- reach, on one side of its kinks."""
+    """Mean torque (n,), without friction, of a spring with parameters x bent by angles spread evenly over d +-
+    reach (n,) [rad], on one side of its kinks."""
     forward = x["forward"]
     backward = x.get("backward", forward)
     half, change = 0.5 * x.get("play", 0.0), -x.get("preload", 0.0) / forward
@@ -187,12 +188,13 @@ def _rests(strokes: Strokes) -> list[str]:
 
 
 def _bend(x: dict[str, float], strokes: Strokes) -> Floats:
-    """By how much the spring is bent (n,)."""
+    """By how much a spring with parameters x is bent (n,) [rad]."""
     rests = np.array([x["rest"], *(x.get(name, x["rest"]) for name in _rests(strokes))])
     return np.asarray(strokes.angle - rests[strokes.run] - x.get("angle drift", 0.0) * strokes.time)
 
 
 def _torque(names: tuple[str, ...], values: Floats, strokes: Strokes) -> Floats:
+    """Torque (n,) of strokes by the spring, dry friction and drift with these parameters (p,)."""
     x = dict(zip(names, values.tolist(), strict=True))
     elastic = _elastic(x, _bend(x, strokes), strokes.reach)
     loaded = x.get("load", 0.0) * np.abs(elastic) * strokes.sign
@@ -200,13 +202,16 @@ def _torque(names: tuple[str, ...], values: Floats, strokes: Strokes) -> Floats:
 
 
 def _dry(x: dict[str, float], strokes: Strokes) -> Floats:
-    """Dry friction (n,) that the torque overcomes, without what grows with the torque."""
+    """Dry friction (n,) that the torque overcomes, by parameters x, without what grows with the torque."""
     turned = 1.0 - 2.0 * np.exp(-strokes.since / x["reversal"]) if "reversal" in x else 1.0
     return np.asarray(x["friction"] * strokes.sign * turned)
 
 
 def _start(names: tuple[str, ...], strokes: Strokes, before: SpringFit | None) -> tuple[Floats, Floats]:
-    """Where the search begins, and by how much each parameter is likely to differ."""
+    """Parameters (p,) where the search begins, and by how much each is likely to differ (p,).
+
+    before  a fit with fewer parameters; None: none yet
+    """
     span_angle, span_torque = float(np.ptp(strokes.angle)), float(np.ptp(strokes.torque))
     if before is None:
         columns = np.stack([strokes.angle, strokes.sign, np.ones_like(strokes.sign)], axis=1)
@@ -245,7 +250,8 @@ def _fit(
     kept: Flags,
     before: SpringFit | None = None,
 ) -> SpringFit:
-    """Least squares over the kept bins. Play, friction by the load and the way of a reversal are not negative."""
+    """Fit the parameters `names` to the kept bins (n,) by least squares, from a fit `before`. Play, friction by
+    the load and the way of a reversal are not negative."""
     from scipy.optimize import least_squares
 
     used = strokes.select(kept)
@@ -267,7 +273,7 @@ def _fit(
 def _covariance(
     jacobian: Floats, strokes: Strokes, residuals: Floats, resolution: Resolution
 ) -> tuple[Floats, int]:
-    """Covariance of the parameters' errors, and the freedom of its estimate.
+    """Covariance (p, p) of the parameters' errors by the torque's derivatives (n, p); the freedom of its estimate.
 
     From the scatter between clusters, as by deleting each in turn (jackknife, in its first order), so that errors
     within a cluster may depend on each other; and from the rounding of the angle, which is the same in every
@@ -287,7 +293,9 @@ def _covariance(
 
 
 def _rounding(pseudo: Floats, strokes: Strokes, resolution: Resolution) -> Floats:
-    """Covariance by the rounding of the angle: one error for each count and sign of motion.
+    """Covariance (p, p) by the rounding of the angle: one error for each count and sign of motion.
+
+    pseudo  (p, n) pseudo-inverse of the torque's derivatives
 
     A bin that covers several counts averages their errors, evenly where it has several readings of each count;
     noise of half a count and more does the same (dither).
@@ -323,7 +331,7 @@ def _clusters(strokes: Strokes) -> Ints:
 def _outliers(residuals: Floats, kept: Flags) -> Flags:
     """Kept bins that lie far from all others; none where they are many, since then the model is wrong."""
     middle = float(np.median(residuals[kept]))
-    spread = 1.4826 * float(np.median(np.abs(residuals[kept] - middle)))
+    spread = 1.4826 * float(np.median(np.abs(residuals[kept] - middle)))  # robust standard deviation
     bad = kept & (np.abs(residuals - middle) > OUTLIER * max(spread, 1e-300))
     return bad if np.count_nonzero(bad) <= MOST_OUTLIERS * len(residuals) else np.zeros_like(bad)
 
