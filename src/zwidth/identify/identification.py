@@ -119,13 +119,13 @@ class Identification(Result):
     @property
     @documented(before="details")
     def left_out(self) -> tuple[str, ...]:
-        """What the intervals do not hold, sentences."""
+        """Sources of error that the intervals leave out, sentences."""
         return ()
 
     @property
     @documented(before="details")
     def premises(self) -> tuple[Mapping[str, Any], ...]:
-        """What the answer rests on: `what`, `holds` (True, False, None) and `how` it was seen."""
+        """Premises of the numbers: `what` each is, whether it `holds` (True, False, None), `how` it was seen."""
         return ()
 
     def table(self) -> Mapping[str, Any]:

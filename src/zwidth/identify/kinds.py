@@ -31,13 +31,13 @@ class Kind:
 
     @property
     def columns(self) -> Columns:
-        """What its records hold."""
+        """Columns that its records have."""
         columns: Columns = import_module(f"zwidth.identify.{self.module}").COLUMNS
         return columns
 
     @property
     def function(self) -> Callable[..., Identification]:
-        """What identifies it."""
+        """Function that identifies a device from such records: `identify_<name>`."""
         found: Callable[..., Identification] = getattr(
             import_module(f"zwidth.identify.{self.module}"), f"identify_{self.name}"
         )

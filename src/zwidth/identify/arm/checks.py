@@ -111,7 +111,7 @@ def torque_check(drives: Sequence[str], surveys: Sequence[MotionSurvey], limits:
 
 
 def _clipped_share(forces: Floats) -> float:
-    """Share of the samples that stand, five and more in a row, at the largest or the least value."""
+    """Share of the samples (n,) that stand, five and more in a row, at the largest or the least value."""
     shares = list[float]()
     for extreme in (np.max(forces), np.min(forces)):
         at = np.concatenate([[0], (forces == extreme).astype(int), [0]])

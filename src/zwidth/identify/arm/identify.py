@@ -103,12 +103,12 @@ class ArmIdentification(Identification):
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """What the intervals do not hold."""
+        """Sources of error that the intervals leave out, in words; () where nothing was fitted."""
         return (POSITION_NOISE,) if self.estimates else ()
 
     @property
     def premises(self) -> tuple[Mapping[str, Any], ...]:
-        """What the intervals rest on."""
+        """Premises that the intervals rest on, as `Identification.premises`; () where nothing was fitted."""
         if not self.estimates:
             return ()
         return (
@@ -260,7 +260,7 @@ class _Work:
         return checks, samplings
 
     def _survey(self, record: Record, sampling: SampleTimes, channels: DriveChannels) -> MotionSurvey:
-        """The longest stretch among the first rows."""
+        """The longest stretch among the first `SEEN` rows of a record, its end left out beyond so many."""
         best, rows = None, 0
         for piece in sampling.stretches(record):
             rows += len(piece["time_s"])
@@ -280,7 +280,7 @@ class _Work:
         return [motion_check(drives.names, surveys, counts, turning), torque_check(drives.names, surveys, limits)]
 
     def _highest(self) -> float:
-        """The highest frequency at which the drives may be taken for rigid [Hz]."""
+        """Highest frequency at which drives may be taken for rigid [Hz]; inf where none is known to bend."""
         drives = self.mechanism.drives
         if not np.isfinite(drives.stiffness).any() or self.device.missing.get("dynamics"):
             return np.inf

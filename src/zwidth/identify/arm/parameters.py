@@ -84,7 +84,7 @@ class Parameters:
 
     @property
     def friction(self) -> slice:
-        """Where the drives' friction stands: dry, viscous, offset, d of each."""
+        """Slice of the parameters that are the drives' friction: d dry, d viscous, d offsets."""
         return slice(self.inertial + len(self.rotors), len(self.names))
 
     def columns(self, links: Floats, rates: Floats, accelerations: Floats, signs: Floats) -> Floats:
@@ -138,7 +138,7 @@ class BaseParameters:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """ "I_zz(upper) + 0.0216 m(distal)", and so on."""
+        """Names (b,) of the combinations: "I_zz(upper) + 0.0216 m(distal)"."""
         return tuple(self._name(row) for row in range(len(self.kept)))
 
     def _name(self, row: int) -> str:

@@ -73,7 +73,7 @@ class Regression:
         return float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
 
     def open_along(self, gradients: Floats) -> Flags:
-        """Of each gradient (k, b) whether parameters that change no torque change the function."""
+        """Which (k,) of the functions with gradients (k, b) change with parameters that change no torque."""
         scaled = gradients * self.size
         length = np.linalg.norm(scaled, axis=1)
         return np.asarray(np.linalg.norm(scaled @ self.unseen, axis=1) > 1e-5 * length)

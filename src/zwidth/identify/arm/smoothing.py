@@ -53,11 +53,11 @@ class Kernel:
 
     @property
     def reach(self) -> float:
-        """Time from its middle to its end [s]."""
+        """Time from the kernel's middle to its end [s]."""
         return ENDS * self.width
 
     def half(self, period: float) -> int:
-        """Samples from its middle to its end."""
+        """Samples, a period [s] apart, from the kernel's middle to its end."""
         return int(np.ceil(self.reach / period))
 
     def taps(self, period: float, derivative: int = 0, shift: float = 0.0) -> Floats:
@@ -127,7 +127,7 @@ class TorqueBand:
 
     @property
     def narrow(self) -> Kernel:
-        """The low pass of what is compared."""
+        """The low pass of the torques that are compared."""
         return Kernel(self.edge, NARROW / self.edge)
 
     @property

@@ -47,7 +47,7 @@ class BoundaryFit:
 
     @property
     def vector(self) -> Floats:
-        """The numbers (p,) as they vary."""
+        """The fitted vector (p,) of `BoundaryParameters`."""
         return self.fit.values
 
     def ends(self, i: int) -> tuple[float, float, float]:
@@ -73,7 +73,7 @@ def search_ranges(points: BoundaryPoints) -> Scatter:
 
 
 def first_scatter(points: BoundaryPoints) -> Scatter:
-    """The scatter that a fit begins with."""
+    """The scatter that a fit begins with: `FIRST_SCATTER` of the measured ranges."""
     return Scatter(*(FIRST_SCATTER * one for one in search_ranges(points)))
 
 
@@ -168,7 +168,7 @@ def _best_start(model: BoundaryModel, parameters: BoundaryParameters, scatter: S
 
 
 def _parts(model: BoundaryModel) -> dict[str, Flags]:
-    """Which residuals (m,) are of points along damping, along stiffness, of unknown edges, of frequencies."""
+    """Kind -> which residuals (m,) are along stiffness, along damping, of frequencies, and of unknown edges."""
     edges = model.points[model.points.on_edge]
     seen = int(np.sum(edges.frequency > 0.0))
     total = len(edges) + seen + int(np.sum(~model.points.on_edge))
@@ -283,7 +283,7 @@ def log_likelihood(model: BoundaryModel, fit: BoundaryFit) -> tuple[float, int, 
 
 
 def without_points(points: BoundaryPoints, every: int = 3) -> Flags:
-    """Which points (n,) are kept where every third on the boundary is left out, along each edge."""
+    """Which points (n,) are kept where every third (`every`) on the boundary is left out, along each edge."""
     order = np.lexsort((points.chosen, points.kind, ~points.on_edge))
     keep = np.ones(len(points), dtype=bool)
     keep[order[: int(points.on_edge.sum())][1::every]] = False

@@ -187,7 +187,7 @@ def _own_edge(parameters: BoundaryParameters, point: OperatingPoint) -> EdgeChor
 
 
 def _route(point: OperatingPoint, plan: TrialPlan | None) -> Check:
-    """What the points are compared with, and why."""
+    """Check that says what the points are compared with, and why; a warning of what the chart leaves out."""
     if plan is not None:
         return Check("compared with", True, plan.sentence)
     omitted = point.contact_loop.nonlinear.kinds if point.response is None else ()
@@ -227,7 +227,7 @@ def _without_edge(
 
 
 def _moves_boundary(model: BoundaryModel, parameters: BoundaryParameters) -> Check:
-    """Whether each number moves the boundary at all, at the values of the file."""
+    """Check that each number moves the boundary at all, at the values of the file."""
     J = derivatives(model, parameters.start, first_scatter(model.points))
     names = [what for what, _, _ in parameters.named]
     still = [name for name, column in zip(names, J.T, strict=True) if np.max(np.abs(column)) < NOTHING]
@@ -412,7 +412,7 @@ class DampingComparison:
 
     @property
     def sentences(self) -> list[str]:
-        """What the comparison says, and what it does not."""
+        """What the comparison tells about the models, and which of them it does not tell apart, in words."""
         if len(self.models) < 2:
             return []
         best, *others = self.models
@@ -440,7 +440,7 @@ class DampingComparison:
         return lines
 
     def _same_edges(self, other: FittedModel) -> bool:
-        """Whether a model's edges pass the points as the best one's do."""
+        """Whether a model deviates from the points as the best one does, to `SAME` of the scatter."""
         own = self.models[0]
         apart = own.fit.deviations.value - other.fit.deviations.value
         return bool(np.max(np.abs(apart / own.model.units(own.fit.scatter))) < SAME)

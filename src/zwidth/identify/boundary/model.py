@@ -86,7 +86,7 @@ class BoundaryModel:
         return self.chords(vector).curve is None
 
     def deviations(self, vector: Floats, scatter: Scatter) -> Deviations:
-        """The points on the boundary beside the exact edge; where there is none, beside the origin."""
+        """Deviations of the points from the exact edge for numbers (p,); without an edge, from the origin."""
         chords = self.chords(vector)
         points = self.points[self.points.on_edge]
         value, frequency = np.full(len(points), np.nan), np.full(len(points), np.nan)

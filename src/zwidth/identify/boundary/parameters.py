@@ -133,7 +133,7 @@ class BoundaryParameters:
         return device.at_point(self.point).contact_loop
 
     def operator(self, vector: Floats) -> Operator | None:
-        """Who holds the device with these numbers."""
+        """The operator who holds the device with these numbers; None: nobody."""
         return self.device_with(vector).operator
 
     def _damping_numbers(self, vector: Floats) -> Floats:

@@ -89,7 +89,7 @@ class BoundaryPoints:
         return len(self.stiffness)
 
     def __getitem__(self, some: Flags | Ints) -> BoundaryPoints:
-        """Some of the points."""
+        """The points of a mask (n,), or of indices."""
         own = {name: value[some] for name, value in vars(self).items() if name != "circumstances"}
         around = {name: values[some] for name, values in self.circumstances.items()}
         return replace(self, **own, circumstances=around)

@@ -119,7 +119,7 @@ class TrialPlan:
         )
 
     def groups(self) -> dict[Disturbing, NDArray[np.intp]]:
-        """Indices of the points that are disturbed in the same way."""
+        """Way of disturbing -> indices of the points that are disturbed so."""
         return {
             how: np.array([i for i, own in enumerate(self.disturbing) if own == how])
             for how in dict.fromkeys(self.disturbing)
@@ -133,7 +133,7 @@ def _span(values: Sequence[float]) -> str:
 
 
 def _filled(values: Floats | None, count: int) -> Floats:
-    """Values (n,), those that are not known the median of the others; 0 where nothing is."""
+    """Values (n,), nan replaced by the median of the others; 0 where none is known."""
     known = np.empty(0) if values is None else values[np.isfinite(values)]
     if values is None or not len(known):
         return np.zeros(count)
@@ -211,11 +211,11 @@ class TrialModel(BoundaryModel):
     lost: BoundaryPoints = field(kw_only=True)
 
     def interpolated(self, vector: Floats) -> bool:
-        """The edge is linear in the numbers, exactly."""
+        """False: the simulated edge is exactly linear in the numbers."""
         return False
 
     def deviations(self, vector: Floats, scatter: Scatter) -> Deviations:
-        """The points on the boundary beside the simulated edge."""
+        """Deviations of the points on the boundary from the simulated edge, for numbers (p,)."""
         some = self.points.on_edge
         edges, own = self.points[some], self.simulated.only(some)
         at = own.values(vector)

@@ -229,7 +229,7 @@ def _names(record: Record) -> tuple[str, str]:
 
 
 def _check_signals(record: Record, sampling: SampleTimes) -> list[Check]:
-    """Whether force and position move, the position by more than some of its steps, the force without limit."""
+    """Check that force and position change, the position by many of its steps, the force without a limit."""
     force, position = _names(record)
     low, high = {force: np.inf, position: np.inf}, {force: -np.inf, position: -np.inf}
     step, at_limit, total = np.inf, dict[float, int](), 0
@@ -420,7 +420,7 @@ def _validation(states: Sequence[_State]) -> float:
 
 
 def _check_validation(share: float) -> list[Check]:
-    """Whether the last third of the motion follows the force as the rest does; [] where it does."""
+    """Warn that the last third of the motion does not follow the force as the rest does; [] where it does."""
     if share > PREDICTED:
         return []
     text = (
@@ -434,7 +434,7 @@ def _check_validation(share: float) -> list[Check]:
 
 
 def _estimates(state: _State) -> list[Estimate]:
-    """Lowest and highest |Z|, and what is felt at low frequency."""
+    """Lowest and highest |Z|, and stiffness, damping and mass felt at low frequency, with their intervals."""
     Z, name = state.impedance, STATES[state.name]
     estimates = []
     for what in ("lowest", "highest"):
@@ -449,7 +449,7 @@ def _estimates(state: _State) -> list[Estimate]:
 
 
 def _sentences(state: _State) -> list[str]:
-    """Whether the handle was seen to be passive."""
+    """Sentence that says whether the handle was seen to be passive, and in which octaves not."""
     bands, name = octave_bands(state.impedance), STATES[state.name]
     active = [f"{band.low:g} to {band.high:g} Hz" for band in bands if band.passive is False]
     open_ones = [f"{band.low:g} to {band.high:g} Hz" for band in bands if band.passive is None]

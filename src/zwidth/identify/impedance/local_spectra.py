@@ -188,6 +188,6 @@ def sums_segment_length(samples: int, segment: int | None = None) -> int:
 
 
 def merged_sums(several: Sequence[LocalSpectra]) -> LocalSpectra:
-    """Sums of records together, of the same period and length."""
+    """The sums of several records as one, of the same period and length."""
     gram = sum((one.gram for one in several), np.zeros_like(several[0].gram))
     return replace(several[0], gram=gram, segments=sum(one.segments for one in several))

@@ -90,7 +90,7 @@ class Windows:
 
     @cached_property
     def rows(self) -> Ints:
-        """Rows of all samples in windows, window by window."""
+        """Rows, of position and force, of all samples in windows, window by window."""
         return np.concatenate([np.arange(a, a + n) for a, n in zip(self.first, self.length, strict=True)])
 
 
@@ -109,7 +109,7 @@ class JointNumbers:
     tied: tuple[tuple[int, int], ...] = ()
 
     def with_free(self, some: Floats) -> JointNumbers:
-        """With other values of the free numbers."""
+        """The numbers with other values (p,) of the free ones; tied ones follow."""
         values = self.values.copy()
         values[list(self.free)] = some
         for number, other in self.tied:
@@ -118,7 +118,7 @@ class JointNumbers:
 
     @property
     def free_values(self) -> Floats:
-        """The values that are fitted."""
+        """Values (p,) of the free numbers."""
         return self.values[list(self.free)]
 
 
@@ -420,7 +420,7 @@ def explained(windows: Windows, squares: Floats) -> float:
 def approach(
     windows: Windows, numbers: JointNumbers, starts: Floats, most: int
 ) -> tuple[JointNumbers, Floats, Floats]:
-    """A few steps of the search, for a better guess: numbers, starts (W, 2), and sums of squares (W,)."""
+    """At most so many steps of the search, for a better guess: numbers, starts (W, 2), sums of squares (W,)."""
     search = _Search(windows, numbers, starts, 0)
     search.run(most)
     return search.numbers, search.starts, squares_of(windows, search.numbers, search.starts)

@@ -105,7 +105,7 @@ class FittedJoint:
 
     @property
     def misfit(self) -> float:
-        """Deviation of what remains over that of the readings' noise."""
+        """Root mean square of the residuals over the deviation of a reading; inf of readings without noise."""
         deviation = float(np.sqrt(np.mean(self.fit.residuals**2)))
         noise = self.motion.deviation
         return deviation / noise if noise > 0.0 else np.inf
@@ -260,7 +260,7 @@ def balance_of(fit: JointFit, motion: JointMotion) -> ForceBalance:
 
 
 def _enough(motion: JointMotion, samplings: Sequence[SampleTimes]) -> list[Check]:
-    """That there are stretches without a gap that are long enough to be cut into windows."""
+    """Fail where no stretch without a gap is long enough to be cut into windows; [] where one is."""
     if motion.sections:
         return []
     longest = max(sampling.longest for sampling in samplings)

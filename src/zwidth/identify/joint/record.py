@@ -167,7 +167,7 @@ def noise_of(sections: Sequence[RecordSection]) -> float:
 
 
 def windows_of(motion: JointMotion) -> Windows:
-    """The motion cut into windows: as many as still bend enough, those without motion left out."""
+    """The motion cut into windows: as many as still bend by `BEND` steps, those without motion left out."""
     lengths = [len(one.position) - (BEFORE if motion.driven else 0) for one in motion.sections]
     total = sum(lengths)
     windows = None

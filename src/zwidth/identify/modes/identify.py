@@ -469,13 +469,13 @@ class FittedData:
 
     @property
     def line(self) -> float:
-        """Distance of two lines of the longest stretch [Hz]."""
+        """Distance of two lines of the transform of the longest stretch [Hz]."""
         share = 1.0 - (1.0 / UNSEEN if self._cut else 0.0)
         return 1.0 / (self.survey.longest * share * self.period)
 
     @property
     def _whole(self) -> bool:
-        """Whether whole stretches are for the validation."""
+        """Whether whole stretches, the last fourth of them, are for the validation."""
         return self.survey.covered and self.survey.stretches >= 2 * UNSEEN
 
     @property
@@ -485,7 +485,7 @@ class FittedData:
 
     @property
     def unseen(self) -> str:
-        """What the validation is made on, in words."""
+        """The part of the records that the validation is made on, in words."""
         if self._whole:
             return "the last fourth of the stretches"
         if self._cut:
@@ -588,7 +588,7 @@ class FittedData:
         return bool(np.all(moved < SETTLED * 2.0 * np.pi * self.line))
 
     def by_record(self, pilot: ModalFit) -> list[RecordResponse]:
-        """The response of each record by itself, where there are several."""
+        """The response of each record by itself; [] of a single one."""
         if len(self.sources) < 2:
             return []
         where = self.where(pilot.poles)

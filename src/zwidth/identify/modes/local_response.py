@@ -278,7 +278,7 @@ class NoiseCurve:
     period: float
 
     def __call__(self, frequency: Floats | float) -> Floats:
-        """Power (...) at frequencies (...) [Hz]."""
+        """Power (...) in lines of the twice differenced position at frequencies (...) [Hz]."""
         f = np.asarray(frequency, dtype=float)
         own = np.exp(np.interp(np.log(f), np.log(self.frequency), np.log(self.power)))
         return np.asarray(own * differenced_twice(f, self.period))
@@ -370,7 +370,7 @@ class RecordResponse:
     freedom: float
 
     def apply(self, P: Complexes) -> Floats:
-        """Rows (r,) or (r, c) of P (n,) or of columns (n, c)."""
+        """Real rows (r,) or (r, c) that the map makes of values of P at `theta`, (n,) or columns (n, c)."""
         count = self.banded.shape[0] * TERMS
         columns = P.reshape(len(P), -1)
         of_bands = np.matmul(self.banded, columns[:count].reshape(-1, TERMS, columns.shape[1]))
@@ -385,7 +385,7 @@ class RecordResponse:
 
     @cached_property
     def _telling(self) -> Ints:
-        """Rows of the bands that say something: all but directions that nothing excited."""
+        """Indices of the bands' rows that say something: all but directions that nothing excited."""
         return np.flatnonzero(np.sum(np.abs(self.banded) ** 2, axis=2).ravel())
 
 

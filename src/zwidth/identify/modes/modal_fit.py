@@ -75,12 +75,12 @@ class ModalFit:
 
     @property
     def rates(self) -> Floats:
-        """w (m,) [rad/s]."""
+        """Natural frequencies w (m,) [rad/s]."""
         return np.exp(self.vector[self._before :: 2])
 
     @property
     def ratios(self) -> Floats:
-        """zeta (m,)."""
+        """Damping ratios zeta (m,)."""
         return np.exp(self.vector[self._before + 1 :: 2])
 
     @property
@@ -94,7 +94,7 @@ class ModalFit:
 
     @property
     def delay(self) -> float:
-        """Sum of all delays [s]."""
+        """Delay of the response [s]."""
         return float(self.vector[0]) * self.period
 
     @property
@@ -119,7 +119,7 @@ class ModalFit:
         return self.rows * float(np.log(self.chi_squared / self.rows)) + k * float(np.log(self.rows))
 
     def response(self, theta: Floats) -> Complexes:
-        """P (n,) at angles (n,) [m/N]."""
+        """Response P (n,) at angles (n,) [m/N]."""
         return np.asarray(self.columns(self.vector, theta) @ self.residues)
 
     def columns(self, vector: Floats, theta: Floats) -> Complexes:
@@ -200,7 +200,7 @@ def modes_of(data: RecordResponse, loop: Loop) -> ModalFit:
 
 
 def _pruned(data: RecordResponse, fit: ModalFit) -> ModalFit:
-    """The modes without those that the information criterion does not miss."""
+    """The modes without those whose loss raises the information criterion by no more than `STRONG`."""
     while fit.count > 1:
         shorter = list[ModalFit]()
         for i in range(fit.count):
@@ -215,7 +215,7 @@ def _pruned(data: RecordResponse, fit: ModalFit) -> ModalFit:
 
 
 def _on_base(data: RecordResponse, fit: ModalFit, base: str) -> ModalFit:
-    """The same modes on another base."""
+    """The same modes on another base, one of `BASES`, with the residues solved anew."""
     modes = fit.vector[fit._before :]
     vector = np.r_[fit.vector[0], _first_brake(base, data, fit.period), modes]
     return _solved(data, base, fit.period, vector, fit.damping, fit.coupled)
@@ -398,7 +398,7 @@ def _columns_of(base: str, damping: Damping, period: float, vector: Floats, coup
 def _columns(
     base: str, damping: Damping, period: float, vector: Floats, theta: Floats, coupled: bool = False
 ) -> Complexes:
-    """Responses (n, c) of unit residue."""
+    """Responses (n, c) of unit residues at angles (n,), for poles and delay, `vector`, as `ModalFit` has them."""
     columns, delay = _columns_of(base, damping, period, vector, coupled), float(vector[0])
     aliased = _aliased_hold(period, delay, theta) if any(one.loss for one in columns) else None
     return np.column_stack([_column(one, period, delay, theta, aliased) for one in columns])
@@ -407,7 +407,7 @@ def _columns(
 def _column(
     column: _Column, period: float, delay: float, theta: Floats, aliased: tuple[Floats, Complexes] | None
 ) -> Complexes:
-    """Response (n,) of one column behind a delay in samples."""
+    """Response (n,) of one column behind a delay [samples]; aliased: `_aliased_hold`, for a loss factor."""
     if column.velocity:
         pairs = [(column.decay, column.squared), column.less]
         both = _held_responses(pairs, period, delay, theta, column.velocity)

@@ -302,7 +302,7 @@ def _first_damping(plant: Plant, shape: Floats) -> float:
 
 def _hand_model(device: Device, point: OperatingPoint, full: Sequence[str]) -> SampledModel:
     """The model of a held device, in those of the hand's five numbers that the paths `full` name; (): in all.
-    Raises DeviceError for another path, and for a hand that is no such chain."""
+    Raises DeviceError for another path, and for a hand that is a chain of bodies."""
     operator = point.operator
     assert operator is not None
     if point.arm is not None:

@@ -80,7 +80,7 @@ def survey_of(sources: Sequence[Source], segment: int | None, progress: Progress
 
 
 def _times_as_far(first: Spectra, other: Spectra) -> float:
-    """How many times as far a stretch moves as another one's response says, where both have force."""
+    """How many times as far a stretch (other) moves as the first one's response says, where both have force."""
     into = "reference" if "reference" in first.channels else "force"
     response = first.response(into, "position") * (first.z - 1.0) ** 2
     known = first.coherence(into, "position") > COHERENT
@@ -362,7 +362,7 @@ def averaged_spectra(
 
 
 def merged_spectra(several: Sequence[Spectra]) -> Spectra:
-    """Spectra of records together, of the same channels, period and length."""
+    """Mean spectra of several records, of the same channels, period and length, by their segments."""
     first, count = several[0], sum(one.segments for one in several)
     total = sum((one.matrix * one.segments for one in several), np.zeros_like(first.matrix))
     return replace(first, matrix=total / max(count, 1), segments=count)

@@ -39,12 +39,12 @@ class Channels:
 
     @property
     def turns(self) -> bool:
-        """Whether they are torque and angle."""
+        """Whether force and position are a torque and an angle."""
         return self.force.endswith("_Nm")
 
     @property
     def names(self) -> dict[str, str]:
-        """Column -> field of a `Stretch`."""
+        """Field of a `Stretch` -> column, of those that are there."""
         every = {"force": self.force, "position": self.position}
         every |= {"reference": self.reference, "measured": self.measured}
         return {field_: name for field_, name in every.items() if name}
@@ -109,7 +109,7 @@ class Source:
 
 
 def _stretch(columns: dict[str, Floats]) -> Iterator[Stretch]:
-    """The stretch of these columns, if it is not too short."""
+    """The stretch of these columns (n,) by field; nothing where it has fewer than `SHORTEST` samples."""
     force, position = columns["force"], columns["position"]
     if len(force) >= SHORTEST:
         yield Stretch(force, position, columns.get("reference"), columns.get("measured"))

@@ -59,7 +59,7 @@ class Record(ABC):
         return name in self.names
 
     def columns(self) -> Piece:
-        """All of it at once."""
+        """All rows at once, by column."""
         pieces = list(self.pieces())
         return {name: np.concatenate([piece[name] for piece in pieces]) for name in self.names} if pieces else {}
 
@@ -79,7 +79,7 @@ class ArrayRecord(Record):
         }
 
     def pieces(self, rows: int = ROWS) -> Iterator[Piece]:
-        """Views of the arrays."""
+        """The columns in pieces of so many rows, views of the arrays."""
         count = len(next(iter(self._columns.values()), ()))
         for start in range(0, count, rows):
             yield {name: values[start : start + rows] for name, values in self._columns.items()}
@@ -161,7 +161,7 @@ class CsvRecord(Record):
                 return
 
     def _fault_of_lines(self, error: Exception) -> DeviceError:
-        """The first lines that hold no numbers, looked for one by one."""
+        """An error that names the first lines without numbers, else pandas' own; to be raised by the caller."""
         faults = list[Fault]()
         rows = self._rows()
         _, header = next(rows)
@@ -382,7 +382,7 @@ class TableWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Drop what was written, unless it was handed over."""
+        """Close the temporary file, unless it was handed over."""
         self._drop()
 
     def add(self, piece: Mapping[str, NDArray[Any]]) -> None:
@@ -408,7 +408,7 @@ class TableWriter:
         return None if stream is None else TableCopy(stream, self._names, words, self._rows)
 
     def _numbers(self, name: str, values: NDArray[Any]) -> Ints:
-        """Places of words in the list, new ones put at its end, as long as they are few."""
+        """Places (n,) of words in the column's list, new ones put at its end, as long as they are few."""
         known = self._places[name]
         places = np.full(len(values), -1)
         for word, place in known.items():

@@ -207,7 +207,7 @@ def _check_sweep(sweep: SweepBlocks) -> list[Check]:
 
 
 def _together(responses: Sequence[Response]) -> Response:
-    """Repeated sweeps as one response: their mean, each beside it."""
+    """Repeated sweeps as one response: their mean, with each of them in `sweeps`."""
     if len(responses) == 1:
         return responses[0]
     whole = mean_path([MeasuredPath(one.value, one.coherence) for one in responses])
@@ -378,7 +378,7 @@ def check_responses(
 
 
 def _copies(responses: Sequence[Response], labels: Sequence[str]) -> list[Check]:
-    """Whether a sweep is another one again, to the last digit; [] where none is."""
+    """Fail where a sweep is another one again, to the last digit; [] where none is."""
     seen = dict[bytes, int]()
     for number, response in enumerate(responses):
         before = seen.setdefault(response.value.tobytes(), number)
@@ -398,7 +398,7 @@ def _coherent(response: Response) -> Flags:
 
 
 def _gain(first: Response, other: Response) -> float:
-    """How many times as far as by the first response a sweep moves, all coherent frequencies alike."""
+    """How many times as far a sweep moves as the first response says, median of the coherent frequencies."""
     grid, known = other.frequency, _coherent(first)
     P = np.interp(grid, first.frequency[known], first.value[known])
     good = _coherent(other) & (np.abs(P) > 0.0)

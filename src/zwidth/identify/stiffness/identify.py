@@ -235,7 +235,7 @@ def _stiffness_estimates(fit: SpringFit, bend: Floats, drive: Drive) -> Iterator
 
 
 def _remarks(fit: SpringFit, strokes: Strokes, both_sides: bool) -> Iterator[str]:
-    """What was seen beside the numbers."""
+    """Sentences about what was seen beside the numbers."""
     if not both_sides:
         yield "the spring was bent one way only: the stiffness is that of this way, and says nothing of the other"
     if fit.outliers.any():

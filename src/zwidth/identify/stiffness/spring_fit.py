@@ -93,11 +93,11 @@ class SpringFit:
         return _elastic(self.by_name, bend)
 
     def bend(self, strokes: Strokes) -> Floats:
-        """By how much the spring is bent (n,) [rad]."""
+        """By how much the fitted spring is bent (n,) at the angles of strokes [rad]."""
         return _bend(self.by_name, strokes)
 
     def bend_under(self, strokes: Strokes) -> Floats:
-        """By how much the fitted spring bends (n,) under their torques [rad]."""
+        """By how much the fitted spring bends (n,) under the torques of strokes [rad]."""
         d = self.bend(strokes)
         reach = 2.0 * float(np.max(np.abs(d)))
         grid = np.linspace(-reach, reach, 4001)
@@ -388,7 +388,7 @@ class Strokes:
         return len(np.unique(self.stroke))
 
     def select(self, which: Flags) -> Strokes:
-        """Some of the bins."""
+        """The bins for which `which` (n,) is true."""
         return Strokes(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
 
