@@ -59,7 +59,10 @@ class Entry:
 
     def key(self, attribute: str) -> str:
         """Key in the document: name and unit, such as "damping_Ns_per_m"."""
-        unit = self.unit.replace(" ", "").replace("^", "").replace("/", "_per_")
+        apart = self.unit.replace(
+            "kg m", "kg_m"
+        )  # as device files write it; a force's units stand together: Nm, Ns
+        unit = apart.replace(" ", "").replace("^", "").replace("/", "_per_")
         return "_".join(filter(None, (self.name or attribute, unit)))
 
 

@@ -286,3 +286,10 @@ def test_the_bundled_devices_continuous_force_is_what_its_source_gives():
     assert_allclose(values("continuous_force", place), torque / lever.max(), rtol=1e-3)
     with pytest.raises(MeasureError, match=r"give mechanism\.drives\.motor-right\.torque_limit_Nm"):
         evaluate(find_measure("peak_force"), place)
+
+
+def test_drives_that_leave_joints_free_have_no_largest_force():
+    place = load("da-vinci-mtm").at()
+    assert place.drive_side.motion.shape[-1] > place.drive_side.driven
+    with pytest.raises(MeasureError):
+        place.measure("peak_force")

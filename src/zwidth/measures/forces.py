@@ -268,8 +268,8 @@ def _jacobian(point: OperatingPoint) -> Floats:
 
     Raises  MeasureError  where drives are not coordinates of their own
     """
-    side = point.drive_side
-    if side.motion.shape[-2:] != (side.driven, point.jacobian.shape[-1]):
+    coordinates = point.jacobian.shape[-1]
+    if point.drive_side.motion.shape[-2:] != (coordinates, coordinates):
         raise MeasureError("needs as many drives as degrees of freedom, and no free joints")
     if point.direction.shape[-1] == 3 or point.posture is None:
         return point.jacobian

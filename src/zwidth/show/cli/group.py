@@ -10,38 +10,9 @@ from typing import Any, Final
 import click
 
 from zwidth._version import __version__
-from zwidth.show.cli.sections import GroupedCommands
+from zwidth.show.cli.sections import GROUPS, GroupedCommands
 
-# Name -> module and attribute: a `Command` to be made, or click's own.
-COMMANDS: Final = {
-    "devices": ("devices", "devices"),
-    "schema": ("schema", "schema"),
-    "compile": ("compile", "compile_command"),
-    "new": ("new", "NewCommand"),
-    "import": ("import_", "ImportCommand"),
-    "identify": ("identify", "identify"),
-    "show": ("show", "ShowCommand"),
-    "chart": ("chart", "ChartCommand"),
-    "check": ("check", "CheckCommand"),
-    "polar": ("polar", "PolarCommand"),
-    "load": ("load", "LoadCommand"),
-    "map": ("map", "MapCommand"),
-    "sweep": ("sweep", "SweepCommand"),
-    "tolerance": ("tolerance", "ToleranceCommand"),
-    "optimise": ("optimise", "OptimiseCommand"),
-    "export": ("export", "ExportCommand"),
-    "report": ("report", "ReportCommand"),
-    "sensitivity": ("sensitivity", "SensitivityCommand"),
-    "felt": ("felt", "FeltCommand"),
-    "bounds": ("bounds", "BoundsCommand"),
-    "guarantees": ("guarantees", "GuaranteesCommand"),
-    "robust": ("robust", "RobustCommand"),
-    "simulate": ("simulate", "SimulateCommand"),
-    "experiment": ("experiment", "ExperimentCommand"),
-    "limit-cycles": ("limit_cycles", "LimitCyclesCommand"),
-    "move": ("move", "MoveCommand"),
-    "app": ("app", "app"),
-}
+COMMANDS: Final = {name: place for commands in GROUPS.values() for name, place in commands.items()}
 EPILOG = """\b
 Example:
   zwidth devices

@@ -19,16 +19,52 @@ SHARED: Final[dict[str, Collection[str]]] = {
 }
 FIRST_COLUMN: Final = 30  # characters; longer options stand on a line of their own
 WHOLE: Final = 200  # characters of a summary: all of it
-# What the commands do, in the order of their list and of docs/commands.md.
-GROUPS: Final[dict[str, tuple[str, ...]]] = {
-    "Describe a device": ("devices", "new", "import", "schema", "show"),
-    "Judge walls": ("chart", "check", "polar", "load", "felt", "bounds", "guarantees"),
-    "Simulate contact": ("simulate", "move", "limit-cycles", "experiment"),
-    "Compare postures and devices": ("map", "sweep", "robust", "tolerance"),
-    "Design": ("sensitivity", "optimise", "export"),
-    "Measure": ("identify",),
-    "Show the answers": ("report", "app"),
-    "Set up": ("compile",),
+# What the commands do, in the order of their list and of docs/commands.md: name -> module, and what in it is the
+# command, a `Command` to be made or click's own.
+GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
+    "Describe a device": {
+        "devices": ("devices", "devices"),
+        "new": ("new", "NewCommand"),
+        "import": ("import_", "ImportCommand"),
+        "schema": ("schema", "schema"),
+        "show": ("show", "ShowCommand"),
+    },
+    "Judge walls": {
+        "chart": ("chart", "ChartCommand"),
+        "check": ("check", "CheckCommand"),
+        "polar": ("polar", "PolarCommand"),
+        "load": ("load", "LoadCommand"),
+        "felt": ("felt", "FeltCommand"),
+        "bounds": ("bounds", "BoundsCommand"),
+        "guarantees": ("guarantees", "GuaranteesCommand"),
+    },
+    "Simulate contact": {
+        "simulate": ("simulate", "SimulateCommand"),
+        "move": ("move", "MoveCommand"),
+        "limit-cycles": ("limit_cycles", "LimitCyclesCommand"),
+        "experiment": ("experiment", "ExperimentCommand"),
+    },
+    "Compare postures and devices": {
+        "map": ("map", "MapCommand"),
+        "sweep": ("sweep", "SweepCommand"),
+        "robust": ("robust", "RobustCommand"),
+        "tolerance": ("tolerance", "ToleranceCommand"),
+    },
+    "Design": {
+        "sensitivity": ("sensitivity", "SensitivityCommand"),
+        "optimise": ("optimise", "OptimiseCommand"),
+        "export": ("export", "ExportCommand"),
+    },
+    "Measure": {
+        "identify": ("identify", "identify"),
+    },
+    "Show the answers": {
+        "report": ("report", "ReportCommand"),
+        "app": ("app", "app"),
+    },
+    "Set up": {
+        "compile": ("compile", "compile_command"),
+    },
 }
 
 
