@@ -112,7 +112,7 @@ def draw(figure) -> None:
 if __name__ == "__main__":
     for mass, found in areas.items():
         print(
-            f"{mass}: common area {1e4 * found.common.area:.2f} cm^2 ({1e4 * by_integration[mass]:.2f} by "
+            f"{mass}: common area {1e4 * found.common.area:.2f} cm² ({1e4 * by_integration[mass]:.2f} by "
             f"integration), {100 * found.common.share:.1f} % of what is reached"
         )
     print("at the reference:", at_reference, f"{1e3 * distance_from_reference:.1f} mm from the common area")

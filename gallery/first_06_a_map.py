@@ -17,7 +17,7 @@ print(f"least: {worst.stiffness_max:.0f} N/m at ({worst.x_m:.3f}, {worst.y_m:.3f
 
 wanted = [zwidth.study.parse_requirement(text) for text in ("stiffness_max>=6000", "isotropy<=1.5")]
 good = zwidth.study.common_area(maps, wanted)
-print(f"at least 6 kN/m and a condition number of at most 1.5: {1e4 * good.common.area:.0f} cm^2")
+print(f"at least 6 kN/m and a condition number of at most 1.5: {1e4 * good.common.area:.0f} cm²")
 
 
 def figure():

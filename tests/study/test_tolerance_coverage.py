@@ -21,7 +21,7 @@ from zwidth.study import (
 from zwidth.study.tolerances.intervals import Interval
 from zwidth.study.tolerances.outcomes import indices_of, sampled_shares
 from zwidth.study.tolerances.question import LEAST_INDEX_SAMPLES
-from zwidth.study.tolerances.tolerance_study import _measured, _tightened
+from zwidth.study.tolerances.tolerance_study import _measure_drawn, _tightened
 
 SEEDS = 400
 WALL = (62_000.0, 90.0)
@@ -38,7 +38,7 @@ def found(device: Device, numbers, wall, seed: int, samples: int = 200, index_sa
         return run_job(job, workers=1, batch=job.count)
 
     values = drawn_values(question.tolerances, question.seed, question.samples)
-    job, cells, indices = _measured(question, values, compute)
+    job, cells, indices = _measure_drawn(question, values, compute)
     narrow = _tightened(question, values, cells, compute)
     return ToleranceStudy(question, job, cells, tuple(indices), tightened=narrow)
 
