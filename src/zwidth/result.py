@@ -59,9 +59,7 @@ class Entry:
 
     def key(self, attribute: str) -> str:
         """Key in the document: name and unit, such as "damping_Ns_per_m"."""
-        apart = self.unit.replace(
-            "kg m", "kg_m"
-        )  # as device files write it; a force's units stand together: Nm, Ns
+        apart = self.unit.replace("kg m", "kg_m")  # the blank is kept in a key, "_kg_m2"
         unit = apart.replace(" ", "").replace("^", "").replace("/", "_per_")
         return "_".join(filter(None, (self.name or attribute, unit)))
 
