@@ -61,12 +61,12 @@ class Arc(NamedTuple):
 
     @property
     def curved(self) -> bool:
-        """Whether it is a piece of a curve; else it is straight."""
+        """Whether the arc is a piece of a curve; else it is straight."""
         return self.kind in CURVED
 
     @property
     def angles(self) -> Floats:
-        """The angles that found it with its ends, from first to last."""
+        """Angles (k,) of the arc's start, the samples that found it, and its end, in this order."""
         return _with_ends(self.start, self.thetas, self.end)
 
 
@@ -156,6 +156,7 @@ class Arcs:
         return len(self.kind)
 
     def __getitem__(self, k: int) -> Arc:
+        """Arc k as a tuple of its own: its walls, angles and samples."""
         (K0, B0), (K1, B1) = self.first[k].tolist(), self.last[k].tolist()
         thetas = self.thetas[self.offsets[k] : self.offsets[k + 1]]
         start, end = float(self.start[k]), float(self.end[k])
@@ -166,13 +167,13 @@ class Arcs:
 
     @cached_property
     def rings(self) -> tuple[range, ...]:
-        """Numbers of the arcs of each ring."""
+        """Each ring's arcs, as a range of indices in the order of its walk."""
         ends = (np.flatnonzero(self.next_arc <= np.arange(len(self))) + 1).tolist()
         return tuple(range(low, high) for low, high in zip([0, *ends][:-1], ends, strict=True))
 
     @property
     def curved(self) -> list[int]:
-        """Numbers of the arcs that are pieces of curves."""
+        """Indices of the arcs that are pieces of curves."""
         return np.flatnonzero(np.isin(self.kind, CURVED)).tolist()
 
     def crossings(self, component: int, level: float = 0.0) -> tuple[Ints, Floats]:
@@ -185,7 +186,7 @@ class Arcs:
 
 
 def _next_arcs(counts: Sequence[int]) -> Ints:
-    """For rings of so many arcs, one after the other, the number of the arc after each."""
+    """Index (n,) of the arc after each, its ring being closed, for rings of `counts` arcs one after the other."""
     following: list[int] = []
     for count in counts:
         first = len(following)
@@ -208,7 +209,7 @@ def sample_arcs(arcs: Arcs, curves: Curves) -> list[ArcPoints]:
 
 
 def _with_ends(first: float, inner: Floats, last: float) -> Floats:
-    """Numbers along an arc, from its first wall to its last."""
+    """One array (k + 2,) of the value at the first wall, the inner ones (k,) and that at the last."""
     out = np.empty(len(inner) + 2)
     out[0], out[1:-1], out[-1] = first, inner, last
     return out
@@ -247,7 +248,7 @@ def outline(arcs: list[ArcPoints]) -> Floats:
 
 
 def signed_area(ring: Floats) -> float:
-    """Positive where a closed ring runs counter-clockwise."""
+    """Area within a closed ring (k, 2), negative where it runs clockwise."""
     x, y = ring[:, 0] - ring[0, 0], ring[:, 1] - ring[0, 1]
     return float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
 

@@ -44,7 +44,7 @@ class AreaMemory(NamedTuple):
 
 
 def area_memory() -> AreaMemory:
-    """The memory of `curve_integral`."""
+    """Working memory for `curve_integral`, with the rule in it."""
     return AreaMemory(lobatto_rule(), np.empty((DEEPEST, 6)), np.empty((3, POINTS)))
 
 
@@ -340,7 +340,7 @@ def find_peak(arcs: Arcs, curves: Curves, stiffness_scale: float) -> Peak | None
 
 
 def _angle(arc: Arc, curves: Curves, place: float) -> float:
-    """Angle of the root at a place on an arc: its start, its end, or a parameter of its curve."""
+    """Angle theta of the root at a place on an arc: at its start, its end, or a parameter of its curve."""
     return float(curves[arc.member].angles(np.array([place]))[0]) if arc.curved else place
 
 

@@ -76,11 +76,10 @@ class Chart(Result, ABC):
     @abstractmethod
     @documented(before="stiffness_max")
     def boundary(self) -> tuple[BoundaryArc, ...]:
-        """Arcs of the set's edge, with frequency."""
+        """Arcs of the stable set's edge, each with its walls and the frequencies at which they fail."""
 
     def drawn(self) -> Self:
-        """The chart itself with its regions drawn and their edge judged, for whoever reads them where no error may
-        be raised.
+        """Draw the regions now, and return this same chart: a later look at `regions` raises no error then.
 
         Raises  ChartError  where walls on the edge are not at the limit of stability
         """
@@ -90,7 +89,7 @@ class Chart(Result, ABC):
     @property
     @documented("Hz", before="frequencies_at_stiffness_max")
     def frequency_at_stiffness_max(self) -> float | None:
-        """The lower one [Hz]; None if there is none."""
+        """The lower of `frequencies_at_stiffness_max` [Hz]; None if there is none."""
         return min(self.frequencies_at_stiffness_max, default=None)
 
     @property
@@ -137,7 +136,7 @@ class Chart(Result, ABC):
         return f"{len(self.regions)} stable region{'' if len(self.regions) == 1 else 's'}"
 
     def _numbers(self) -> list[str]:
-        """At most four lines of numbers."""
+        """Largest stiffness, largest damping and area as lines of text; with those added at most four."""
         stiffest = "none: no stable wall has K > 0 and B >= 0"
         if self.frequencies_at_stiffness_max:
             frequencies = " and ".join(f"{frequency:.6g}" for frequency in self.frequencies_at_stiffness_max)
@@ -170,4 +169,5 @@ class DrawnChart(Chart, ABC):
 
 
 def _plain(value: Floats | float | None) -> Any:
+    """An array as nested lists, for documents and tables; anything else as it is."""
     return value.tolist() if isinstance(value, np.ndarray) else value

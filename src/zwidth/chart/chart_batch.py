@@ -51,12 +51,12 @@ class ChartNumbers(NamedTuple):
 
     @property
     def spectral_radius(self) -> Floats:
-        """(N,) of the fastest-decaying walls."""
+        """Spectral radius (N,) of the fastest-decaying wall of each loop."""
         return self.fastest[:, 2].copy()
 
 
 def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS, radius: Floats | None = None) -> ChartNumbers:
-    """The numbers of each loop; one whose sections are none, or whose degree is too high, is DOUBTFUL.
+    """The numbers of each loop's chart; a loop without sections, or of too high a degree, is DOUBTFUL.
 
     what    mask of STIFFEST, WHOLE_EDGE and DECAY
     radius  (N,) of the circle of each loop's chart; None: 1, that of stability
@@ -65,6 +65,7 @@ def chart_numbers(loops: LoopTable, what: int = ALL_NUMBERS, radius: Floats | No
     radii = np.ones(len(loops.rows)) if radius is None else radius
 
     def several(first: int, last: int) -> None:
+        """Fill `out` for loops first to last - 1, in the thread's own memory, which its first call makes."""
         if not hasattr(own, "memory"):
             own.memory = edge_memory(loops, MOST_DEGREE, MOST_SAMPLES)
         _several(loops, own.memory, what, radii, out, first, last)
@@ -109,7 +110,7 @@ def empty_numbers(count: int) -> ChartNumbers:
 def _several(
     loops: LoopTable, memory: EdgeMemory, what: int, radii: Floats, out: ChartNumbers, first: int, last: int
 ) -> None:
-    """Loops first to last - 1, one after the other, each on the circle |z| = its radius."""
+    """Fill `out` for loops first to last - 1, each on the circle |z| = its radius."""
     memory.circle.sizes[COMPUTER] = -1
     for i in range(first, last):
         fill_numbers(loops, i, memory, what, radii[i], out)

@@ -80,6 +80,7 @@ def memory_of_threads(like: EdgeMemory, threads: int, place_for: Any = cuda) -> 
     """
 
     def there(part: Any, place: str) -> Any:
+        """The array, or tuple of arrays, `part` on the GPU; place: its name there, "memory.arcs.kind" for one."""
         if isinstance(part, tuple):
             kind: Any = type(part)
             return kind(*(there(one, f"{place}.{name}") for name, one in zip(kind._fields, part, strict=True)))
@@ -93,7 +94,7 @@ def memory_of_threads(like: EdgeMemory, threads: int, place_for: Any = cuda) -> 
 
 @cache
 def kernel_of_gpu() -> Any:
-    """The kernel; it is compiled when it is first launched, which takes about a minute in each process."""
+    """The GPU's kernel `fill_all`, compiled when first launched, which takes about a minute in each process."""
     numbers, own = function_of_gpu(fill_numbers), cuda.jit(_memory_of_thread(), device=True)
 
     def fill_all(loops: Any, memory: Any, what: int, radius: float, out: Any) -> None:
@@ -121,7 +122,7 @@ def _memory_of_thread() -> Callable[[Any, int], Any]:
 
 
 def _rows(kind: type, place: str, known: dict[str, Any]) -> str:
-    """The text that makes a tuple of this kind of the rows of that at a place; `known` gets the kinds it names."""
+    """Python text that makes a tuple of this kind of one thread's rows of the arrays in the variable `place`."""
     known[kind.__name__] = kind
     parts = []
     for name, inner in get_type_hints(kind).items():
@@ -163,7 +164,7 @@ def function_of_gpu(kernel: Any) -> Any:
 
 
 def _of_gpu(value: Any) -> Any:
-    """What stands on the GPU in place of what a kernel knows by a global name."""
+    """The GPU's stand-in for the value of a kernel's global name: a function for a kernel, NumPy's for NumPy."""
     if isinstance(value, Dispatcher):
         return function_of_gpu(value)
     return _numpy_of_gpu() if value is np and not SIMULATED else value
@@ -220,7 +221,7 @@ def _device_function() -> Any:
         apart: bool
 
         def compile_device(self, arguments: Any, return_type: Any = None) -> Any:
-            """Translate it for types of arguments, once."""
+            """Compile this function for the GPU for types of arguments, once."""
             known = arguments in self.overloads
             result = super().compile_device(arguments, return_type)
             if self.apart and not known:
@@ -232,7 +233,7 @@ def _device_function() -> Any:
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
-    """The code, and that of the functions defined in it."""
+    """A code object, and those of the functions defined in it."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):

@@ -99,7 +99,7 @@ def read_numbers(memory: EdgeMemory) -> bool:
 
 @compiled_lean
 def _largest_stiffness_of_edge(memory: EdgeMemory) -> float:
-    """Largest |K| of the rings' walls."""
+    """Largest |K| [N/m] of the walls of all rings."""
     arcs, K, largest = memory.arcs, memory.samples.K, 0.0
     for k in range(memory.counts[ARCS]):
         if arcs.next_arc[k] >= 0:
@@ -111,7 +111,7 @@ def _largest_stiffness_of_edge(memory: EdgeMemory) -> float:
 
 @compiled_lean
 def _keep_peak(memory: EdgeMemory, least: float, K: float, B: float, t: float, partner: float) -> None:
-    """Take a wall with K above the least and B >= 0 for the stiffest if it is stiffer than the one found."""
+    """Put a wall with K > least, B >= 0 into `peak` if stiffer than that there; t, partner: of its two roots."""
     peak = memory.peak
     if least < K and B >= 0.0 and is_stiffer(K, B, peak[0], peak[1]):
         peak[0], peak[1], peak[2], peak[3] = K, B, t, partner
@@ -131,7 +131,7 @@ def _add_stop(memory: EdgeMemory, B: float) -> bool:
 
 @compiled_lean
 def _read_line(memory: EdgeMemory, k: int, scale: float) -> bool:
-    """What a straight arc adds."""
+    """Add what straight arc k has: area, a crossing of B = 0, a meeting with K = 0; False where memory is full."""
     arcs = memory.arcs
     K0, B0, K1, B1 = arcs.first[k, 0], arcs.first[k, 1], arcs.last[k, 0], arcs.last[k, 1]
     memory.numbers[AREA] += straight_integral(K0, B0, K1, B1)
@@ -143,7 +143,7 @@ def _read_line(memory: EdgeMemory, k: int, scale: float) -> bool:
 
 @compiled_lean
 def _read_curve(memory: EdgeMemory, k: int, scale: float) -> bool:
-    """What an arc of the curve adds."""
+    """Add what arc k of the curve has: area, stiffest wall, meetings with K = 0; False where memory is full."""
     circle, nodes, area = memory.circle, memory.picked, memory.area
     n = fill_nodes(memory, k)
     t, K, B = nodes[0], nodes[1], nodes[2]

@@ -130,7 +130,7 @@ def _add_zeros(out: Features, p: Floats) -> None:
 
 @compiled_apart
 def fill_computer_features(f: CircleFactors, out: Features) -> None:
-    """The points that come from filters and velocity estimate, whatever the plant."""
+    """Put into `out` the singular points that come from filters and velocity estimate, whatever the plant."""
     out.counts[0] = 0
     for k in range(f.sizes[FORCE]):
         _add_roots(out, f.force[k, 1], f.force[k, 2], f.force[k, 3])
@@ -153,7 +153,7 @@ def fill_computer_features(f: CircleFactors, out: Features) -> None:
 
 @compiled_apart
 def fill_features(f: CircleFactors, polynomials: LoopPolynomials, out: Features) -> None:
-    """All points of a loop whose computer's points stand already: poles and zeros of P are added."""
+    """Add to `out`, which has the computer's singular points, the plant's: poles and zeros of P."""
     out.counts[0] = out.counts[1]
     for k in range(f.sizes[SECTIONS]):
         _add_roots(out, f.plant[k, 0], f.plant[k, 1], f.plant[k, 2])
@@ -175,7 +175,7 @@ def fill_features(f: CircleFactors, polynomials: LoopPolynomials, out: Features)
 
 @compiled_lean
 def _fill_distances(radius: float, out: Features) -> None:
-    """z, and the scales of distances to the points and between them."""
+    """Fill in z of each singular point, and the scales of distances to the points and between them."""
     n = out.counts[0]
     for k in range(n):
         s = out.points[k]

@@ -90,7 +90,7 @@ def _find_clear(memory: EdgeMemory, clear: Floats) -> None:
 
 @compiled_lean
 def _insert(memory: EdgeMemory, i: int, t: float) -> None:
-    """A new sample as number i."""
+    """Insert a new sample at t as number i."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     for k in range(n, i, -1):
         samples.t[k], samples.K[k], samples.B[k] = samples.t[k - 1], samples.K[k - 1], samples.B[k - 1]

@@ -199,6 +199,6 @@ def _best_on_axis(tracer: Tracer, points: Floats, axis: int) -> Floats:
 
 
 def _edge_walls(tracer: Tracer) -> Floats:
-    """Walls (k, 2) on whatever edge the curve has on the tracer's circle."""
+    """Walls (k, 2) on every edge that the curve has on the tracer's circle."""
     K, B, edge = decided_trace(tracer, tracer.sample_angles(0.2))
     return np.column_stack([K[edge], B[edge]])

@@ -112,7 +112,7 @@ def fill_line_pieces(memory: EdgeMemory) -> int:
 
 @compiled_lean
 def _add_pieces(memory: EdgeMemory, root: float) -> int:
-    """`fill_line_pieces` for one of the lines."""
+    """`fill_line_pieces` for the line of one real root: 0, z = rho, or inf, z = -rho."""
     _, s, v = line_of(memory, root)
     T, pieces, nodes = memory.size[1], memory.pieces, memory.pieces.nodes
     length = np.hypot(s / T, v)
@@ -248,7 +248,7 @@ def join_arcs(memory: EdgeMemory, blur: float) -> bool:
 
 @compiled_lean
 def _fill_sizes(memory: EdgeMemory) -> None:
-    """Extent of each arc, and size of the whole edge."""
+    """Put the extent of each arc, and the size of the whole edge, into memory."""
     arcs, samples, T = memory.arcs, memory.samples, memory.size[1]
     largest = 0.0
     for k in range(memory.counts[ARCS]):
@@ -265,7 +265,7 @@ def _fill_sizes(memory: EdgeMemory) -> None:
 
 @compiled_lean
 def _number_corners(memory: EdgeMemory, reach: float) -> None:
-    """A number for each end of an arc, the same for ends within reach of each other."""
+    """Give each end of an arc a number in memory, the same to ends within reach of each other: one corner."""
     arcs, T, n = memory.arcs, memory.size[1], memory.counts[ARCS]
     for k in range(2 * n):
         arcs.node[k // 2, k % 2] = -1

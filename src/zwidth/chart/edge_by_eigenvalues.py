@@ -161,7 +161,7 @@ def _stage(
 
 
 def _run(tracer: Tracer, memory: EdgeMemory, stage: int, value: float = 0.0) -> float:
-    """`_stage`. Raises ChartError where memory does not hold what the stage finds."""
+    """`_stage` for a tracer's loop. Raises ChartError where memory does not hold what the stage finds."""
     result = _stage(tracer.table, memory, stage, value, LONGEST, NEAR_END)
     if stage != JOIN and (result == 0.0 if stage != LINE_PIECES else result < 0.0):
         raise ChartError(

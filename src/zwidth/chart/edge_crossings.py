@@ -31,7 +31,7 @@ class EdgeCurve(Protocol):
 
     @property
     def loop(self) -> Loop:
-        """Whose walls they are."""
+        """The loop whose walls the curve has."""
 
     def walls(self, thetas: Floats) -> tuple[Floats, Floats]:
         """K and B (k,) at angles (k,) in (0, pi)."""

@@ -159,7 +159,7 @@ class EdgeMemory(NamedTuple):
 
 
 def edge_memory(loops: LoopTable, most_degree: int, most_samples: int) -> EdgeMemory:
-    """Memory for any one of these loops, up to a degree and so many samples."""
+    """Working memory for any one of these loops, up to a degree and a number of samples."""
     n, a, p = most_samples + 2, MOST_ARCS, MOST_PIECES
     return EdgeMemory(
         circle=factor_memory(loops),

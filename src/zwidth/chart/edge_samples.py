@@ -167,7 +167,7 @@ def walls_again(memory: EdgeMemory) -> None:
 
 @compiled_lean
 def flag_all(memory: EdgeMemory) -> None:
-    """Flags of all samples."""
+    """Flag every sample: EDGE, NO_EDGE, or HIDDEN where rounding leaves it open."""
     samples, n = memory.samples, memory.counts[SAMPLES]
     flag_walls(
         memory.polynomials.coefficients,
@@ -211,7 +211,7 @@ def flag_quadrant(memory: EdgeMemory) -> None:
 
 @compiled_apart
 def edge_flag(memory: EdgeMemory, t: float) -> int:
-    """Flag of the wall at one t."""
+    """Flag (EDGE, NO_EDGE, HIDDEN) of the wall on the curve at one t = tan(theta/2)."""
     K, B = wall_on_circle(memory.circle, t)
     return edges_stable_set(memory.polynomials.coefficients, memory.circle.sizes[DEGREE], t, K, B, memory.room)
 

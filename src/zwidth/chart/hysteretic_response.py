@@ -184,7 +184,7 @@ class SampledResponse:
         return cls(loop, lossy, damped, reference, k[sharp], far)
 
     def __call__(self, thetas: Floats) -> Complexes:
-        """P (n,) at angles (n,) in (0, pi]."""
+        """Sampled response P (n,) [m/N], force to reading with hold and delay, at angles (n,) in (0, pi]."""
         parts = np.array_split(thetas, 1 + len(thetas) // CHUNK)
         near = [_response_difference(self.loop, self.hysteretic, self.viscous, part, self.near) for part in parts]
         low_pass, z = force_filter(self.loop.controller), np.exp(1j * thetas)
@@ -255,7 +255,7 @@ def hysteretic_chart(loop: Loop) -> MeasuredChart:
 
 
 def _response(loop: Loop) -> Response:
-    """P on the circle as a response, close enough to be interpolated."""
+    """P on the unit circle as a response [m/N], at angles so close that it can be interpolated."""
     sampled = SampledResponse.of(loop)
     squared, _ = undamped_modes(loop.plant.mass, loop.plant.stiffness)
     braked = loop.plant.damping.any() or loop.plant.lagged_dampers
@@ -396,7 +396,7 @@ def _angles_between(points: ArcPoints, start: float, end: float) -> Floats:
 
 
 def _walks(curve: HystereticCurve, inner: list[Floats], moved: MovedArcs) -> list[tuple[Floats, Floats]]:
-    """Angles (k,) and walls (k, 2) along each arc, its moved ends included."""
+    """Angles (k,) and walls (k, 2) [N/m, N s/m] along each arc: at its inner angles, and at its moved ends."""
     K, B = curve.walls(np.concatenate(inner)) if sum(map(len, inner)) else (np.empty(0), np.empty(0))
     parts = np.split(np.column_stack([K, B]), np.cumsum([len(thetas) for thetas in inner])[:-1])
     return [
@@ -520,12 +520,12 @@ def _differ_from(arcs: Arcs, start: Floats, end: Floats, corner: Floats, size: F
 
 
 def _inner(angles: Floats) -> Flags:
-    """Which angles lie within (0, pi) and not at its ends."""
+    """Which angles lie within (0, pi), farther than NEAREST from its ends."""
     return (angles > NEAREST) & (angles < np.pi - NEAREST)
 
 
 def _room(angles: Floats) -> Floats:
-    """Distance of angles to the nearer end of (0, pi)."""
+    """Distance of each angle from the nearer of 0 and pi [rad]."""
     return np.minimum(angles, np.pi - angles)
 
 

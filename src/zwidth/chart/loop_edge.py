@@ -85,7 +85,7 @@ class TracedEdge:
 
     @cached_property
     def simple(self) -> list[bool]:
-        """Whether each outline does not cross itself."""
+        """For each of `outlines`, whether it does not cross itself."""
         return [len(outline) > 3 and bool(shapely.Polygon(outline).is_valid) for outline in self.outlines]
 
     @cached_property
@@ -112,11 +112,11 @@ class TracedEdge:
 
     @cached_property
     def regions(self) -> tuple[Floats, ...]:
-        """The cells as simple closed rings (k, 2)."""
+        """The stable cells as closed rings (k, 2) of [K, B] that do not cross themselves."""
         return simple_rings(self.outlines, self.simple)
 
     def boundary(self, period: float | Mapping[int, float]) -> tuple[BoundaryArc, ...]:
-        """The arcs with their frequencies; period as for `chart_fields`."""
+        """The arcs with their walls and frequencies [Hz]; period as for `chart_fields`."""
         members = self.arcs.member.tolist()
         several = isinstance(period, Mapping)
         periods = period if isinstance(period, Mapping) else dict.fromkeys(members, period)
@@ -251,7 +251,7 @@ class LoopEdge:
         return drawn
 
     def _has_numbers_of(self, edge: TracedEdge) -> bool:
-        """Whether the numbers are also those of another edge, to `SAME_NUMBER`."""
+        """Whether another edge has the same largest stiffness, damping and area, to a share SAME_NUMBER."""
         stiffness, other = (0.0 if peak is None else peak.stiffness for peak in (self.peak, edge.peak))
         pairs = (
             (stiffness, other),
@@ -262,7 +262,7 @@ class LoopEdge:
 
 
 def _angles_of(edge: TracedEdge) -> Floats:
-    """Angles of all points of an edge but its corners."""
+    """Angles theta (k,) of all points along an edge's arcs but their ends."""
     return np.concatenate([thetas[1:-1] for thetas, _, _ in edge.arc_points])
 
 

@@ -192,7 +192,7 @@ def fill_polynomials(f: CircleFactors, out: LoopPolynomials) -> None:
 
 @compiled
 def polynomials_of_loop(circle: CircleFactors, out: LoopPolynomials) -> None:
-    """All polynomials of a single loop."""
+    """Fill in all polynomials of a single loop."""
     fill_computer_polynomials(circle, out)
     fill_polynomials(circle, out)
 

@@ -220,7 +220,7 @@ def copy_nodes(source: EdgeNodes, first: int, last: int, nodes: EdgeNodes) -> bo
 
 @compiled_lean
 def _insert(nodes: EdgeNodes, at: int, K: float, B: float, t: float, loop: int) -> bool:
-    """A node of the curve at a place among the others; False where memory is full."""
+    """Insert a node of the curve as number `at` among the others; False where memory is full."""
     n = nodes.used[0]
     if n >= len(nodes.K):
         return False

@@ -62,7 +62,7 @@ def terms_at(circle: CircleFactors, theta: float) -> tuple[complex, complex, com
 
 @compiled_lean
 def _times_denominators(A: complex, rows: Floats, count: int, cc: float, ss: float, sc: float) -> complex:
-    """A times the denominators of a computer's factors, of size 1."""
+    """A turned by the phase of the denominators of a computer's factors, whose sizes are left out."""
     for k in range(count):
         if rows[k, 0] == 1.0:
             den = complex(rows[k, 4] * np.sqrt(cc), rows[k, 5] * np.sqrt(ss))
@@ -74,7 +74,7 @@ def _times_denominators(A: complex, rows: Floats, count: int, cc: float, ss: flo
 
 @compiled
 def terms_along(circle: CircleFactors, thetas: Floats) -> Complexes:
-    """(n, 3): A, A P, A P w at angles in (0, pi)."""
+    """`terms_at` each of n angles in (0, pi): (n, 3) of A, A P, A P w."""
     out = np.empty((len(thetas), 3), dtype=np.complex128)
     for i in range(len(thetas)):
         out[i, 0], out[i, 1], out[i, 2] = terms_at(circle, thetas[i])
@@ -91,7 +91,7 @@ def _phase_change(before: complex, after: complex) -> float:
 
 @compiled_lean
 def _side(theta: float, pair: float) -> float:
-    """Sign of cos theta - cos pair where there is a pair."""
+    """Sign of cos theta - cos pair, at theta, of a pair of roots at angle `pair`; 1 without one (pair 0)."""
     return -1.0 if 0.0 < pair < theta else 1.0
 
 

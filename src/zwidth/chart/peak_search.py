@@ -85,7 +85,7 @@ def search_peak(memory: EdgeMemory) -> int:
 
 @compiled_lean
 def _keep(memory: EdgeMemory, K: float, B: float, t: float, partner: float) -> None:
-    """Take a wall for the stiffest if it is stiffer than the one found."""
+    """Put a wall with B >= 0 into `peak` if it is stiffer than that there; t, partner: of its two roots."""
     peak = memory.peak
     if B >= 0.0 and is_stiffer(K, B, peak[0], peak[1]):
         peak[0], peak[1], peak[2], peak[3] = K, B, t, partner

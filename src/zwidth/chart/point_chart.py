@@ -38,7 +38,7 @@ AT_ONCE: Final = 32768  # loops that are in memory at once
 
 
 def pieces_of_points(point: OperatingPoint) -> Iterator[tuple[slice, OperatingPoint]]:
-    """All points, flat, as many at a time as are in memory at once; and which they are."""
+    """Pieces of all points, flat, each as large as memory holds, with the slice of the points that it is."""
     count = int(np.prod(point.shape))
     if count <= AT_ONCE:
         yield slice(None), point
@@ -127,13 +127,13 @@ def pole_pairs_of_points(point: OperatingPoint, model: Model, coupled: bool = Tr
 
 
 def _alone(point: OperatingPoint) -> bool:
-    """Whether who holds the device holds it in more than the rendered direction."""
+    """Whether the loop of each point is built alone: its operator holds more than the rendered direction."""
     across = point.operator is not None and point.operator.directions == "all" and point.mechanism is not None
     return point.arm is not None or (across and (point.model or "full") == "full")
 
 
 def _known_together(mechanism: Mechanism, model: Model) -> bool:
-    """Whether the modes of many postures are computed together."""
+    """Whether the modes of a mechanism's many postures can be computed together."""
     return is_plain(mechanism) or (model == "full" and has_general_modes(mechanism))
 
 
@@ -143,6 +143,7 @@ def _is_held(point: OperatingPoint, model: Model) -> bool:
 
 
 def _modes(point: OperatingPoint, model: Model) -> RenderedModes:
+    """Modes of all points' plants, without operator, by the given plant or by the mechanism in its postures."""
     if point.given_plant is not None:
         return plant_modes(point.given_plant, point.shape)
     assert point.mechanism is not None
@@ -220,6 +221,7 @@ def numbers_of_points(point: OperatingPoint, what: int, radius: Floats | None = 
 
 
 def _numbers(point: OperatingPoint, what: int, radius: Floats | None) -> ChartNumbers | None:
+    """`numbers_of_points`, computed anew for flat radii (N,): piece by piece, as many points as memory holds."""
     parts = []
     for at, piece in pieces_of_points(point):
         table = table_of_points(piece)
@@ -230,6 +232,7 @@ def _numbers(point: OperatingPoint, what: int, radius: Floats | None) -> ChartNu
 
 
 def _compute(loops: LoopTable, what: int, radius: Floats | None) -> ChartNumbers:
+    """The numbers of each loop's chart, on the GPU if that is in use and all circles are the unit circle."""
     if processor_in_use() == "cpu" or radius is not None:
         return chart_numbers(loops, what, radius)
     from zwidth.chart.chart_cuda import numbers_on_gpu

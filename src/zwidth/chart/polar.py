@@ -58,7 +58,7 @@ class ByDirection(Result):
     @property
     @documented("deg", name="angle", before="stiffness")
     def angles(self) -> Floats:
-        """(k,) from the plane's first axis towards its second [deg]; nan for directions round no plane."""
+        """Angles (k,) from the plane's first axis to its second [deg]; nan for directions round no plane."""
         count = len(self.stiffness)
         return 360.0 * np.arange(count) / count if self.plane else np.full(count, np.nan)
 
@@ -77,6 +77,7 @@ class ByDirection(Result):
         return {f"direction_{axis}": self.directions[:, k] for k, axis in enumerate("xyz")} | columns
 
     def __repr__(self) -> str:
+        """Number of directions and range of their largest stiffness, or why none has any."""
         count, around = len(self.stiffness), f" round the {self.plane} plane" if self.plane else ""
         if self.reason is not None:
             return f"ByDirection: {count} directions{around}: {self.reason}"
@@ -176,7 +177,7 @@ def largest_stiffness_by_direction(
 
 
 def _together(point: OperatingPoint, units: Floats) -> list[tuple[float, float, float, str] | None]:
-    """Stiffness, damping, frequency and status along each unit vector (k, 3); None for one to be traced alone."""
+    """K [N/m], B [N s/m], frequency [Hz], status for each unit vector (k, 3); None: to be traced alone."""
     assert point.posture is not None
     posture = point.posture.broadcast_to((len(units),))
     along = replace(point, posture=posture, directions=units[:, None, :], wall_matrices=None)
@@ -225,7 +226,7 @@ def _plants(point: OperatingPoint) -> Callable[[Floats], Plant]:
 
 
 def _stiffest(plant: Callable[[Floats], Plant], along: OperatingPoint) -> tuple[float, float, float, str]:
-    """Stiffness, damping, frequency and status along the direction of a point, whose plant `_plants` gives."""
+    """K [N/m], B [N s/m], frequency [Hz], status of the stiffest wall along a point's direction."""
     none = float("nan")
     try:
         loop = Loop(plant(along.direction), along.computer)

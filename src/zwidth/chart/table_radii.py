@@ -70,7 +70,7 @@ def slowest_roots(
 
 
 def _radii(loops: LoopTable, which: Ints, K: Floats, B: Floats, leverage: bool) -> tuple[Floats, Floats]:
-    """Radii (p,), and leverages (p,) if these are wanted, else nan."""
+    """Spectral radii (p,) of walls K, B (p,), and leverages (p,) of `radii_and_leverages` if wanted, else nan."""
     radii, leverages = np.full((2, len(which)), np.nan)
     for walls, states in _batches(loops, which):
         with np.errstate(over="ignore", invalid="ignore"):
@@ -111,7 +111,7 @@ def _batches(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpace]]
 
 
 def _leverages(z: Complexes, states: StateSpace) -> Floats:
-    """The largest (p,) over the roots that are, or are nearly, the largest of z (p, N)."""
+    """Largest leverage (p,), |dz| over |dL / L|, of those roots z (p, N) that are, or nearly are, the largest."""
     poles = np.linalg.eigvals(states.open)
     size = np.abs(z)
     largest = size > size.max(axis=-1, keepdims=True) - BESIDE

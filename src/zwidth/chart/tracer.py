@@ -47,7 +47,7 @@ ROOTS: tuple[RealRoot, RealRoot] = ("plus", "minus")
 
 
 def tracer_of(loop: Loop, radius: float = 1.0) -> Tracer:
-    """The loop on a circle; on the unit circle it is kept with the loop."""
+    """The tracer of a loop on the circle |z| = radius; that on the unit circle is kept with the loop."""
     if radius != 1.0:
         return Tracer(loop, radius)
     if "tracer" not in loop.results:
@@ -79,7 +79,7 @@ class Tracer:
 
     @cached_property
     def all_polynomials(self) -> LoopPolynomials:
-        """Its polynomials there, with the products that they are made of."""
+        """The loop's polynomials on the circle, with the products that they are made of."""
         every = polynomial_memory(self.degree)
         polynomials_of_loop(self.circle, every)
         return every
@@ -116,7 +116,7 @@ class Tracer:
         return walls(self.circle, thetas)
 
     def angles(self, parameters: Floats) -> Floats:
-        """The angles themselves."""
+        """The parameters themselves, which are angles."""
         return parameters
 
     def zeros(self, arc: Arc, component: int) -> Floats:
@@ -157,7 +157,7 @@ class Tracer:
 
     @cached_property
     def _circle(self) -> tuple[Floats, Complexes]:
-        """Samples of the circle, and the loop's terms along them."""
+        """Angles (n,) of samples of the circle, and A, A P, A P w (n, 3) there, for `flags_by_phase`."""
         thetas = self.sample_angles(0.2)
         # soft walls have roots as near to z = 1 as one likes
         closer = np.logspace(-8.0, -1.0, 8)
@@ -182,7 +182,7 @@ class Tracer:
         return int(flags[0] or self.edge_by_eigenvalues(one, K, B)[0])
 
     def edge_by_eigenvalues(self, thetas: Floats, K: Floats, B: Floats) -> Ints:
-        """The flag from all eigenvalues but the pair at each angle."""
+        """Flags (EDGE, NO_EDGE, HIDDEN) of walls on the curve, by all eigenvalues but the pair at their angle."""
         z = np.abs(self.roots_without_pair(thetas, K, B)).max(axis=-1) - self.radius
         return np.where(z < -CIRCLE_TOLERANCE, EDGE, np.where(z > CIRCLE_TOLERANCE, NO_EDGE, HIDDEN))
 
@@ -221,7 +221,7 @@ class Tracer:
         return self.polynomials[:3, 0 if root == "plus" else -1].copy()
 
     def edge_on_line(self, root: RealRoot, K: float, B: float) -> bool:
-        """Whether a wall on that line has all its other roots inside."""
+        """Whether a wall on the line of a real root has all its other roots inside the circle."""
         if self.is_high_degree:
             flag = int(self.flags_by_phase(np.array([[K, B]]), np.zeros(1), 1)[0])
         else:

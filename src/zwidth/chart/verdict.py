@@ -69,6 +69,7 @@ class WallVerdicts(Result):
         return {"points": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]}
 
     def __repr__(self) -> str:
+        """The verdict on a single wall, or how many walls have each verdict."""
         names = self.names
         if len(names) == 1:
             wall = f"{float(self.stiffness.ravel()[0]):.6g} N/m, {float(self.damping.ravel()[0]):.6g} N s/m"
@@ -92,6 +93,7 @@ class Verdicts(WallVerdicts):
     unheld: Ints
 
     def table(self) -> dict[str, list[Any]]:
+        """The walls as columns, with spectral radius and number of unheld positions."""
         return super().table() | {
             "spectral_radius": self.spectral_radius.ravel().tolist(),
             "unheld_positions": self.unheld.ravel().tolist(),
@@ -149,7 +151,7 @@ def verdicts(
 
 
 def _unheld(loop: Loop | MultiLoop, K: Floats) -> Ints:
-    """Positions that nobody holds on walls K (...)."""
+    """Number (...) of positions that nobody holds on each wall K (...): 0 unless K is 0."""
     free = K == 0.0
     return np.where(free, unheld_positions(loop) if np.any(free) else 0, 0)
 

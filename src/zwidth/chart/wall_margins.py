@@ -84,6 +84,7 @@ def stiffness_with_margins(
     out, status, own = np.full((N, 2), np.nan), np.full(N, DOUBTFUL, dtype=np.uint8), local()
 
     def several(first: int, last: int) -> None:
+        """Fill `out` and `status` for devices first to last - 1, in the thread's own memory."""
         if not hasattr(own, "memory"):
             own.memory = _memory(loops, delays)
         _several(loops, delays, stiffness_margin, damping_margin, own.memory, out, status, first, last)
@@ -112,6 +113,7 @@ class MarginMemory(NamedTuple):
 
 
 def _memory(loops: LoopTable, delays: int) -> MarginMemory:
+    """Working memory for any of these devices, each with its edges at so many delays."""
     return MarginMemory(
         edge_memory(loops, MOST_DEGREE, MOST_SAMPLES),
         factor_memory(loops),

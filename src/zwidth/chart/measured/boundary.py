@@ -56,7 +56,7 @@ class Boundary:
     reference_count: int
 
     def outside(self, walls: Floats) -> Ints:
-        """Numbers (n,) of roots outside the circle of walls (n, 2)."""
+        """How many roots each of walls (n, 2) [K, B] has outside the unit circle: (n,)."""
         return roots_outside(
             self.segments, self.jumps, self.reference, self.reference_count, np.ascontiguousarray(walls)
         )
@@ -98,9 +98,11 @@ def refine_angles(loop: MeasuredLoop, angles: Floats, box: Window, tolerance: fl
     scale, low = np.array([K1 - K0, B1 - B0]), np.array([K0, B0])
 
     def scales(theta: Floats) -> Floats:
+        """Width and height of the box (n, 2), the unit of K and of B at every angle (n,)."""
         return np.broadcast_to(scale, (len(theta), 2))
 
     def tolerances(a: Floats, b: Floats, middle: Floats) -> Floats:
+        """Allowed distances (n,) of chords from a to b (n, 2): inf where a chord misses the box, here [0, 1]^2."""
         touches = np.all((np.maximum(a, b) >= 0.0) & (np.minimum(a, b) <= 1.0), axis=1)
         return np.where(touches, tolerance, np.inf)
 
@@ -111,9 +113,11 @@ def coarse_angles(loop: MeasuredLoop) -> Floats:
     """Angles at which chords follow the whole curve, within a share COARSE of its distance from K = B = 0."""
 
     def scales(theta: Floats) -> Floats:
+        """Sizes of K and of B that count at each angle: (n, 2) at angles (n,)."""
         return wall_scales(loop, theta)
 
     def tolerances(a: Floats, b: Floats, middle: Floats) -> Floats:
+        """Allowed distances (n,) of chords: a share of their middles' distance from K = B = 0."""
         return np.asarray(COARSE * np.hypot(*middle.T))
 
     return _bisect_chords(loop, first_measured_angles(loop), np.zeros(2), scales, tolerances)
@@ -166,7 +170,7 @@ def wall_scales(loop: MeasuredLoop, theta: Floats) -> Floats:
 
 
 def large_wall_scale(loop: MeasuredLoop) -> Floats:
-    """Values (2,) of |h| and |h / w| that are exceeded at a tenth of the measured frequencies."""
+    """Sizes (2,) of a large K and B: |h| and |h / w| that only a tenth of the measured frequencies exceed."""
     return np.asarray(np.quantile(wall_scales(loop, loop.angles_below_pi), 0.9, axis=0))
 
 

@@ -111,7 +111,7 @@ class MeasuredChart(DrawnChart):
     @property
     @documented(before="measured_stiffness_max")
     def integrators(self) -> int:
-        """Poles of the response at z = 1."""
+        """Number of poles of the response at z = 1."""
         return self.loop.integrators
 
     @cached_property
@@ -148,6 +148,7 @@ class MeasuredChart(DrawnChart):
         )
 
     def _numbers(self) -> list[str]:
+        """Lines of the chart's numbers, with the largest stiffness within the measurement's error."""
         if self.band is None:
             return [*super()._numbers(), "error              not known; nothing is said about how sure this is"]
         high = self.band.stiffness_high
@@ -230,7 +231,7 @@ def _nominal_of_sweeps(response: Response, controller: Controller) -> Iterator[f
 
 
 def _credible_cells(loop: MeasuredLoop, cells: StableRegions) -> StableRegions:
-    """The cells that are not made by noise: loops of the curve between a few points, or all in doubt."""
+    """The cells without those that noise makes: edged by too few measured points, or with every wall in doubt."""
     K0, K1, B0, B1 = cells.box
     scale = np.array([K1 - K0, B1 - B0])
     doubt = doubt_along(loop, cells.edge, cells.box) if cells.polygons else None
@@ -254,7 +255,7 @@ def _walls_within(cell: shapely.Polygon, scale: Floats) -> Floats:
 
 
 def _edge_distances(loop: MeasuredLoop, cell: shapely.Polygon, scale: Floats) -> Floats:
-    """Distance (n,) of the measured points below pi from a cell's edge, in units of `scale`."""
+    """Distance (n,) from a cell's edge of the walls at measured angles below pi; scale (2,): units of K, B."""
     K, B, _ = loop.walls(loop.angles_below_pi)
     outline = shapely.transform(cell.boundary, lambda xy: xy / scale)
     return np.asarray(shapely.distance(outline, shapely.points(np.column_stack([K, B]) / scale)))
@@ -320,7 +321,7 @@ def _no_edge_message(loop: MeasuredLoop) -> str:
 
 
 def _chart(loop: MeasuredLoop, cells: StableRegions, opened: bool) -> MeasuredChart:
-    """The chart from its cells."""
+    """The chart of a loop from its stable cells; opened: the boundary does not close them."""
     peak, zoomed = ((nan, nan), cells) if opened else refine_peak(loop, cells)
     arcs = tuple(_arcs(loop, cells))
     points = [(K, B) for arc in arcs for K, B in zip(arc.stiffness, arc.damping, strict=True)]
@@ -393,7 +394,7 @@ def doubt_along(loop: MeasuredLoop, edge: Boundary, box: Window) -> Doubt | None
 
 
 def _meaning(loop: MeasuredLoop) -> str:
-    """What the band covers, in words."""
+    """In words: the confidence of the measurement's error band, and what the error is known from."""
     response = loop.response
     sources = ["coherence"] if response.coherence is not None else []
     if response.sweeps is not None:
@@ -449,7 +450,7 @@ def _line_intervals(ring: Floats, h: float, w: float, scale: Floats) -> Iterator
 
 
 def _mark_on_edge(loop: MeasuredLoop, cells: StableRegions) -> Iterator[UnusableRange]:
-    """The unusable stretches, and whether the stable set's edge runs through each."""
+    """The loop's unusable stretches of frequency, each marked whether the stable set's edge runs through it."""
     edge = cells.edge
     scale = np.array([cells.box[1] - cells.box[0], cells.box[3] - cells.box[2]])
     f = edge.angles / (2.0 * np.pi * loop.period)

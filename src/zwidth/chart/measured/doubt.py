@@ -96,6 +96,7 @@ class Doubt:
         )
 
     def _stretches(self, walls: Floats) -> tuple[Ints, Ints]:
+        """`stretches` of so few walls (n, 2) that they fit in memory at once."""
         F, reach, _, away = self._way(walls)
         flags = np.zeros((len(walls), 2 * len(self.angles) + 1), dtype=bool)
         flags[:, 1::2] = np.abs(F) <= reach

@@ -53,6 +53,11 @@ class MeasuredLoop:
     usable: Flags = field(init=False)
 
     def __post_init__(self) -> None:
+        """Choose the usable frequencies.
+
+        Raises  ResponseError  where they are too few or too high, or where the controller holds what the response
+                               holds already
+        """
         if self.controller.fixed_feedback:
             raise ResponseError(
                 f"a measured response has no model from which {self.controller.feedback_names[0]} could be "
@@ -89,7 +94,7 @@ class MeasuredLoop:
 
     @cached_property
     def integrators(self) -> int:
-        """Poles of P at z = 1."""
+        """Number of poles of P at z = 1."""
         return integrators_of(self.response, self.period)
 
     @cached_property
@@ -105,7 +110,7 @@ class MeasuredLoop:
 
     @cached_property
     def interpolation(self) -> ResponseInterpolation:
-        """The response between these angles, below them, and above where it is known to be small."""
+        """The response interpolated between `angles`, continued below them, and above where it is known small."""
         closed, to_end = reaches_half_rate(self.angles)
         low, P_low = self._continued_down()
         high, P_high = (np.empty(0), np.empty(0)) if to_end or not self.bounded else self._continued_up()
@@ -122,7 +127,7 @@ class MeasuredLoop:
 
     @property
     def _across_noise(self) -> Flags:
-        """Between which of `angles` (n - 1,) noise was measured, with ends that are not sure either."""
+        """Which intervals (n - 1,) of `angles` hold frequencies left out as noise, and have an unsure end."""
         if self.errors is None:
             return np.zeros(len(self.angles) - 1, dtype=bool)
         left_out = np.diff(np.flatnonzero(self.usable)) > 1
@@ -172,21 +177,21 @@ class MeasuredLoop:
         return float(np.pi if self.interpolation.closed else self.angles[-1])
 
     def h(self, theta: Floats) -> Complexes:
-        """h = -1/P (...) at angles in (0, pi], software delay and force filter in P; inf where P is 0."""
+        """h = -1/P (...) [N/m] at angles in (0, pi], software delay and force filter in P; inf where P is 0."""
         delay, force = round(self.controller.delay), force_filter(self.controller)
         with np.errstate(divide="ignore", invalid="ignore"):
             passed = factor_response(force.numerator, force.denominator, around_one(theta))
             return np.asarray(-self.interpolation.inverse(theta) * np.exp(1j * theta * delay) / passed)
 
     def w(self, theta: Floats) -> Complexes:
-        """The velocity estimate w (...) at angles in (0, pi]."""
+        """Response w (...) [1/s] of the velocity estimate to the position, at angles theta in (0, pi]."""
         d, own = around_one(theta), velocity_estimator(self.controller)
         return np.asarray(
             factor_response(own.numerator, own.denominator, d) * window_response(own.window, 1.0 + d)
         )
 
     def walls(self, theta: Floats) -> tuple[Floats, Floats, Floats]:
-        """K, B of the wall that fails at each angle, and the sign of Im w there."""
+        """K [N/m], B [N s/m] of the wall with a root at exp(i theta), and sign of Im w: each (...) as theta."""
         h, w = self.h(theta), self.w(theta)
         with np.errstate(divide="ignore", invalid="ignore"):
             B = h.imag / w.imag
@@ -202,7 +207,7 @@ class MeasuredLoop:
 
     @cached_property
     def _radius(self) -> Floats | None:
-        """Radius (n,) over |P| at all frequencies, usable or not."""
+        """Error of P at all frequencies (n,), usable or not, over |P|, as in `errors`; None: unknown."""
         return joint_radius(self.response)
 
     @cached_property
@@ -310,7 +315,7 @@ class UnusableRange(Documented):
 
 
 def reaches_half_rate(theta: Floats) -> tuple[bool, bool]:
-    """Whether the response goes on to theta = pi, and whether that is measured and not continued."""
+    """Whether a response at angles theta (n,) is taken on to pi, and whether it was measured that far."""
     spacing = np.max(np.diff(theta[-4:]))
     measured = bool(np.pi - theta[-1] <= SHORT_OF_END * spacing)
     return measured or bool(theta[-1] >= CONTINUED * np.pi), measured
@@ -319,7 +324,7 @@ def reaches_half_rate(theta: Floats) -> tuple[bool, bool]:
 def unusable_ranges(
     response: Response, good: Flags, period: float, interpolation: ResponseInterpolation
 ) -> Iterator[UnusableRange]:
-    """The unusable stretches from low to high frequency."""
+    """Stretches of frequency that cannot be relied on, ascending; good (n,): which frequencies are used."""
     f = response.frequency[good]
     theta = 2.0 * np.pi * f * period
     half = 0.5 / period
@@ -345,7 +350,7 @@ def unusable_ranges(
 
 
 def _incoherent(response: Response, good: Flags) -> Iterator[UnusableRange]:
-    """Runs of dropped frequencies between the used ones on both sides."""
+    """Stretches of frequencies that are not `good` (n,), each from the good one before to that after it."""
     for run in _runs(~good, SAME_STRETCH):
         low = response.frequency[run[0] - 1] if run[0] > 0 else 0.0
         high = response.frequency[min(run[-1] + 1, len(good) - 1)]
@@ -363,7 +368,7 @@ def _incoherent(response: Response, good: Flags) -> Iterator[UnusableRange]:
 
 
 def _gaps(f: Floats, errors: Floats) -> Iterator[UnusableRange]:
-    """Neighbours between which nothing was measured or P cannot be interpolated; adjoining ones as one."""
+    """Stretches of f (n,) [Hz] not measured, or where P cannot be interpolated by errors (n - 1,) between them."""
     spacing = np.diff(f)
     around = np.array([np.median(spacing[max(0, i - 5) : i + 6]) for i in range(len(spacing))])
     empty = (spacing > WIDEST_GAP * around) & (f[1:] > WIDEST_RATIO * f[:-1])
@@ -382,6 +387,6 @@ def _gaps(f: Floats, errors: Floats) -> Iterator[UnusableRange]:
 
 
 def _runs(flags: Flags, reach: int = 1) -> list[Ints]:
-    """Indices of the true, those together that are no farther apart than `reach`."""
+    """Indices of the true flags in groups, within which neighbours are no farther apart than `reach`."""
     at = np.flatnonzero(flags)
     return np.split(at, np.flatnonzero(np.diff(at) > reach) + 1) if len(at) else []

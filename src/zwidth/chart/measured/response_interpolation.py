@@ -42,11 +42,11 @@ class ResponseInterpolation:
     closed: bool
 
     def _at(self, theta: Floats) -> Ints:
-        """Number (...) of the interval that holds each angle."""
+        """Index (...) of the interval between nodes that holds each angle."""
         return np.clip(np.searchsorted(self.nodes, theta, side="right") - 1, 0, len(self.nodes) - 2)
 
     def inverse(self, theta: Floats) -> Complexes:
-        """1 / P at angles (...) within (0, pi]."""
+        """Interpolated 1 / P (...) [N/m] at angles theta (...) in (0, pi]."""
         i = self._at(theta)
         kind = self.kind[i]
         step = self.nodes[i + 1] - self.nodes[i]
@@ -150,13 +150,13 @@ def _missed_between(x: Floats, y: Complexes, kinds: Complexes) -> Floats:
 
 
 def _windows(n: int) -> tuple[Ints, Flags]:
-    """Five neighbouring nodes (n, 5) round each node, and which of them it is itself."""
+    """Indices (n, 5) of five neighbouring nodes round each of n nodes, and which of the five is itself."""
     window = np.clip(np.arange(n) - 2, 0, n - 5)[:, None] + np.arange(5)
     return window, window == np.arange(n)[:, None]
 
 
 def _slopes(x: Floats, y: Complexes) -> Complexes:
-    """Derivative at each node of the polynomial through it and its four neighbours (nodes of any spacing)."""
+    """Derivative (n,) at each node x, y (n,) of the polynomial through it and four neighbours; any spacing."""
     window, here = _windows(len(x))
     scale, gaps = _products(x, window, here)
     weights = scale[here][:, None] / (scale * gaps)

@@ -61,7 +61,7 @@ class StableRegions:
     polygons: tuple[shapely.Polygon, ...]
 
     def select(self, selected: Flags) -> StableRegions:
-        """Some of these cells."""
+        """These regions with only those cells whose flag in `selected` (n,) is true."""
         return replace(
             self, polygons=tuple(cell for cell, keep in zip(self.polygons, selected, strict=True) if keep)
         )
@@ -110,7 +110,7 @@ def regions_within(loop: MeasuredLoop, known: Boundary, box: Window) -> StableRe
 
 
 def _chords(edge: Boundary, low: Floats, scale: Floats) -> list[shapely.Geometry]:
-    """The segments that meet the unit window, clipped to it; ends of the curve drawn a tick across."""
+    """The segments in the window, in its units (wall - low) / scale; ends of the curve drawn a tick across."""
     ends = (edge.segments.reshape(-1, 2, 2) - low) / scale
     for first, kind in ((0, -1), (np.flatnonzero(edge.angle_index >= 0)[-1], -2)):
         if np.any(edge.angle_index == kind):
@@ -193,14 +193,14 @@ def refine_peak(loop: MeasuredLoop, cells: StableRegions) -> tuple[tuple[float, 
 
 
 def _stiffest(cells: StableRegions) -> tuple[float, float]:
-    """The corner or crossing of B = 0 of largest K, with K > 0 and B >= 0; nan where there is none."""
+    """K [N/m], B [N s/m] of the stiffest wall on the cells' edges with K > 0, B >= 0; nan without one."""
     # corners are noded to 1e-11 of the window: what is stiff by less than 1e-9 of it may be no wall
     peak = find_peak(cells.edge_arcs, (), 10.0 * (cells.box[1] - cells.box[0]))
     return (peak.stiffness, peak.damping) if peak else (nan, nan)
 
 
 def _around(wall: tuple[float, float], box: Window, of_K: float, of_B: float) -> Window:
-    """The window that extends these shares of a box to either side of a wall."""
+    """The window about a wall (K, B) that extends shares of_K and of_B of a box to either side of it."""
     K, B = wall
     half_K, half_B = of_K * (box[1] - box[0]), of_B * (box[3] - box[2])
     return K - half_K, K + half_K, B - half_B, B + half_B
@@ -296,7 +296,7 @@ def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> 
 
 
 def _ellipses(loop: MeasuredLoop, cells: StableRegions, scale: Floats, curve: Ints) -> shapely.Geometry:
-    """The union of convex hulls of each two neighbouring ellipses along these chords."""
+    """One area that joins the ellipses of doubt along chords of the curve, neighbours by their convex hull."""
     edge = cells.edge
     every = max(1, len(curve) // MOST_ELLIPSES)
     hulls: list[shapely.Geometry] = []
@@ -418,7 +418,7 @@ def _certain(edge: Boundary, doubt: Doubt, dampings: Floats) -> Floats:
 
 
 def _intervals(edge: Boundary, doubt: Doubt, B: float) -> Floats:
-    """Intervals of K (n, 2) in doubt on the line of damping B; ends may be infinite."""
+    """Intervals of K (n, 2) [N/m] that are in doubt on the line of damping B [N s/m]; ends may be infinite."""
     p, s, w, R2 = doubt.response, doubt.scale, doubt.velocity, doubt.radius**2
     base = s + p * (B * w)
     a = np.abs(p) ** 2 - R2
@@ -457,7 +457,7 @@ def _crossings(edge: Boundary, doubt: Doubt, B: float) -> Floats:
 
 
 def _gaps(intervals: Floats) -> Floats:
-    """What is left (n, 2) of K >= 0 by intervals (k, 2)."""
+    """Intervals (n, 2) of K >= 0 that none of `intervals` (k, 2) covers."""
     order = np.argsort(intervals[:, 0])
     low, high = intervals[order].T
     reached = np.maximum.accumulate(np.concatenate([[0.0], high]))
@@ -466,7 +466,7 @@ def _gaps(intervals: Floats) -> Floats:
 
 
 def _middles(gaps: Floats) -> Floats:
-    """A stiffness within each gap (n, 2)."""
+    """One stiffness (n,) within each gap (n, 2): its middle, or one beyond its start where it has no end."""
     return np.where(np.isfinite(gaps[:, 1]), 0.5 * (gaps[:, 0] + gaps[:, 1]), 2.0 * gaps[:, 0] + 1.0)
 
 

@@ -161,12 +161,12 @@ def _has_small_cut(samples: list[ArcPoints], members: list[Member], unit: float)
 
 
 def _stiffness(edge: TracedEdge) -> float:
-    """Largest stiffness on an edge [N/m]; 0 without a stable wall."""
+    """Largest stiffness [N/m] of the walls that an edge encloses; 0 without a stable wall with K > 0, B >= 0."""
     return edge.peak.stiffness if edge.peak else 0.0
 
 
 def _best_by_area(charted: dict[int, Member], shapes: Shapes) -> tuple[int, float]:
-    """The member of the largest area within K >= 0, B >= 0 and that area; the polygons choose, to 1e-6."""
+    """Index of the member of the largest area within K, B >= 0, by polygons to 1e-6, and its exact area."""
     cells = [shapes[index] for index in charted]
     right, top = np.nan_to_num(shapely.total_bounds(cells)[2:])
     areas = np.zeros(len(cells))

@@ -12,6 +12,7 @@ from zwidth.result import entry
 
 
 def _failed_members(failed: Mapping[int, str]) -> list[dict[str, Any]]:
+    """The members without a chart, as rows of index and reason for `document`."""
     return [{"member": index, "reason": reason} for index, reason in failed.items()]
 
 
@@ -59,7 +60,7 @@ class CommonChart(DrawnChart):
 
     @property
     def unknown_members(self) -> int:
-        """Number of members of which nothing is known, because they could not be charted."""
+        """Number of the members in `failed`: they could not be charted, so that nothing is known of them."""
         return len(self.failed)
 
     @property
@@ -111,12 +112,14 @@ class CommonChart(DrawnChart):
         return doubt | reason | super().document()
 
     def _summary(self) -> str:
+        """How many regions there are, for how many members, and how many of these bind."""
         bind = f"{len(self.binding)} of which bind"
         if self.failed:
             return f"{self.unknown_text}; {super()._summary()} for the other {len(self.charted)}, {bind}"
         return f"{super()._summary()} for all of {len(self.charted)} members, {bind}"
 
     def _numbers(self) -> list[str]:
+        """Lines of the chart's numbers, each marked where it does not hold for all members or is in doubt."""
         if not self.doubt:
             return super()._numbers()
         doubt = [f"in doubt           {self.doubt}"] if len(self.off_circle) else []

@@ -72,7 +72,7 @@ def common_edge(shape: shapely.MultiPolygon, members: Sequence[Member], unit: fl
 
 
 def _outline_chords(members: Sequence[Member], unit: float) -> _OutlineChords:
-    """The chords of all members' outlines."""
+    """The chords of all members' outlines, in [K unit, B]."""
     ends, angles, origin = [], [], []
     for number, member in enumerate(members):
         for arc, (thetas, K, B) in enumerate(member.edge.arc_points):
@@ -151,7 +151,7 @@ def _distance(points: Floats, ends: Floats) -> Floats:
 
 
 def _angle(segments: _OutlineChords, k: int, point: Floats) -> float:
-    """theta of a point on a segment, in proportion."""
+    """Angle theta of a point (2,) on segment k, linear between those of its ends."""
     (first, last), (start, end) = segments.ends[k], segments.angles[k]
     along = last - first
     share = float(np.clip((point - first) @ along / max(along @ along, 1e-300), 0.0, 1.0))
@@ -169,12 +169,12 @@ def _runs_on_edge(runs: list[ArcRun], members: Sequence[Member], unit: float, de
 
 
 def _continues(one: ArcRun, two: ArcRun) -> bool:
-    """Whether the second run goes on along the arc of the first."""
+    """Whether run `two` goes on along the arc of run `one`, and does not begin that arc anew."""
     return one.same_arc(two) and not _starts_anew(one.arc, one.angles[1], two.angles[0])
 
 
 def _merge_runs(runs: list[ArcRun]) -> list[ArcRun]:
-    """Runs with successive ones on one arc joined."""
+    """The runs of a closed walk, with successive ones on the same arc joined to one."""
     out = runs[:1]
     for run in runs[1:]:
         if _continues(out[-1], run):
@@ -224,7 +224,7 @@ class ArcRun:
 
     @property
     def length(self) -> float:
-        """Distance of its ends [K unit, B]."""
+        """Straight distance between the ends of the run, in [K unit, B]."""
         return float(np.hypot(*(self.last - self.first)))
 
     def same_arc(self, other: ArcRun) -> bool:
@@ -262,7 +262,7 @@ class ArcRun:
         return self.at(self._middle(unit)[0], unit)[0]
 
     def inwards(self, unit: float) -> Floats:
-        """Unit vector there towards the common set, which is on the left."""
+        """Unit vector (2,) at `middle` towards the common set, which is on the left of the run."""
         u, sign = self._middle(unit)
         along = sign * self.at(u, unit)[1]
         return np.asarray(np.array([-along[1], along[0]]) / max(np.hypot(*along), 1e-300))
@@ -324,7 +324,7 @@ def _solve_crossing(one: ArcRun, two: ArcRun, unit: float, size: float) -> Corne
 
 
 def _within(run: ArcRun, u: float) -> bool:
-    """Whether a parameter lies on the arc, or next to it."""
+    """Whether a parameter u lies on the run's arc, or next to it."""
     if not run.arc.curved:
         return -1.0 <= u <= 2.0
     low, high = sorted((run.arc.start, run.arc.end))

@@ -103,7 +103,7 @@ def _softenings(
     first: int,
     last: int,
 ) -> None:
-    """Fill in `out` for walls first to last - 1."""
+    """Fill `out` (p,) with the `softening` [N/m] of walls first to last - 1."""
     for k in range(first, last):
         if k == first or which[k] != which[k - 1]:
             fill_loop_polynomials(loops, which[k], 1.0, circle, polynomials)

@@ -155,13 +155,13 @@ def _union(rings: tuple[Floats, ...], unit: float) -> shapely.Geometry:
 
 
 def _rings(shape: shapely.MultiPolygon, unit: float) -> tuple[Floats, ...]:
-    """Closed rings (k, 2) of [K, B], counter-clockwise."""
+    """A shape's polygons in [K unit, B] as closed rings (k, 2) of [K, B], counter-clockwise, cut at holes."""
     pieces = [piece for part in shapely.get_parts(shape) for piece in cut_at_holes(part)]
     return tuple(np.array(orient(p).exterior.coords) / (unit, 1.0) for p in pieces)
 
 
 def _quadrant(shape: shapely.Geometry) -> shapely.MultiPolygon:
-    """The part with K >= 0, B >= 0."""
+    """The part of a shape with K >= 0, B >= 0."""
     if shape.is_empty:
         return shapely.MultiPolygon()
     right, top = np.maximum(shape.bounds[2:], 0.0)
@@ -169,7 +169,7 @@ def _quadrant(shape: shapely.Geometry) -> shapely.MultiPolygon:
 
 
 def _stiffest(quadrant: shapely.MultiPolygon, unit: float) -> tuple[float, float]:
-    """K, B of the stiffest corner; nan where there is none."""
+    """K [N/m], B [N s/m] of the stiffest corner of polygons in [K unit, B]; nan where there is none."""
     corners = shapely.get_coordinates(quadrant)
     if not len(corners):
         return nan, nan
@@ -211,7 +211,7 @@ def _stiffest_common(
 
 
 def _largest_damping(left: shapely.MultiPolygon) -> float:
-    """The largest damping stable for small K > 0 [N s/m]; 0 where there is none."""
+    """Largest damping [N s/m] at small K > 0 of `left`, the common set in K, B >= 0; 0 without one."""
     if left.is_empty:
         return 0.0
     right, top = left.bounds[2:]
@@ -228,6 +228,7 @@ def _distances(shapes: Mapping[int, shapely.MultiPolygon], points: Floats, size:
 
 
 def _size(common: shapely.MultiPolygon) -> Floats:
+    """Extent (2,) of the common set in K unit and B [N s/m]."""
     low_K, low_B, high_K, high_B = common.bounds
     return np.array([high_K - low_K, high_B - low_B])
 
@@ -235,7 +236,7 @@ def _size(common: shapely.MultiPolygon) -> Floats:
 def _members_at(
     shapes: Mapping[int, shapely.MultiPolygon], common: shapely.MultiPolygon, K: float, B: float
 ) -> tuple[int, ...]:
-    """The members on whose edge a wall [K unit, B] lies, two at most; the nearest one in any case."""
+    """Indices of the members on whose edge a wall [K unit, B] lies, two at most; the nearest one in any case."""
     away = _distances(shapes, np.array([[K, B]]), _size(common))[:, 0]
     order = [k for k in np.argsort(away, kind="stable")[:2] if away[k] <= max(away.min(), 10.0 * CHORD)]
     return tuple(sorted(list(shapes)[k] for k in order))

@@ -60,7 +60,7 @@ def chart_members(loops: Sequence[Loop]) -> tuple[dict[int, Member], dict[int, s
 
 
 def chart_member(index: int, loop: Loop) -> Member:
-    """One loop with its edge. Raises ChartError."""
+    """One loop with its traced edge. Raises ChartError where that cannot be closed."""
     tracer = Tracer(loop)
     return Member(index, tracer, trace_edge(tracer, index))
 

@@ -50,7 +50,7 @@ class BranchSamples:
 
     @classmethod
     def of(cls, equation: RootEquation, parameters: Floats) -> BranchSamples:
-        """Samples at ascending parameters (N,)."""
+        """An equation's walls and their slopes at ascending parameters (N,)."""
         with np.errstate(all="ignore"):
             walls = equation.solutions(parameters)
             slopes = np.full_like(walls, np.nan)
@@ -73,7 +73,7 @@ class BranchSamples:
         )
 
     def point(self, n: int, k: int) -> tuple[Floats, Floats]:
-        """The point (3,) of wall k at parameter n, and the direction (3,) in which the curve runs there."""
+        """Parameter, k T and b (3,) of wall k at parameter n, and the direction (3,) of the curve there."""
         return np.array([self.parameters[n], *self.walls[n, k]]), np.array([1.0, *self.slopes[n, k]])
 
 
@@ -185,18 +185,19 @@ def _folds(equation: RootEquation, samples: BranchSamples, box: WallBox, open_: 
 
 
 def _cosine(one: Floats, other: Floats) -> Floats:
-    """Of the angles (n,) between vectors (n, 2)."""
+    """Cosine (n,) of the angle between vectors (n, 2), `one` and `other`."""
     length = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
     return np.asarray(np.einsum("ni,ni->n", one, other) / length)
 
 
 def _walks(samples: BranchSamples, forward: Ints, folds: list[_Fold]) -> list[CurvePoints]:
-    """Linked walls, one branch after the other."""
+    """Walls linked by `forward` (as of `_link`) and folds, joined to branches; one branch after the other."""
     q = samples.walls.shape[1]
     joints: list[_Fold | None] = []
     ways: dict[int, list[tuple[int, int]]] = {}  # of each wall: the walls beside it, and the number of the joint
 
     def join(one: int, other: int, fold: _Fold | None = None) -> None:
+        """Make two walls, numbered n q + k, neighbours on a branch: linked, or by the fold between them."""
         ways.setdefault(one, []).append((other, len(joints)))
         ways.setdefault(other, []).append((one, len(joints)))
         joints.append(fold)

@@ -67,6 +67,7 @@ class _Cells:
 
 
 def _law(loop: MultiLoop) -> dict[str, Any]:
+    """The law's matrices as lists by key; none where the law is the same along all directions."""
     own = loop.matrices
     if own is None:
         return {}
@@ -126,6 +127,7 @@ class MultiChart(DrawnChart):
         return f"in doubt, {super()._summary()} found" if self.doubt else super()._summary()
 
     def _numbers(self) -> list[str]:
+        """Lines of the chart's numbers, each marked as only found where the chart is in doubt."""
         if not self.doubt:
             return super()._numbers()
         numbers = [line.replace("none: no stable wall has", "none found with") for line in super()._numbers()]
@@ -253,13 +255,13 @@ def _stable_cells(loop: MultiLoop, curves: CurveSet) -> _Cells:
 
 
 def _walls_off_circle(loop: MultiLoop, edge: TracedEdge) -> Floats:
-    """Walls (k, 2) of [K, B] of an edge that are not on the stability limit."""
+    """Those walls (k, 2) of [K, B] along an edge whose largest root is not on the unit circle."""
     walls = np.vstack([np.empty((0, 2)), *(np.column_stack([K, B]) for _, K, B in edge.arc_points)])
     return walls[sides_of_circle(loop, *walls.T) != 0.0] if len(walls) else walls
 
 
 def _angles_beside(loop: MultiLoop, off: Floats) -> Floats:
-    """Angles of the roots near the circle, or outside, of walls (k, 2) of [K, B]; and around them."""
+    """Angles theta of roots near the circle or outside, of walls (k, 2) of [K, B], and angles about these."""
     off = off[:: max(1, len(off) // MOST_ROOTS)]
     z = np.linalg.eigvals(loop.transition_matrix(*off.T))
     return np.unique(np.abs(np.angle(z[np.abs(z) > 1.0 - NEAR_CIRCLE]))[:, None] * (1.0 + BESIDE))
@@ -295,10 +297,11 @@ def _edge(loop: MultiLoop, curves: list[WallCurve], polygons: list[shapely.Polyg
 
 
 def _is_stable(loop: MultiLoop, wall_stiffness: float, wall_damping: float) -> bool:
-    """Whether all eigenvalues of the transition matrix lie inside the unit circle."""
+    """Whether one wall is stable: all eigenvalues of its transition matrix lie inside the unit circle."""
     return bool(np.abs(np.linalg.eigvals(loop.transition_matrix(wall_stiffness, wall_damping))).max() < 1.0)
 
 
 def _wall_text(wall: Floats) -> str:
+    """A wall (2,) [N/m, N s/m] in words, for messages."""
     K, B = wall
     return f"{K:.6g} N/m and {B:.6g} N s/m"

@@ -82,13 +82,13 @@ def _is_one_law(equation: WallEquation) -> bool:
 
 
 def _moves_both(equation: WallEquation) -> bool:
-    """Whether both numbers move its roots; of one alone `curve_set` finds the lines."""
+    """Whether K and B both move the roots of an equation; of one alone `curve_set` finds the lines."""
     return bool(equation.stiffness[0] > 0.0 and equation.damping[0] > 0.0)
 
 
 @np.errstate(all="ignore")  # walls at infinity are data
 def _walls(equation: WallEquation, thetas: Floats) -> Floats:
-    """All angles and walls (k, 3) of [theta, K T, B] with a pair of roots there, of every eigenvalue."""
+    """All walls with a pair of roots at these angles (n,), as rows (k, 3) of [theta, K T, B]."""
     s, v = equation.stiffness[0], equation.damping[0]
     forces, stiffened, _ = equation.terms(thetas)
     known = np.isfinite(forces).all(axis=(1, 2)) & np.isfinite(stiffened).all(axis=(1, 2))
@@ -103,7 +103,7 @@ def _walls(equation: WallEquation, thetas: Floats) -> Floats:
 
 
 def _eigenvalues(forces: Complexes, readings: Complexes) -> Complexes:
-    """Numbers h (n, r) for which F + h Y (n, r, r) is singular."""
+    """All h (n, r) at which F + h Y is singular; forces F and readings Y (n, r, r)."""
     size = np.linalg.norm(np.concatenate([forces, readings], axis=1), axis=1, keepdims=True)
     F, Y = forces / size, readings / size
     try:
@@ -288,7 +288,7 @@ def missed_angles(loop: MultiLoop, raster: Raster, polygons: list[shapely.Polygo
 
 
 def _beside(cell: shapely.Polygon, box: WallBox) -> Floats:
-    """Walls (n, 2) on both sides of a cell's outer edge."""
+    """Walls (n, 2) [K T, B] a little off a cell's outer edge, on both sides all along it."""
     edge = shapely.transform(cell.exterior, lambda points: points / box.size)
     share = (np.arange(ALONG) + 0.5) / ALONG
     ends = [
@@ -303,7 +303,7 @@ def _beside(cell: shapely.Polygon, box: WallBox) -> Floats:
 
 
 def _grid(low: Floats, high: Floats, side: int) -> Floats:
-    """The middles (side^2, 2) of equal parts of a box."""
+    """Middles (side^2, 2) of the parts of a box from `low` to `high` (2,), each side cut in `side` equal parts."""
     share = (np.arange(side) + 0.5) / side
     x, y = np.meshgrid(*(low + share[:, None] * (high - low)).T)
     return np.column_stack([x.ravel(), y.ravel()])

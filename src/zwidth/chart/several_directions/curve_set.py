@@ -109,7 +109,7 @@ class RealRootEquation:
         return np.column_stack([value, off]), np.stack([first, np.broadcast_to(second, first.shape)], axis=1)
 
     def angles(self, parameters: Floats) -> Floats:
-        """The same angle everywhere."""
+        """Angle (N,) of the root at each parameter: 0 or pi throughout."""
         return np.full(len(parameters), self.real_angle)
 
     def _determinant(self, points: Floats) -> tuple[Floats, Floats]:
@@ -192,7 +192,7 @@ def _free_at_rest(H: Floats, unsprung: Flags, least: float) -> tuple[Floats, Flo
 
 
 def _pencil(A: Floats, B: Floats, scale: float) -> list[float]:
-    """Real x with det(A + x B) = 0, of a size up to `scale`."""
+    """All real x with det(A + x B) = 0, A, B (r, r); scale: size of a large x, which tells rounding from 0."""
     if not len(A):
         return []
     alpha, beta = scipy.linalg.eig(A, -B, right=False, homogeneous_eigvals=True)
@@ -207,11 +207,12 @@ def _pencil(A: Floats, B: Floats, scale: float) -> list[float]:
 
 
 def _real(x: Complexes | Floats, least: float = 0.0) -> Floats:
-    """Real parts of what is real but for rounding; nan for what is not."""
+    """Real parts of those x that are real but for rounding, nan for others; least: rounding of small ones."""
     return np.where(np.abs(x.imag) <= ROUNDING * np.abs(x) + least, x.real, np.nan)
 
 
 def _is_symmetric(H: Floats) -> bool:
+    """Whether a matrix (r, r) is symmetric but for rounding."""
     return bool(np.abs(H - H.T).max() <= ROUNDING * np.abs(H).max())
 
 
@@ -244,7 +245,7 @@ class CurveSet:
         return every[np.isfinite(every).all(axis=1)]
 
     def with_angles(self, thetas: Floats) -> CurveSet:
-        """With more samples, at these angles in (0, pi)."""
+        """These curves with more samples, at angles thetas (n,) in (0, pi)."""
         pairs = []
         for equation, samples in self.pairs:
             known = samples.parameters
@@ -374,7 +375,7 @@ def _followed(
 
 
 def _fits(first: Floats, chord: Floats, middles: Floats, scale: Floats) -> Flags:
-    """Which points (n, 3) can lie halfway on the curve from points `first` along chords."""
+    """Which middles can lie halfway on a curve along chords from points first, each (n, 3); scale: (3,)."""
     off = np.linalg.norm((middles - first - 0.5 * chord)[:, 1:] / scale[1:], axis=1)
     ahead = (middles - first)[:, 0] / np.where(chord[:, 0] == 0.0, np.inf, chord[:, 0])
     return np.asarray((off <= NEAR_CHORD * np.linalg.norm(chord / scale, axis=1)) & (np.abs(ahead - 0.5) <= 1.5))
@@ -388,7 +389,7 @@ def _steps_between(first: Floats, last: Floats) -> Floats:
 
 
 def _turns(traced: CurvePoints, k: Ints, box: WallBox) -> Flags:
-    """Which steps from points k turn so much that a loop may hide there."""
+    """Which steps, from points k of a branch to the next, turn so much that a loop may hide there."""
     ahead = traced.directions[:, 1:] / box.size
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     return np.asarray(np.einsum("ni,ni->n", ahead[k], ahead[k + 1]) < STRAIGHT)
@@ -475,17 +476,18 @@ def pair_lines(equation: WallEquation, thetas: Floats) -> list[StraightLine]:
 
 
 def _numbers(equation: WallEquation, thetas: Floats) -> Complexes:
-    """Numbers x (N, r) by which walls have a root at each angle (N,): real ones are walls."""
+    """Values (N, r) of b if the law damps, else of k, with a root at each angle (N,): real ones are walls."""
     A, B, C = equation.terms(thetas)
     moving = C if (equation.damping > 0.0).any() else B
     return np.asarray(-np.linalg.eigvals(np.linalg.solve(moving, A)), dtype=complex)
 
 
 def _real_number(equation: WallEquation, thetas: Floats, ends: tuple[complex, complex]) -> tuple[float, complex]:
-    """Angle between two others at which a number's imaginary part changes sign, and the number there."""
+    """Angle between `thetas` (2,) at which a number of `_numbers`, `ends` there, is real, and the number at it."""
     low, high = (float(theta) for theta in thetas)
 
     def number(theta: float) -> complex:
+        """The number x at an angle that is nearest to the straight line between those at both ends."""
         expected = ends[0] + (theta - low) / (high - low) * (ends[1] - ends[0])
         every = _numbers(equation, np.array([theta]))[0]
         return complex(every[np.argmin(np.abs(every - expected))])

@@ -74,7 +74,7 @@ def ring_arcs(curves: Sequence[WallCurve], ring: Floats, period: float) -> list[
 
 
 def _runs(curves: Sequence[WallCurve], ring: Floats) -> list[_CurveRun]:
-    """Consecutive sides on one curve at neighbouring parameters."""
+    """The sides of a ring (k, 2) [K T, B] in runs, each on one curve at neighbouring parameters."""
     sides = np.diff(ring, axis=0)
     length = np.hypot(sides[:, 0], sides[:, 1])
     steps = _steps(curves, ring)
@@ -106,7 +106,7 @@ def _long_runs(runs: list[_CurveRun], shortest: float) -> list[_CurveRun]:
 
 
 def _continues(one: _CurveRun, other: _CurveRun) -> bool:
-    """Whether a run goes on where another ends."""
+    """Whether run `other` goes on, on the same curve, where run `one` ends."""
     return one.curve == other.curve and abs(other.samples[0] - one.samples[1]) <= NEIGHBOURS
 
 
@@ -133,14 +133,14 @@ class _CurveSteps:
     end: Floats
 
     def parameter(self, k: int, point: Floats) -> float:
-        """The parameter at the point's foot on step k."""
+        """Parameter of the place on step k that is nearest to a point (2,) [K T, B]."""
         step = self.last[k] - self.first[k]
         share = float(np.clip((point - self.first[k]) @ step / (step @ step), 0.0, 1.0))
         return float(self.start[k] + share * (self.end[k] - self.start[k]))
 
 
 def _steps(curves: Sequence[WallCurve], ring: Floats) -> _CurveSteps:
-    """Steps of curves on which a side of the ring can lie."""
+    """All steps between samples of the curves that run near the ring, so that a side of it may lie on them."""
     around = WallBox(ring.min(axis=0), ring.max(axis=0)).with_margin(AROUND)
     parts: list[tuple[Floats, Floats, Ints, Ints, Floats, Floats]] = []
     for i, curve in enumerate(curves):
@@ -174,13 +174,13 @@ def _corner(
 
 
 def _wall(curve: WallCurve, place: float) -> tuple[Floats, Floats]:
-    """[K T, B] and its slope on a curve."""
+    """Wall (2,) [K T, B] at a parameter of a curve, and its slope (2,) by the parameter."""
     K, B, dK, dB = (float(value[0]) for value in curve.at(np.array([place]))[:4])
     return np.array([K * curve.period, B]), np.array([dK * curve.period, dB])
 
 
 def _on(curve: WallCurve, place: float) -> float:
-    """A place on a curve, which may end there."""
+    """A parameter, moved to the curve's nearer end where it lies beyond it."""
     return float(np.clip(place, curve.parameters[0], curve.parameters[-1]))
 
 

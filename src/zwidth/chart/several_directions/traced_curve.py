@@ -47,7 +47,7 @@ class RootEquation(Protocol):
         """What must vanish (n, 2), and its slopes (n, 2, 3), at points (n, 3) of [u, k T, b]."""
 
     def angles(self, parameters: Floats) -> Floats:
-        """Angles (n,) of the roots."""
+        """Angles (n,) of the roots at each parameter."""
 
 
 class CurvePoints(NamedTuple):
@@ -162,22 +162,22 @@ class TracedCurve:
 
     @property
     def kind(self) -> int:
-        """Of its arcs."""
+        """Kind of the arcs on this curve: PAIR or REAL."""
         return PAIR if self.equation.real_angle is None else REAL
 
     @property
     def real_angle(self) -> float | None:
-        """0 or pi where the root is real."""
+        """Angle 0 or pi of the root where it is real; None for a pair."""
         return self.equation.real_angle
 
     @cached_property
     def parameters(self) -> Floats:
-        """(n,) of the points."""
+        """Parameters (n,) of the curve's points: their indices."""
         return np.arange(len(self.traced.points), dtype=np.float64)
 
     @property
     def walls(self) -> Floats:
-        """(n, 2) [k T, b] of the points."""
+        """Walls (n, 2) [k T, b] of the curve's points."""
         return self.traced.points[:, 1:]
 
     @property
@@ -202,7 +202,7 @@ class TracedCurve:
         return None
 
     def reach(self, parameter: float) -> float:
-        """How far a step of Newton's method may go from here."""
+        """How far a step of Newton's method may go from a parameter."""
         return REACH
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:

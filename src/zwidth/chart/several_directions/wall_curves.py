@@ -74,32 +74,32 @@ class StraightLine:
 
     @property
     def kind(self) -> int:
-        """Of its arcs."""
+        """Kind of the arcs on this line: PLUS or MINUS of a real root, else CHORD."""
         return PLUS if self.angle == 0.0 else MINUS if self.angle == np.pi else CHORD
 
     @property
     def real_angle(self) -> float | None:
-        """0 or pi where the root is real."""
+        """Angle 0 or pi of the root where it is real; None for a pair."""
         return self.angle if self.kind in (PLUS, MINUS) else None
 
     @property
     def along(self) -> Floats:
-        """Unit vector."""
+        """Unit vector (2,) along the line, in [K T, B]."""
         return np.array([-self.across[1], self.across[0]])
 
     @property
     def parameters(self) -> Floats:
-        """Distances of both ends from the foot."""
+        """Parameters (2,) of both ends: distances from the foot, the line's point nearest to [0, 0]."""
         return np.array([-self.size, self.size])
 
     @property
     def walls(self) -> Floats:
-        """Both ends (2, 2)."""
+        """Walls (2, 2) [K T, B] at both ends."""
         return self.offset * self.across + self.parameters[:, None] * self.along
 
     @property
     def drawn(self) -> Floats:
-        """Both ends."""
+        """Walls (2, 2) [K T, B] at both ends, as `walls`."""
         return self.walls
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
@@ -115,14 +115,14 @@ class StraightLine:
         )
 
     def regular(self, parameters: Floats) -> Flags:
-        """Everywhere."""
+        """True (k,) everywhere: a line can be evaluated at all parameters."""
         return np.ones(len(parameters), dtype=bool)
 
     def limit(self, parameter: float, angle: float) -> None:
-        """It has no end."""
+        """None: a line has no end."""
 
     def reach(self, parameter: float) -> float:
-        """A step is exact."""
+        """Inf: on a line a step of Newton's method is exact, however far it goes."""
         return np.inf
 
 
@@ -135,7 +135,7 @@ class WallBox:
 
     @property
     def size(self) -> Floats:
-        """(2,)"""
+        """Width in k T and height in b (2,)."""
         return self.high - self.low
 
     def with_margin(self, share: float) -> WallBox:

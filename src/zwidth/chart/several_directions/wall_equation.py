@@ -71,7 +71,7 @@ class WallEquation:
 
     @property
     def real_angle(self) -> None:
-        """The roots are a pair."""
+        """None: the roots are a pair."""
 
     def solutions(self, thetas: Floats) -> Floats:
         """All real walls (N, r^2, 2) of [k T, b] with a root at each angle (N,); nan for the others."""
@@ -152,7 +152,7 @@ class WallEquation:
         return _Frame(F, Y, dF, dY, w, 1j * z * dw)
 
     def _terms(self, f: _Frame) -> tuple[Complexes, Complexes, Complexes]:
-        """`terms` of forces and readings."""
+        """`terms` from forces and readings that are known already."""
         s, v = self.stiffness[:, None], self.damping[:, None]
         return f.F, s * f.Y, f.w[:, None, None] * (v * f.Y)
 
@@ -279,7 +279,7 @@ def on_circle(thetas: Floats) -> tuple[Complexes, Complexes]:
 
 
 def features(loop: MultiLoop) -> Complexes:
-    """Poles and zeros of P, poles of w, and where w is real on the circle; Im z >= 0."""
+    """Points z (k,), Im z >= 0, where curves turn: poles, zeros of P, poles of w, real w on the circle."""
     held, estimator, force = loop.sampled_plant, loop.estimator, loop.force_filter
     m = loop.count
     split = loop.fractional_delay > 0.0
