@@ -247,7 +247,7 @@ def _rule(
     Bb: float,
     far: bool,
 ) -> float:
-    """The rule for the integral of K dB over one panel."""
+    """Integral of K dB over one panel from t = a to b by the rule; far: nodes lie evenly in 1/t."""
     rule, t, K, B = area.rule, area.walls[0], area.walls[1], area.walls[2]
     n, total = rule.shape[1], 0.0
     for i in range(1, n - 1):

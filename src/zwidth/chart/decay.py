@@ -178,6 +178,7 @@ def _best_on_axis(tracer: Tracer, points: Floats, axis: int) -> Floats:
     t = AXIS_SHARES * farthest
 
     def radii(t: Floats) -> Floats:
+        """Spectral radii (n,) of the walls at places t (n,) on the axis."""
         zero = np.zeros(len(t))
         return scatter_values(tracer.polynomials, tracer.radius, *((zero, t) if axis == 0 else (t, zero)))
 

@@ -87,7 +87,7 @@ def closed_rings(tracer: Tracer, extra_angles: Floats | None = None) -> tuple[Ar
 
 
 def arcs_of(memory: EdgeMemory) -> Arcs:
-    """The rings of joined arcs, ring after ring."""
+    """The rings of joined arcs in memory as `Arcs`, ring after ring."""
     return arcs_of_rings(rings_of(memory))
 
 
@@ -103,14 +103,14 @@ class EdgeRings(NamedTuple):
 
 
 def rings_of(memory: EdgeMemory) -> EdgeRings:
-    """The rings of joined arcs, as they stand in memory."""
+    """A copy of the arcs in memory, with the t of their samples."""
     arcs, samples = memory.counts[ARCS], memory.counts[SAMPLES]
     kept = EdgeArcs._make(field[:arcs].copy() for field in memory.arcs)
     return EdgeRings(kept, memory.samples.t[:samples].copy())
 
 
 def arcs_of_rings(rings: EdgeRings) -> Arcs:
-    """Joined arcs, ring after ring."""
+    """The arcs of rings as `Arcs`, ring after ring, their t = tan(theta/2) turned into angles."""
     arcs, t = rings
     order = arcs.order[: int(np.count_nonzero(arcs.next_arc >= 0))]
     place = np.empty(MOST_ARCS, dtype=np.int64)
@@ -137,7 +137,7 @@ def arcs_of_rings(rings: EdgeRings) -> Arcs:
 def _stage(
     loops: LoopTable, memory: EdgeMemory, stage: int, value: float, longest: float, near_end: float
 ) -> float:
-    """One stage; value is the radius for SAMPLE (with the share in `size[0]`), the blur for JOIN."""
+    """Run one stage; value is the radius for SAMPLE (with the share in `size[0]`), the blur for JOIN."""
     if stage == SAMPLE:
         memory.circle.sizes[COMPUTER] = -1
         share = memory.size[0]
@@ -285,7 +285,7 @@ def _line_crossing(
 
 @compiled
 def _crossing(circle: CircleFactors, one: float, other: float) -> tuple[float, float, float, bool]:
-    """`solve_crossing`, and the better conditioned of the two."""
+    """What `solve_crossing` gives, with the better conditioned of its two t before the flag."""
     a, b, settled = solve_crossing(circle, one, other)
     return a, b, better_conditioned(circle, a, b), settled
 
@@ -314,13 +314,13 @@ def _is_stable_inside(tracer: Tracer, arcs: Arcs) -> bool:
 
 
 def _walls(tracer: Tracer, arc: Arc) -> Floats:
-    """An arc's corners and the samples that found it, (k, 2)."""
+    """Walls (k, 2) [K, B] along an arc: its first, those of the samples that found it, its last."""
     K, B = tracer.walls(arc.thetas)
     return np.vstack([arc.first, np.column_stack([K, B]), arc.last])
 
 
 def _samples_around_corners(memory: EdgeMemory) -> Floats:
-    """The t close to both sides of every branch in a corner, and between each two of them."""
+    """The t close to each known corner or crossing, on both sides, and halfway between neighbours."""
     samples, arcs, n = memory.samples, memory.arcs, int(memory.counts[SAMPLES])
     curved = np.flatnonzero(arcs.kind[: memory.counts[ARCS]] == PAIR)
     settled = np.flatnonzero(samples.corner[: n - 1] != NONE)

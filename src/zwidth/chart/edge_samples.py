@@ -66,7 +66,7 @@ def fill_without_singularities(loops: LoopTable, i: int, radius: float, memory: 
 
 @compiled_apart
 def fill_curve(memory: EdgeMemory, share: float, longest: float, near_end: float) -> bool:
-    """Samples of the curve with their walls, not yet flagged; False where memory does not hold them.
+    """Put samples of the curve with their walls, not yet flagged, into memory; False where it is full.
 
     share, longest, near_end  as for `circle_sampling.fill_samples`
     """
@@ -150,7 +150,7 @@ def add_sample(memory: EdgeMemory, t: float) -> bool:
 
 @compiled_lean
 def walls_again(memory: EdgeMemory) -> None:
-    """The walls of samples that stand, and their slopes, not yet flagged."""
+    """Compute K, B and slopes of all samples from their t; flags and corners are then unknown."""
     samples, beside, n = memory.samples, memory.picked, memory.counts[SAMPLES]
     walls_of_samples(memory.circle, samples.t, n, samples.K, samples.B, memory.lanes)
     for i in range(n):

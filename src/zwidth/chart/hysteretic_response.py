@@ -170,7 +170,7 @@ class SampledResponse:
 
     @classmethod
     def of(cls, loop: Loop) -> SampledResponse:
-        """The response of a loop, its far aliases summed."""
+        """The sampled response of a loop, its far aliases summed beforehand."""
         reference = replace(loop, plant=viscous_equivalent(loop.plant))
         lossy, damped = ModalPlant.of(loop.plant), ModalPlant.of(reference.plant)
         rates = np.concatenate([lossy.natural_rates(), damped.natural_rates(), [0.0]])

@@ -220,7 +220,7 @@ class LoopEdge:
 
     @cached_property
     def arcs(self) -> Arcs:
-        """Rings of arcs."""
+        """The edge's rings of arcs, in the form of all charts."""
         return self.rings if isinstance(self.rings, Arcs) else arcs_of_rings(self.rings)
 
     @cached_property

@@ -178,7 +178,7 @@ def _fill_edges(
     memory: MarginMemory,
     status: NDArray[np.uint8],
 ) -> None:
-    """The edges of devices begin to end - 1 into the pool: of all of them at one delay after the other, since what
+    """Put edges of devices begin to end - 1 in the pool: of all of them at one delay after the other, since what
     the computer alone decides is then computed once. NO_WALL where there is none at one of the delays."""
     pool, ends = memory.pool, memory.ends
     pool.used[0], ends[0] = 0, 0
@@ -194,7 +194,7 @@ def _fill_edges(
 
 @compiled_apart
 def _add_edge_of(loops: LoopTable, own: int, d: int, memory: MarginMemory) -> int:
-    """The edge of loop `own` into the pool."""
+    """Add the edge of loop `own`, of its device at delay d, to the pool: FOUND, NO_WALL or DOUBTFUL."""
     if loops.section_count[own] == 0 or degree_of(loops, own) > MOST_DEGREE:
         return DOUBTFUL
     fill_loop(loops, own, 1.0, memory.edge)
@@ -206,7 +206,7 @@ def _add_edge_of(loops: LoopTable, own: int, d: int, memory: MarginMemory) -> in
 
 @compiled_apart
 def _stiffest(nodes: EdgeNodes, delays: int, a: float, b: float, tried: Floats) -> float:
-    """The stiffest wall of the polylines, 0 if there is none."""
+    """Stiffness [N/m] of the stiffest wall that fits between the edges with margins a, b; 0 if none does."""
     n, top = nodes.used[0], np.inf
     for d in range(delays):
         largest = 0.0
@@ -317,7 +317,7 @@ def _settled(
     middle: float,
     stiffness: float,
 ) -> tuple[float, bool]:
-    """`_refined` with one set of nodes."""
+    """`_refined` with the pieces in `nodes`, whose crossings it adds: stiffness, and whether it settled."""
     tolerance, half, widest = COARSE, 10.0 * COARSE, BESIDE if middle > 0.0 else 0.5
     for _ in range(ROUNDS):
         if not add_crossings(nodes, loops, i, N, circle, stiffness / a, stiffness * a):

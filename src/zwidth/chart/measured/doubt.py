@@ -231,7 +231,7 @@ def judge_measured(
 
 
 def _nearest_frequency(loop: MeasuredLoop, walls: Floats) -> Floats:
-    """The measured frequency (n,) of the least |1 + L| at each wall (n, 2)."""
+    """Measured frequency (n,) [Hz] at which |1 + L| is least for each wall (n, 2), L = P (K + B w)."""
     theta = loop.angles_below_pi
     h, w = loop.h(theta), loop.w(theta)
     parts = [walls[i : i + 500] for i in range(0, len(walls), 500)]

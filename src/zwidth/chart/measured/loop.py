@@ -46,7 +46,10 @@ HALVINGS = 12  # of the lowest frequency, at which what is fitted continues the 
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """A response and the computer's part of the loop. Its delay is that of software alone, in whole samples."""
+    """A response and the computer's part of the loop. Its delay is that of software alone, in whole samples.
+
+    usable  which of the response's frequencies are used
+    """
 
     response: Response
     controller: Controller

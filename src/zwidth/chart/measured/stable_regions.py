@@ -277,7 +277,7 @@ def band_rings(loop: MeasuredLoop, cells: StableRegions) -> tuple[Floats, ...]:
 
 
 def _doubtful_walls(loop: MeasuredLoop, cells: StableRegions, scale: Floats) -> shapely.Geometry:
-    """The ellipses along the stable set's edge, in units of `scale`.
+    """Area of the ellipses of doubt along the stable set's edge, in units of `scale` (2,) of K and B.
 
     Where two arcs meet, each goes on beyond the corner as far as the other leaves it in doubt: there the edge
     would run if both were as far out as they can be.

@@ -60,6 +60,7 @@ class RobustChart(CommonChart):
         worst = np.argmax([one.spectral_radius for one in each], axis=0)
 
         def of_worst(values: list[Floats]) -> Floats:
+            """At each wall the value of the member whose spectral radius is the largest there."""
             return np.asarray(np.take_along_axis(np.array(values), worst[None], axis=0)[0])
 
         return Verdicts(

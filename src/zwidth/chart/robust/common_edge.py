@@ -84,7 +84,7 @@ def _outline_chords(members: Sequence[Member], unit: float) -> _OutlineChords:
 
 
 def _runs(points: Floats, members: Sequence[Member], segments: _OutlineChords, near: float) -> list[ArcRun]:
-    """The walk round a polygon (k, 2), grouped by arc; it begins where one arc gives way to another."""
+    """The walk round a polygon (k, 2) [K unit, B] in runs, each on one arc; the first begins an arc."""
     nearest = _nearest_segments(points, segments, near)
     origins = segments.origin[nearest]
     angles = np.array([[_angle(segments, k, point) for point in points[i : i + 2]] for i, k in enumerate(nearest)])

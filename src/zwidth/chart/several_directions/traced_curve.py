@@ -202,7 +202,7 @@ class TracedCurve:
         return None
 
     def reach(self, parameter: float) -> float:
-        """How far a step of Newton's method may go from a parameter."""
+        """How far a step of Newton's method may go from a parameter, in steps from point to point."""
         return REACH
 
     def at(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
