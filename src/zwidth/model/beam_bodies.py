@@ -85,6 +85,7 @@ def finite_elements(
     order = _node_order(n, held)
 
     def all_shapes(places: Floats) -> Shapes:
+        """Shapes of all coordinates of the elements at places (q,) [m] along the beam, in the order of eps."""
         bending, bar = hermite_bending(places, nodes), quadratic_bar(places, nodes)
         downwards = bending * np.repeat([1.0, -1.0], n)  # the rotation about y is minus the slope of z
         return Shapes(*(field[..., order] for field in assembled(bending, downwards, bar, bar)))
@@ -157,6 +158,7 @@ def lumped_tip(beam: BeamProperties, stations: ArrayLike) -> FlexibleBody:
     loads = np.array([L])
 
     def shapes(places: Floats) -> Shapes:
+        """Shapes, at places (q,) [m] along the beam, of the tip's displacement in x, y and z and of its twist."""
         bent = bending_deflections(places, loads)[..., :1] * (3.0 / L**3)
         stretched = bar_deflections(places, loads) / L
         by_family = assembled(bent, bent, stretched, stretched)
@@ -245,8 +247,7 @@ def _orthonormal(strain: Floats, weights: Floats) -> Floats:
 
 
 def _divided(edges: Floats, longest: float) -> Floats:
-    """Ascending edges with further ones between them, evenly, so that none is farther than `longest` from the
-    next."""
+    """The ascending edges [m] with more between them, evenly: none is farther than `longest` from the next."""
     parts = [
         np.linspace(start, end, ceil((end - start) / longest * (1.0 - SAME_PLACE)), endpoint=False)
         for start, end in pairwise(edges.tolist())
@@ -277,7 +278,7 @@ def _stations(beam: BeamProperties, stations: ArrayLike) -> Floats:
 
 
 def _loaded(stations: Floats) -> Floats:
-    """The places of stations that the base does not hold, each once, ascending."""
+    """Places (k,) [m] of the stations that the base does not hold, each once, ascending."""
     return np.unique(stations[stations > 0.0])
 
 
@@ -365,6 +366,7 @@ def _body(
     elements: int,
     stations: Floats,
 ) -> FlexibleBody:
+    """The beam of a link as a body, by one of the methods; stations (S,) [m], the rest as of `flexible_link`."""
     if method == "lumped":
         return lumped_tip(beam, stations)
     if method == "finite-elements":

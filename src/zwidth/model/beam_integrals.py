@@ -37,7 +37,7 @@ class Shapes(NamedTuple):
     stretch: Floats
 
     def reduced(self, basis: Floats) -> Shapes:
-        """Those of the coordinates eta of eps = T eta; basis (e, n)."""
+        """Shapes of the coordinates eta of eps = T eta; basis (e, n) is T."""
         return Shapes(*(field @ basis for field in self))
 
 
@@ -110,7 +110,7 @@ def second_order(shapes: Shapes, once: Floats, twice: Floats) -> tuple[Floats, F
     c = shapes.stretch
 
     def turned(weights: Floats) -> tuple[Floats, Floats, Floats]:
-        """Integral of a x k."""
+        """Components x, y and z of the integral of a x k, (e, e) each."""
         return (
             _gram(ay, weights, kz) - _gram(az, weights, ky),
             _gram(az, weights, kx) - _gram(ax, weights, kz),
@@ -244,7 +244,8 @@ def bending_deflections(places: Floats, loaded: Floats) -> Floats:
 
 
 def bar_deflections(places: Floats, loaded: Floats) -> Floats:
-    """The same of stretch under a force, or of twist under a torque, (2, q, k)."""
+    """Stretch of the clamped bar of unit stiffness under a force, or its twist under a torque, at each of the
+    loaded places (k,) > 0: (2, q, k)."""
     s = places[:, None]
     return np.stack([np.minimum(s, loaded), np.where(s < loaded, 1.0, 0.0)])
 

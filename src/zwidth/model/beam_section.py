@@ -41,6 +41,7 @@ class CrossSection:
     torsion_constant: float
 
     def __post_init__(self) -> None:
+        """Raise ValueError for an area, a second moment or a torsion constant that is not finite and above 0."""
         check_number("area", self.area, "m²", above=0.0, hint="a beam needs a section with material in it")
         for name in ("second_moment_y", "second_moment_z", "torsion_constant"):
             check_number(name, getattr(self, name), "m⁴", above=0.0)
@@ -146,6 +147,7 @@ class Material:
     density: float
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a modulus or a density that is not finite and above 0."""
         check_number("youngs_modulus", self.youngs_modulus, "Pa", above=0.0)
         check_number("shear_modulus", self.shear_modulus, "Pa", above=0.0)
         check_number("density", self.density, "kg/m³", above=0.0)
@@ -208,6 +210,7 @@ class BeamProperties:
     torsional_inertia_per_length: float
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a length, stiffness, mass or inertia that is not finite and above 0."""
         hint = "leave the link rigid if it has no length"
         check_number("length", self.length, "m", above=0.0, hint=hint)
         for name, unit in (("EI_y", "N m²"), ("EI_z", "N m²"), ("GJ", "N m²/rad"), ("EA", "N")):

@@ -32,7 +32,7 @@ class LinkAccelerations(NamedTuple):
 
 @compiled
 def new_link_accelerations(mech: MechanismArrays) -> LinkAccelerations:
-    """Fresh memory."""
+    """Fresh memory for the velocities and accelerations of all links."""
     n, m = mech.parent.size, mech.joint.size
     return LinkAccelerations(np.zeros(m), np.zeros(m), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
 

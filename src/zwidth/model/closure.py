@@ -110,7 +110,7 @@ def closing_turn(mech: MechanismArrays, design: int, c: int, work: WorkingMemory
 
 @compiled_lean
 def _handle_equations(mech: MechanismArrays, design: int, r: int, work: WorkingMemory) -> None:
-    """The handle's rows from r on: its position, its orientation, or both."""
+    """Fill the handle's rows and gaps from row r on: its position, its orientation, or both."""
     gaps, goal, link = work.gaps, work.goal, mech.handle_link
     if mech.controls != ORIENTATION:
         h = link_point(work.rotation, work.origin, link, mech.handle, design, 0)
@@ -357,8 +357,8 @@ def _add_products(
 
 @compiled_lean
 def _determinant(G: Floats, unknowns: int) -> float:
-    """Of the first lines and columns of G, which is overwritten: Gauss with row exchanges, each of which turns the
-    sign."""
+    """Determinant of the first `unknowns` lines and columns of G, which is overwritten: Gauss with row exchanges,
+    each of which turns the sign."""
     determinant = 1.0
     for j in range(unknowns):
         pivot = j

@@ -69,7 +69,8 @@ def largest_magnitude(values: Floats, count: int) -> float:
 
 @compiled_lean
 def set_goal(mech: MechanismArrays, goals: Floats, i: int, work: WorkingMemory) -> None:
-    """Goal i of (N, g): the handle's position [m], the vector of its orientation [rad], or one after the other."""
+    """Take goal i of (N, g) to the working memory: the handle's position [m], the vector of its orientation [rad],
+    or one after the other."""
     g = 0
     if mech.controls != ORIENTATION:
         for x in range(3):
@@ -296,7 +297,7 @@ def _is_closed(mech: MechanismArrays, design: int, work: WorkingMemory, count: i
 
 @compiled_lean
 def _keep_posture(mech: MechanismArrays, work: WorkingMemory, angles: Floats, gaps: Floats) -> None:
-    """Copy the angles (n,), and what remains open of each loop (k,) [m]."""
+    """Copy the joint coordinates at hand to `angles` (n,), and how far each loop is open [m] to `gaps` (k,)."""
     present, left, first = work.angles, work.gaps, mech.first_row
     for j in range(present.size):
         angles[j] = present[j]

@@ -71,6 +71,7 @@ def in_one_axis(count: int) -> Change:
 
 
 def _changed(value: Any, change: Change, shape: tuple[int, ...]) -> Any:
+    """A dataclass, or a tuple of such, with the change made to its arrays of designs; any other value itself."""
     if isinstance(value, tuple):
         return tuple(_changed(one, change, shape) for one in value)
     if not is_dataclass(value) or isinstance(value, type):
@@ -83,6 +84,7 @@ def _changed(value: Any, change: Change, shape: tuple[int, ...]) -> Any:
 
 
 def _changed_numbers(numbers: Any, own: int, change: Change, shape: tuple[int, ...]) -> Any:
+    """An array, or a dictionary of such, with the change made to all axes but its `own` last, if it has more."""
     if isinstance(numbers, Mapping):
         return {name: _changed_numbers(one, own, change, shape) for name, one in numbers.items()}
     if not isinstance(numbers, np.ndarray) or numbers.ndim <= own:

@@ -234,7 +234,7 @@ class DriveMotion:
 
     @classmethod
     def of(cls, mechanism: Mechanism, motions: Motions, angles: Floats, ratio: Floats) -> DriveMotion:
-        """Of one design.
+        """The motion of the drives of one design.
 
         angles  (n,) joint coordinates;   ratio  (d,) of the posture that is linearised about, which drives with a
                 table refer to
@@ -256,7 +256,7 @@ class DriveMotion:
 
 
 def drive_travel(mechanism: Mechanism, start: Floats, end: Floats, ratio: Floats) -> Floats:
-    """By what the drives' coordinates (d,) differ between two postures, given by their joint coordinates (n,)."""
+    """Travel (d,) of the drives' coordinates between two postures, given by their joint coordinates (n,)."""
     drives, way = mechanism.drives, end - start
     travel = way[drives.joint].copy()
     if drives.coupling is not None:
@@ -405,8 +405,8 @@ def _effective_in_general(
     spun: Floats | None,
     shape: tuple[int, ...],
 ) -> EffectiveParameters:
-    """The four numbers where drives are not the coordinates: N postures, rotors and springs (N, d) at the joints,
-    spun (N, d) J_m n of rotors whose turning with their links counts."""
+    """Effective masses and stiffness where drives are not the coordinates: N postures, rotors and springs (N, d)
+    at the joints, spun (N, d) J_m n of rotors whose turning with their links counts."""
     N, c = h.shape
     T = np.broadcast_to(side.motion, (*shape, *side.motion.shape[-2:])).reshape(N, -1, c)
     t = side.shares(np.reshape(h, (*shape, c))).reshape(N, -1)

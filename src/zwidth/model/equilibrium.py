@@ -95,7 +95,7 @@ class Equilibrium:
         return abs(self.wall_force) / wall_stiffness if wall_stiffness > 0.0 else float("nan")
 
     def document(self, drives: Sequence[str]) -> dict[str, Any]:
-        """Its numbers by their keys. drives: the drives' names."""
+        """The equilibrium's numbers by their keys. drives: the drives' names."""
         ratio = self.ratio
         return {
             "wall_force_N": self.wall_force,
@@ -149,6 +149,7 @@ class Balance:
     def __init__(
         self, mechanism: Mechanism, posture: Posture, screw: Floats, load: Load, counts_motors: bool
     ) -> None:
+        """Take motions, springs and weight at a posture, its links unbent; arguments of `solve_equilibrium`."""
         self.mechanism, self.angles, self.screw, self.load = mechanism, posture.angles, screw, load
         self.counts_motors = counts_motors
         self.motions = Motions(pack(mechanism), posture.angles, mechanism.flexible)
@@ -173,7 +174,7 @@ class Balance:
         return self.motions.joint_count
 
     def _bend(self, bending: Floats, share: float) -> None:
-        """Take what acts on the joints as it is with the flexible links bent by elastic coordinates (x,)."""
+        """Set what acts on the joints under a share of the load, the flexible links bent by coordinates (x,)."""
         n, handle = self.joints, self.motions.handle
         self.bending = bending
         self.speed = handle.speed[:, :n] + handle.speed_2[:, :n, n:] @ bending
@@ -298,12 +299,14 @@ class Balance:
         return self.load.text(unit_of_push(self.screw))
 
     def _not_held(self) -> str:
+        """Message: the springs of the drives bend too far under the load."""
         return (
             f"no equilibrium was found under {self._load_text}: the springs of the drives bend further than the "
             "device can move; is the load too large, or a stiffness too small?"
         )
 
     def _compensated(self, counted: CountedPosture) -> Floats:
+        """Generalised forces (n,) of gravity that the computer works out and compensates; 0 if it does not."""
         if self.compensation != "computed":
             return np.zeros(self.joints)
         return counted.motions.weight(self.gravity)[0]
@@ -318,8 +321,8 @@ class Balance:
         s: Floats,
         f: float,
     ) -> tuple[Floats, Floats]:
-        """What the balance of the flexible drives, and of the load along the direction, is off by, and the
-        derivative of both."""
+        """Errors of the balance of the flexible drives, and of the load along the direction, and their derivatives
+        by the deflections and the wall's force."""
         F, count = self.flexible, len(self.flexible)
         turning = command_change(counted, self.screw, share * self.gravity, self.compensation, f)
         by_ahead = turning[:, F] if self.counts_motors else np.zeros((len(s), count))
@@ -366,6 +369,7 @@ class Balance:
         return np.asarray(np.linalg.solve(self.elastic - own, pushed[n:]))
 
     def _result(self, ahead: Floats, counted: CountedPosture, torques: Floats, s: Floats, f: float) -> Equilibrium:
+        """The equilibrium at deflections `ahead`, motors' and springs' torques (d,) and the wall's force f [N]."""
         borne = self._borne(s)
         wrench = -(self.to_wrench @ borne)
         left = borne + wrench[:3] @ self.speed + wrench[3:] @ self.spin
@@ -448,8 +452,8 @@ class Balance:
 def command_change(
     counted: CountedPosture, screw: Floats, gravity: Floats, compensation: Compensation, wall_force: float
 ) -> Floats:
-    """By how much the torques that the computer asks for change with the drives' coordinates that it counts, (d,
-    d), at a constant force of the wall: its force turns with the counts, and gravity with what is computed of it.
+    """Derivative (d, d) of the torques that the computer asks for by the drives' coordinates that it counts, at a
+    constant force of the wall: its force turns with the counts, and gravity with what is computed of it.
 
         tau = T G b,  G = (T^T T)^-1,  b = f h - w(p_c)
 
@@ -488,7 +492,7 @@ class DriveSprings:
 
     @classmethod
     def of(cls, drives: Drives) -> DriveSprings:
-        """Of the drives of one design."""
+        """The springs of the drives of one design."""
         n = drives.transmission
         forward, dry = n**2 * drives.stiffness, drives.nonlinearity
         if dry is None:
@@ -503,8 +507,8 @@ class DriveSprings:
         return np.flatnonzero(np.isfinite(self.forward))
 
     def settled(self, deflection: Floats, rounding: float) -> Floats:
-        """The deflections (d,), those at the kink to rounding, a torque [N m], just there: without torque, what is
-        left by a search would else decide on the stiffness."""
+        """Deflections (d,), moved to the kink where they are at it to rounding, a torque [N m]: without torque,
+        what is left by a search would else decide on the stiffness."""
         flexible = np.isfinite(self.forward) & (self.forward != self.backward)
         near = np.where(flexible, self.forward, 0.0) * np.abs(deflection - self.kink) <= rounding
         return np.where(flexible & near, self.kink, deflection)

@@ -89,8 +89,9 @@ def first_order_form(plant: Plant, period: float, second_reading: Floats | None 
 def _second_output(
     A: Floats, elastic: Floats, basis: Floats, lag_count: int, period: float, rows: Floats
 ) -> Floats:
-    """Weights (k,) of a form's states in a reading rows . [x'', x', x], without what the force adds to x''.
+    """Weights (N,) of a form's states in a reading rows . [x'', x', x], without what the force adds to x''.
 
+    A               (N, N)  dynamics of the form, whose last `lag_count` states are forces of lagged dampers
     elastic, basis  (n, e), (n, k)  motions of the form's places, the last of them, and of its velocities
     rows            (3, n)
     """
@@ -242,6 +243,7 @@ def invariant_subspace(form: FirstOrderForm, poles: Complexes) -> tuple[Floats, 
         return bool(wanted[np.argmin(np.abs(value - every))])
 
     def basis(A: Floats) -> Floats:
+        """Orthonormal basis (k, p) of the invariant subspace of a matrix (k, k) for the wanted poles."""
         _, vectors, count = schur(A, output="complex", sort=chosen)
         U, _, _ = np.linalg.svd(np.hstack([vectors[:, :count].real, vectors[:, :count].imag]))
         return np.asarray(U[:, :count])
@@ -340,7 +342,7 @@ def _widened(basis: Floats, columns: Floats, level: float) -> Floats:
 
 
 def _coupling(matrix: Floats) -> Flags:
-    """Which two modes a symmetric matrix (n, n) in modal coordinates couples by more than a share of what it does
-    to both of them."""
+    """Marks (n, n) of the pairs of modes that a symmetric matrix (n, n) in modal coordinates couples by more than
+    a share of what it does to both of them."""
     own = np.sqrt(np.abs(np.diag(matrix)))
     return np.asarray((np.abs(matrix) > IDLE * np.outer(own, own)) & ~np.eye(len(own), dtype=bool))

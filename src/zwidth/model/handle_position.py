@@ -166,7 +166,7 @@ def _motions(rows: Floats, loops: int, driven: int) -> Floats:
 
 
 def _close_loops(mech: MechanismArrays, design: int, angles: Floats, goal: Floats) -> tuple[Floats, Floats]:
-    """Close the loops with the drives at rest, the angles in place; the constraints there."""
+    """Close the loops with the drives at rest, the angles (n,) in place. Returns `constraints` there."""
     passive, loops = mech.joint.size - mech.driven - mech.free, int(mech.first_row[-1])
     rows, gaps = constraints(mech, design, angles, goal)
     for _ in range(8 if passive else 0):
@@ -190,6 +190,7 @@ def handle_goal(mech: MechanismArrays, design: int, angles: Floats) -> Floats:
     return turned if mech.controls == ORIENTATION else np.concatenate([position, turned])
 
 
+# Fills in position (3,) [m] and axes (3, 3) of one design's handle at joint coordinates (n,).
 @compiled
 def _fill_handle(mech: MechanismArrays, design: int, angles: Floats, position: Floats, axes: Floats) -> None:
     work = working_memory(mech)
@@ -295,6 +296,7 @@ def _closed_configurations(mech: MechanismArrays, designs: Ints, rough: Floats) 
 
 
 def _misfit(mechanism: Mechanism, mech: MechanismArrays, ranks: Ints) -> Misfit | None:
+    """Why the drives do not fit the mechanism by its `_ranks` (3,), and what to do; None where they fit."""
     m, independent = mech.joint.size, mech.driven + mech.free
     of_loops, of_passive, of_all = ranks
     freedom = m - of_loops
@@ -340,7 +342,7 @@ def constraints(mech: MechanismArrays, design: int, angles: Floats, goal: Floats
 
 
 def _rank(rows: Floats, sizes: Floats) -> Ints:
-    """Of matrices (N, i, j), of mechanisms of these sizes (N,)."""
+    """Ranks (N,) of matrices (N, i, j) of mechanisms of these sizes (N,) [m]."""
     if 0 in rows.shape:
         return np.zeros(len(rows), dtype=np.int64)
     values = np.linalg.svd(rows, compute_uv=False)

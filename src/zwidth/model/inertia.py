@@ -136,6 +136,7 @@ def joint_mass_matrix(mechanism: Mechanism, coordinates: Floats) -> Floats:
     return np.asarray(M[0] + np.diag(rotors))
 
 
+# Joint axes (n, 3) of the only design in the base frame, at joint coordinates (n,).
 @compiled
 def _axes(mech: MechanismArrays, angles: Floats) -> Floats:
     work = working_memory(mech)
@@ -143,6 +144,7 @@ def _axes(mech: MechanismArrays, angles: Floats) -> Floats:
     return work.axis
 
 
+# Fills in out (1, c, c), the links' mass matrix in the independent coordinates, at joint coordinates (n,).
 @compiled
 def _mass(mech: MechanismArrays, angles: Floats, out: Floats) -> None:
     work = working_memory(mech)

@@ -131,7 +131,7 @@ class _Balances:
         return self._of(posture)[1]
 
     def check(self, posture: Posture) -> Equilibrium:
-        """The same, if drives, hand and wall hold what they have to. Raises what `Balance.check` raises."""
+        """The equilibrium of a posture. Raises what `Balance.check` raises where it is not held."""
         balance, found = self._of(posture)
         balance.check(found)
         return found
@@ -142,6 +142,7 @@ class _Balances:
         return balance.largest_part(found)
 
     def _of(self, posture: Posture) -> tuple[Balance, Equilibrium]:
+        """Balance and equilibrium of a posture, looked for from the last one; kept until another posture comes."""
         if self.last is not None and self.last[0] is posture:
             return self.last[1:]
         mechanism = self.mechanism
@@ -198,6 +199,7 @@ def _settled(mechanism: Mechanism, at: Posture, screw: Floats, load: Load, balan
     start = balances.solve(at).handle_place
 
     def off(there: Posture) -> Floats:
+        """Sideways force and way along the direction that are too much, in shares of load and size."""
         found = balances.solve(there)
         return np.append(across.T @ (found.hand_force - force) / strength, u @ (found.handle_place - start) / size)
 
@@ -219,6 +221,7 @@ def _hung(mechanism: Mechanism, at: Posture, balances: _Balances) -> Posture:
     scale = balances.scale(at) or 1.0
 
     def off(there: Posture) -> Floats:
+        """Forces on the free joints that nothing balances, in shares of the largest force."""
         return np.asarray(balances.solve(there).unbalanced[k:] / scale)
 
     if np.max(np.abs(off(at)), initial=0.0) <= SETTLED:
@@ -320,7 +323,7 @@ def _describe(
     position: Floats,
     turn: Floats,
 ) -> None:
-    """Mass matrix, Jacobians, and place of the handle at joint coordinates (n,)."""
+    """Fill in mass matrix (1, c, c), Jacobians, and place of the handle at joint coordinates (n,)."""
     work = working_memory(mech)
     place_links(mech, 0, angles, work)
     equations(mech, 0, work)

@@ -250,6 +250,7 @@ class PieceSums:
     """
 
     def __init__(self, values: int, narrowest: int) -> None:
+        """Begin with sums of no block."""
         self._width = narrowest // 2
         self._count = (values - 1) // self._width // 2 * 2
         self._blocks = 0
@@ -319,7 +320,7 @@ def _reduced(stacked: list[Complexes]) -> Complexes:
 
 
 def _moved(middle: ArrayLike, half: float) -> Floats:
-    """What turns columns u R^p of a piece into u r^p of a window, (n, 5, 5), where r = middle + half R:
+    """Matrix (n, 5, 5) that turns columns u R^p of a piece into u r^p of a window, where r = middle + half R:
     r^p = sum over q of (p over q) middle^(p - q) half^q R^q."""
     q, p = np.arange(SUMMED_TERMS)[:, None], np.arange(SUMMED_TERMS)
     about = np.atleast_1d(np.asarray(middle, dtype=np.float64))[:, None, None]

@@ -62,7 +62,7 @@ class RatioTable:
 
     @cached_property
     def _coefficients(self) -> Floats:
-        """Of the cubics in q less their first coordinate, highest power first, of P designs (4, P, k - 1)."""
+        """Coefficients (4, P, k - 1) of P designs' cubics in q less its first entry, highest power first."""
         from scipy.interpolate import PchipInterpolator  # which devices without a table do without
 
         ratio = self.ratio.reshape(-1, len(self.coordinate))
@@ -80,14 +80,14 @@ class RatioTable:
         return np.asarray(np.where(inside, ((c[0] * x + c[1]) * x + c[2]) * x + c[3], np.nan))
 
     def slope(self, coordinate: Floats) -> Floats:
-        """Its derivative n'(q) at coordinates (...); nan outside of the table."""
+        """Derivative n'(q) of the ratio at coordinates (...); nan outside of the table."""
         q, inside = self._within(coordinate)
         c, x, _ = self._cubic(q)
         return np.asarray(np.where(inside, (3.0 * c[0] * x + 2.0 * c[1]) * x + c[2], np.nan))
 
     def motor_angle(self, coordinate: Floats) -> Floats:
-        """f(q), by which the motor has turned since the joint was at the table's first entry [rad], at coordinates
-        (...) of one design; nan outside of the table."""
+        """Angle f(q) by which the motor has turned since the joint was at the table's first entry [rad], at
+        coordinates (...) of one design; nan outside of the table."""
         q, inside = self._within(coordinate)
         c, x, span = self._cubic(q)
         every = self._coefficients[:, 0]
@@ -113,7 +113,7 @@ class RatioTable:
         return self._coefficients[:, self._design(q.shape), span], q - self.coordinate[span], span
 
     def _design(self, shape: tuple[int, ...]) -> Ints:
-        """Which design's numbers are meant at each of coordinates of a shape, with the axes of the designs."""
+        """Index of the design for each of coordinates of a shape, broadcast with the axes of the designs."""
         designs = self.ratio.shape[:-1]
         numbers = np.arange(int(np.prod(designs))).reshape(designs)
         return np.broadcast_to(numbers, np.broadcast_shapes(designs, shape))
@@ -144,7 +144,7 @@ def with_any_ratio(drives: Drives) -> Drives:
 
 
 def _with_ratios(drives: Drives, ratios: list[Floats | None]) -> Drives:
-    """The drives with ratios (...) in place of their tables; None: that of the drive."""
+    """The drives with ratios (...) in place of their tables; where a ratio is None, that of the drive stays."""
     own = drives.transmission
     columns = [own[..., i] if ratio is None else ratio for i, ratio in enumerate(ratios)]
     return replace(drives, transmission=np.stack(np.broadcast_arrays(*columns), axis=-1), ratio_tables=None)
@@ -406,6 +406,7 @@ def nonlinear_of_drives(
 
 
 def _friction(n: Floats, dry: DriveNonlinearity, motors: Floats) -> tuple[Friction, ...]:
+    """Dry friction of the drives that have it; n (d,) ratios, motors (d, n) as in `nonlinear_of_drives`."""
     return tuple(
         Friction(
             along=motors[i],
@@ -421,7 +422,8 @@ def _friction(n: Floats, dry: DriveNonlinearity, motors: Floats) -> tuple[Fricti
 
 
 def _counters(drives: Drives, h: Floats, counted: Floats) -> tuple[Counter, ...]:
-    """None where no encoder is known; beside one that is, the others are as fine as you like."""
+    """Encoder steps of the drives, read by rows counted (d, n) and weighed by h (d,); () where neither a step nor
+    noise is known. A step that is not known is 0: as fine as you like."""
     n, counts = drives.transmission, drives.encoder_counts
     known = np.isfinite(counts)
     noise = np.zeros(len(h)) if drives.nonlinearity is None else drives.nonlinearity.encoder_noise / n
@@ -437,6 +439,8 @@ def _counters(drives: Drives, h: Floats, counted: Floats) -> tuple[Counter, ...]
 def _springs(
     drives: Drives, dry: DriveNonlinearity, deflections: Floats, bent: Floats | None, backward: bool
 ) -> tuple[Spring, ...]:
+    """What the drives' springs add to a constant stiffness; deflections (d, n): row i reads theta - phi of drive
+    i, bent and backward as in `nonlinear_of_drives`."""
     n = drives.transmission
     cubic = n**4 * dry.hardening
     excess = np.zeros(len(n))
@@ -467,6 +471,7 @@ def kinks(drives: Drives, dry: DriveNonlinearity) -> Floats:
 
 
 def _brakes(n: Floats, dry: DriveNonlinearity, motors: Floats) -> tuple[Brake, ...]:
+    """Electrical brakes of the drives that have one; n (d,) ratios, motors (d, n) as in `nonlinear_of_drives`."""
     return tuple(
         Brake(motors[i], float(n[i] ** 2 * dry.brake_damping[i]), float(dry.brake_time_constant[i]))
         for i in np.flatnonzero(dry.brake_damping > 0.0)

@@ -229,7 +229,7 @@ def _rows_of_links(mechanism: Mechanism, first_row: Ints) -> Ints:
 
 
 def _filled(spans: Ints) -> Ints:
-    """Rows (m, 2) that are not 0 once each unknown before is eliminated from those that share rows with it."""
+    """First and end (m, 2) of each unknown's rows once the unknowns before it that share rows are eliminated."""
     filled = spans.copy()
     for j in range(len(spans)):
         shares = (filled[:, 0] < filled[j, 1]) & (filled[j, 0] < filled[:, 1])
@@ -240,7 +240,7 @@ def _filled(spans: Ints) -> Ints:
 
 
 def _carriers(links: Links) -> Ints:
-    """Of each link the one against which its joint turns."""
+    """Index (n,) of the link against which each link's joint turns."""
     carrier = np.array(links.parent, dtype=np.int64)
     for i in np.flatnonzero(np.asarray(links.joint) == BALL_Z):
         carrier[i - 1 : i + 1] = carrier[i - 2]
@@ -248,7 +248,8 @@ def _carriers(links: Links) -> Ints:
 
 
 def _turning(rotation: Floats, axis: Floats) -> Floats:
-    """C0, C1, C2 of Rodrigues' formula: C (a a^T + sin q [a]x + cos q (1 - a a^T)), shape (P, n, 3, 3, 3)."""
+    """C0, C1, C2 (P, n, 3, 3, 3) of a joint's rotation C (a a^T + sin q [a]x + cos q (1 - a a^T)), by Rodrigues:
+    `rotation` C (P, n, 3, 3) is that at q = 0, `axis` a (P, n, 3)."""
     along = axis[..., :, None] * axis[..., None, :]
     cross = np.zeros_like(along)
     x, y, z = np.moveaxis(axis, -1, 0)

@@ -103,7 +103,7 @@ def _stiffness_and_rounding(stiffness: Floats, motions: Floats, fastest: float) 
 
 
 def repeat_tolerance(squared: Floats) -> Floats:
-    """(n,)  by how much squared frequencies may differ from each of these and still be the same."""
+    """Differences (n,) by which others may be off these squared frequencies (n,) and still count as the same."""
     size = np.abs(squared)
     least = SLOW_SHARE * max(float(np.max(size, initial=0.0)), np.finfo(float).tiny)
     slowest = float(np.min(size, where=size > 0.0, initial=np.inf))

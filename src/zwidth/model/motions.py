@@ -401,6 +401,7 @@ def _place(mech: MechanismArrays, angles: Floats) -> tuple[Floats, Floats, Float
     return rotation, origin, axis
 
 
+# Fills in axes (n, 3, 3) and origin (n, 3) of every link, and its joint's axis (n, 3), at joint coordinates (n,).
 @compiled
 def _place_all(mech: MechanismArrays, angles: Floats, rotation: Floats, origin: Floats, axis: Floats) -> None:
     work = working_memory(mech)

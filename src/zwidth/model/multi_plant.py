@@ -213,6 +213,7 @@ def _names(what: str, count: int) -> tuple[str, ...]:
 
 
 def _check_independent(rows: Floats) -> None:
+    """Raise DirectionError unless the rows (m, n), the handle's motion along each direction, are independent."""
     m, n = rows.shape
     singular = np.linalg.svd(rows, compute_uv=False)
     if m > n or not singular[-1] > DEPENDENT * singular[0]:

@@ -42,6 +42,7 @@ class Operator:
     directions: Literal["rendered", "all"] = "rendered"
 
     def __post_init__(self) -> None:
+        """Raise ValueError for other directions than rendered or all, or a number out of range."""
         check_choice("directions", self.directions, ("rendered", "all"))
         units = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
         for part, unit in units.items():

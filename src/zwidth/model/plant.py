@@ -429,6 +429,7 @@ def check_no_loss_factor(plant: Plant) -> None:
 
 
 def _check_numbers(masses: dict[str, float], damping: float, stiffness: float) -> None:
+    """Raise ValueError unless all are finite, masses [kg] above 0 and the damping [N s/m] not below 0."""
     for name, value in masses.items():
         check_number(name, value, "kg", above=0.0)
     check_number("damping", damping, "N s/m", least=0.0)

@@ -49,6 +49,7 @@ def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
         return modes
 
     def several(first: int, last: int) -> None:
+        """Fill in the modes of plants first to last - 1."""
         fill_modes(
             M, B, K, actuator, sensor, handle, decay, squared, enter, leave, held, drag, coupled, first, last,
         )  # fmt: skip
@@ -58,7 +59,7 @@ def plant_modes(plant: Plant, designs: tuple[int, ...] = ()) -> RenderedModes:
 
 
 def _flat(array: Floats, shape: tuple[int, ...], own: int) -> Floats:
-    """One axis of designs, as an array that can be written to: kernels are compiled once for these."""
+    """An array (shape, own axes) as (N, own axes), writable: kernels are compiled once for such."""
     tail = array.shape[array.ndim - own :]
     return np.array(np.broadcast_to(array, (*shape, *tail)).reshape(-1, *tail), dtype=np.float64, order="C")
 
@@ -226,12 +227,14 @@ def modes_in_general(
 
 
 def _flat_postures(mechanism: Mechanism, posture: Posture, side: DriveSide, u: Floats) -> Postures:
+    """Postures, drives' side and screws u (..., 6), broadcast with the designs and flattened to N."""
     drives = mechanism.drives
     shape = np.broadcast_shapes(posture.status.shape, u.shape[:-1], mechanism.design_shape)
     design, known = design_of_each(mechanism, shape), np.broadcast_to(posture.status == OK, shape).ravel()
     first = int(np.argmax(known))
 
     def flat(array: Floats, own: int) -> Floats:
+        """An array (..., own axes) as (N, own axes); at postures that are not OK the first OK one's numbers."""
         tail = array.shape[array.ndim - own :]
         full = np.broadcast_to(array, (*shape, *tail)).reshape(-1, *tail)
         return np.asarray(np.where(known.reshape(-1, *(1,) * own), full, full[first]))
@@ -262,7 +265,7 @@ def _flat_postures(mechanism: Mechanism, posture: Posture, side: DriveSide, u: F
 
 
 def _matrices(at: Postures) -> tuple[Floats, Floats, Floats]:
-    """M and K (N, n, n), and the deflections D (N, f, n) of the flexible drives."""
+    """Mass M and stiffness K (N, n, n) of the full model, and deflections D (N, f, n) of the flexible drives."""
     T, (N, c) = at.side.motion, at.h.shape
     F, R = np.flatnonzero(at.flexible), np.flatnonzero(~at.flexible)
     f, n = len(F), c + len(F)
@@ -284,7 +287,7 @@ def _matrices(at: Postures) -> tuple[Floats, Floats, Floats]:
 def _damping(
     mechanism: Mechanism, at: Postures, damping: Damping, M: Floats, K: Floats, D: Floats
 ) -> tuple[Floats, Floats | None]:
-    """B (N, n, n), and the damping ratio (N,) that comes to every flexible mode."""
+    """Damping B (N, n, n) of the full model, and the damping ratio (N,) that comes to every flexible mode."""
     B, ratio, c = np.zeros_like(K), None, at.h.shape[1]
 
     def of_each(number: float | Floats) -> Floats:

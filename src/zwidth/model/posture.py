@@ -159,8 +159,7 @@ def solve_posture(
     tolerance: float = 0.0,
     straight: bool = False,
 ) -> Posture:
-    """The posture with the handle at a position, in an orientation, or both, in a named assembly (None: the
-    first).
+    """The posture with the handle at a position, in an orientation, or both, in an assembly (None: the first).
 
     The assembly's approximate joint coordinates are closed onto the reference; from there Newton is continued to
     the goal without passing a singularity (`continuation`), along the straight way or by the roadmap of all
@@ -262,6 +261,7 @@ def _posture(
     projected: Floats,
     shape: tuple[int, ...],
 ) -> Posture:
+    """The postures as a `Posture` of a shape (...), from N solved ones, goals (N, g) and projected (N,) [m]."""
     n, c = mech.parent.size, mech.driven + mech.free
     # the position that was requested, to the last digit; of an orientation, where the handle happens to be
     position, rotation = solved.position if mech.controls == ORIENTATION else goals[:, :3], None
@@ -358,14 +358,12 @@ def place_of_joints(
 
 
 def joint_position(mechanism: Mechanism, coordinates: Mapping[str, float], assembly: str | None = None) -> Floats:
-    """The handle's position with the driven joints at given coordinates, (3,) [m]; arguments and errors are those
-    of `place_of_joints`."""
+    """Handle's position (3,) [m] at coordinates of the driven joints; arguments, errors of `place_of_joints`."""
     return place_of_joints(mechanism, coordinates, assembly)[0]
 
 
 def handle_motions(posture: Posture) -> Floats:
-    """Orthonormal directions (3, r) in which the drives and free joints can move the handle, at a single
-    posture."""
+    """Orthonormal directions (3, r) in which drives and free joints can move the handle at a single posture."""
     left, singular, _ = np.linalg.svd(posture.jacobian, full_matrices=False)
     return np.asarray(left[:, singular > 1e-9 * singular[0]])
 
@@ -417,6 +415,7 @@ def link_points(mechanism: Mechanism, posture: Posture) -> LinkPoints:
     return LinkPoints(origin.reshape(*shape, n, 3), tip.reshape(*shape, n, 3), rotation.reshape(*shape, n, 3, 3))
 
 
+# Fills in axes (N, n, 3, 3) and origins (N, n, 3) [m] of the links at joint coordinates (N, n).
 @compiled
 def _place_batch(mech: MechanismArrays, design: Ints, angles: Floats, rotation: Floats, origin: Floats) -> None:
     work = working_memory(mech)
@@ -436,6 +435,7 @@ def _references(mechanism: Mechanism, mech: MechanismArrays, name: str) -> tuple
 
 
 def _assembly_name(mechanism: Mechanism, assembly: str | None) -> str:
+    """Name of an assembly, None being the first one. Raises ValueError for an unknown name."""
     names = list(mechanism.assemblies)
     name = names[0] if assembly is None else assembly
     if name not in mechanism.assemblies:
@@ -463,7 +463,7 @@ def _goals(mechanism: Mechanism, position: ArrayLike | None, orientation: ArrayL
 
 
 def _in_space(mechanism: Mechanism, position: ArrayLike | None) -> Floats:
-    """Positions (..., 3), None being the reference's; two coordinates are completed with its third."""
+    """Positions (..., 3) [m], None: the reference's; two coordinates are completed with the third of that."""
     if position is None:
         return np.asarray(mechanism.reference_position)
     given = np.asarray(position, dtype=np.float64)
@@ -481,6 +481,7 @@ def _in_space(mechanism: Mechanism, position: ArrayLike | None) -> Floats:
 
 
 def _check_loops(mechanism: Mechanism, mech: MechanismArrays, name: str, gaps: Floats) -> None:
+    """Raise LoopOpen where the largest of the gaps (k,) [m] left in an assembly's loops is more than rounding."""
     if gaps.size and gaps.max() > ASSEMBLY_TOLERANCE * mech.size[0]:
         worst = int(gaps.argmax())
         raise LoopOpen(
@@ -493,7 +494,7 @@ ALIKE: Final = 1e-9  # m and degrees that are not worth saying
 
 
 def singular_throughout(assembly: str, uncontrolled: str) -> Singular:
-    """An assembly in which the drives control the handle nowhere, for the reason given."""
+    """Error for an assembly in which the drives control the handle nowhere, for the reason given."""
     return Singular(
         f"assembly {assembly!r} of the mechanism is singular wherever its handle is: {uncontrolled}; choose "
         "another assembly, or change the places of joints that make it so"
@@ -509,7 +510,7 @@ def posture_failure(
     goal: Floats,
     near: Floats | None,
 ) -> PostureError:
-    """Why there is no posture of one design at a goal (g,), by its status.
+    """The error that says, by its status, why there is no posture of one design at a goal (g,).
 
     reference  (n,) joint coordinates;   near  (g,) a goal near it that the handle can have, None where unknown
     """
@@ -553,7 +554,7 @@ def _numbers(values: Floats) -> str:
 
 
 def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:
-    """How far apart two goals (g,) are, in words: in place, in orientation, as far as the drives control them."""
+    """Text: how far apart two goals (g,) are in place and in orientation, as far as the drives control them."""
     shift, turn = goal_difference(mech, near, goal)
     angle = degrees(turn)
     parts = [f"{shift:.4g} m" if shift >= 1.0 else f"{1e3 * shift:.4g} mm"] if shift > ALIKE else []
@@ -562,7 +563,7 @@ def _distance(mech: MechanismArrays, near: Floats, goal: Floats) -> str:
 
 
 def _limit(mechanism: Mechanism, mech: MechanismArrays, reference: Floats, goal: Floats) -> str:
-    """Which joint is beyond which limit, and by how much."""
+    """Message: which joint is beyond which limit at a goal (g,), straight from the reference (n,)."""
     angles = reference.copy()
     link = _joint_beyond(mech, angles, goal[None].copy())
     if link < 0:  # the straight way does not lead there
@@ -593,7 +594,7 @@ def _drive_with_table(mechanism: Mechanism, link: int) -> tuple[str, RatioTable]
 
 @compiled
 def _joint_beyond(mech: MechanismArrays, angles: Floats, goals: Floats) -> int:
-    """The joint that is beyond its limit at the goal, reached straight from joint coordinates (in place)."""
+    """Link whose joint is beyond its limit at the goal, reached straight from `angles` (in place); or -1."""
     work = working_memory(mech)
     follow(mech, 0, goals, 0, angles, work)
     return joint_beyond_limit(mech, 0, angles)

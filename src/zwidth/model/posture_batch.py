@@ -61,7 +61,8 @@ class PostureBatch:
 
 
 def solve_batch(mech: MechanismArrays, design: Ints, reference: Floats, goals: Floats) -> PostureBatch:
-    """Every posture from the start that suits: many of one design by its roadmap, others straight."""
+    """Postures at goals (N, g), each from the start that suits: many of one design by its roadmap, others straight
+    from the reference (P, n) of their design (N,)."""
     designs = len(reference)
     if len(goals) >= ROADMAP_LEAST * designs:
         if designs == 1:
@@ -88,9 +89,8 @@ def solve_batch(mech: MechanismArrays, design: Ints, reference: Floats, goals: F
 
 
 def by_roadmap(mech: MechanismArrays, design: int, reference: Floats, goals: Floats) -> PostureBatch:
-    """Start each posture at the roadmap's node of its cell; where that fails, at the nearest nodes.
-
-    What no chain of links can span is not tried.
+    """Postures of one design at goals (N, g), each begun at the roadmap's node of its cell; where that fails, at
+    the nearest nodes. A goal that no chain of links can span is not tried.
     """
     far = outside_shells(mech, design, goals)
     if far.any():
@@ -111,6 +111,7 @@ def by_roadmap(mech: MechanismArrays, design: int, reference: Floats, goals: Flo
 
 
 def empty_batch(mech: MechanismArrays, count: int) -> PostureBatch:
+    """Memory for the results of so many postures, not filled in yet."""
     n, c = mech.parent.size, mech.driven + mech.free
     return PostureBatch(
         np.empty(count, np.uint8),
@@ -124,7 +125,7 @@ def empty_batch(mech: MechanismArrays, count: int) -> PostureBatch:
 
 
 def failed_batch(mech: MechanismArrays, count: int, status: int = SINGULAR) -> PostureBatch:
-    """No posture at all; left out: the answer of an assembly that is singular throughout."""
+    """Results of so many goals without a posture; SINGULAR: of an assembly that is singular throughout."""
     solved = empty_batch(mech, count)
     for numbers in vars(solved).values():
         numbers.fill(np.nan if numbers.dtype == np.float64 else status)
@@ -134,6 +135,7 @@ def failed_batch(mech: MechanismArrays, count: int, status: int = SINGULAR) -> P
 def solve_from_starts(
     mech: MechanismArrays, design: Ints, starts: Floats, which: Ints, goals: Floats
 ) -> PostureBatch:
+    """Postures at goals (N, g), each followed from joint coordinates starts[which[i]] (n,) of its design (N,)."""
     solved = empty_batch(mech, len(goals))
     kernel: Callable[[int, int], None] = partial(
         _postures, mech, design, starts, which, goals, *vars(solved).values()
@@ -259,6 +261,7 @@ def shells(mech: MechanismArrays, design: int | Ints) -> list[Shell]:
 
 
 def _shared_points(mech: MechanismArrays, design: int | Ints) -> list[SharedPoint]:
+    """Points that two links share: at joints that do not slide, and at closures."""
     tip = np.zeros_like(mech.handle[design, 0])
     joints = [
         (int(mech.parent[i]), mech.origin[design, i], i, tip)

@@ -320,7 +320,7 @@ def encoder_step(stretches: Sequence[Floats]) -> float:
 
 
 def _common_step(differences: Floats, least: float) -> float:
-    """What all of these (n,) are whole multiples of, more than one of it; 0 where there is no such step.
+    """Step of which most differences (n,) are whole multiples, not all the same one; 0 where there is none such.
 
     least  below which a difference is rounding
     """

@@ -288,6 +288,7 @@ def _padded(matrix: Floats, more: int) -> Floats:
 
 
 def _full_damping(M: Floats, K: Floats, D: Floats, damper: Floats, damping: Damping) -> Floats:
+    """Damping (n, n): a ratio of the modes, in proportion to M and K, or dampers (f,) on deflections D (f, n)."""
     if isinstance(damping, ModalDamping):
         return modal_matrix(M, K, damping.ratio)
     if isinstance(damping, ProportionalDamping):
@@ -329,8 +330,8 @@ def _own_dampers(drives: Drives, side: DriveSide, damping: Damping) -> Floats:
 def _two_mass_of_links(
     full: Plant, numbers: EffectiveParameters, damping: Damping, dampers: Floats, *, link_fixed: bool
 ) -> Plant:
-    """The same for links that bend: the spring is that of drives and links together, the dampers (n, n) that are
-    given one by one are moved by the motions of the two sides."""
+    """Two masses and their spring for links that bend: the spring is that of drives and links together, dampers
+    (n, n) that are given one by one are moved by the motions of the two sides."""
     m1, m2, k = float(numbers.link_side_mass), float(numbers.motor_side_mass), float(numbers.stiffness)
     pair = _pair(m1, m2, _damping_between(m1, m2, k, damping), k)
     if isinstance(damping, ProportionalDamping):
@@ -342,13 +343,15 @@ def _two_mass_of_links(
 
 
 def _damping_between(link: float, motor: float, stiffness: float, damping: Damping) -> float:
-    """Of two masses on a spring, by their mode's ratio or in proportion to the spring; 0 for given dampers."""
+    """Damper [N s/m] between two masses [kg] on a spring [N/m], by their mode's ratio or in proportion to the
+    spring; 0 for given dampers."""
     if isinstance(damping, ModalDamping):
         return 2.0 * float(damping.ratio) * float(np.sqrt(stiffness * link * motor / (link + motor)))
     return damping.stiffness_coefficient_s * stiffness if isinstance(damping, ProportionalDamping) else 0.0
 
 
 def _pair(link: float, motor: float, damping: float, stiffness: float) -> Plant:
+    """Plant of a link side, held by the hand, and a motor side [kg], damper [N s/m] and spring [N/m] between."""
     between = np.array([[1.0, -1.0], [-1.0, 1.0]])
     at_link, at_motor = np.array([1.0, 0.0]), np.array([0.0, 1.0])
     return Plant(
@@ -363,6 +366,7 @@ def _pair(link: float, motor: float, damping: float, stiffness: float) -> Plant:
 
 
 def _single(mass: float, damping: float, stiffness: float, name: str) -> Plant:
+    """Plant of one mass [kg], driven and read, without handle, with damper [N s/m] and spring [N/m] to ground."""
     one = np.ones(1)
     return Plant(
         np.array([[mass]]), np.array([[damping]]), np.array([[stiffness]]), one, one.copy(), None, (name,)
@@ -370,10 +374,12 @@ def _single(mass: float, damping: float, stiffness: float, name: str) -> Plant:
 
 
 def _motor_mass(mass: float, damping: float, stiffness: float) -> Plant:
+    """Plant of the motor side [kg], on damper [N s/m] and spring [N/m] to the link side, which is held fixed."""
     return _single(mass, damping, stiffness, "motor side")
 
 
 def _rigid(mass: float, damping: float) -> Plant:
+    """Plant of the whole device as one mass [kg], held by the hand, with a damper [N s/m] to ground."""
     return replace(_single(mass, damping, 0.0, "device"), handle=np.ones(1))
 
 

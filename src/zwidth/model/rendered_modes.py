@@ -59,7 +59,7 @@ class RenderedModes:
         return PolePairs(self.decay, self.frequency_squared, position, np.zeros_like(position), reach)
 
     def rows(self, rows: Ints) -> RenderedModes:
-        """Those of some of the plants."""
+        """The modes of some of the plants, by their indices."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
         return replace(self, **{name: value[rows] for name, value in values.items() if value is not None})
 
@@ -111,8 +111,8 @@ def rendered_modes(
 
 
 def _coefficients(mechanism: Mechanism, damping: Damping) -> Floats:
-    """r_m, r_k and the damping ratio of each design, (P, 3), or of each point, where the designs differ in their
-    damping and not in their mechanism, (N, 3); nan where given dampers couple the modes."""
+    """Damping coefficients r_m [1/s] and r_k [s], and damping ratio, of each design (P, 3), or each point (N, 3)
+    where the designs differ in their damping alone; nan where given dampers couple the modes."""
     P = int(np.prod(mechanism.design_shape))
     if isinstance(damping, ModalDamping):
         out = np.zeros((max(P, np.size(damping.ratio)), 3))
@@ -140,7 +140,7 @@ def _coefficients(mechanism: Mechanism, damping: Damping) -> Floats:
 
 
 def _of_reduced(numbers: EffectiveParameters, model: Model, coefficients: Floats) -> RenderedModes:
-    """Of masses and a spring: with the pair's reduced mass mu, w^2 = k/mu.
+    """Modes of the reduced models, masses and a spring: with the pair's reduced mass mu, w^2 = k/mu.
 
     The two masses' own ratio is that of their mode; the motor mass keeps the damper of the pair (`reduction`)."""
     r_m, r_k, ratio = coefficients.T
@@ -173,7 +173,7 @@ def _of_full(
     shape: tuple[int, ...],
     encoders: Encoders,
 ) -> RenderedModes:
-    """Undamped modes of the full model; rotor inertias and springs (P, d) at the joints."""
+    """Modes of the full model, undamped; rotor inertias and springs (P, d) at the joints."""
     d = rotor.shape[1]
     N, m = len(design), int(np.isfinite(spring).sum(axis=1).max(initial=0)) + 1
     along = np.broadcast_to(lever_arms(posture, screw(direction)), (*shape, d))
@@ -355,7 +355,7 @@ class PolePairs:
         )
 
     def with_rows(self, rows: Ints, others: PolePairs) -> PolePairs:
-        """The same with these plants' parts taken from others, one for each of the rows."""
+        """The same pairs, but those of some plants, one for each of the rows, taken from others."""
         most = max(self.decay.shape[1], others.decay.shape[1])
         merged = {}
         for name in ("decay", "frequency_squared", "position", "velocity"):

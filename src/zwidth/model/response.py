@@ -115,13 +115,14 @@ class Response:
     delay: float | None = None
 
     def __post_init__(self) -> None:
+        """Raise ValueError unless frequencies and values have one shape."""
         f, P = np.shape(self.frequency), np.shape(self.value)
         if f != P:
             raise ValueError(f"value has the shape {P} and frequency {f}; they must be alike")
 
 
 def handle_obstacle(response: Response) -> str:
-    """Why nobody can hold the handle of a measured device, and what to do; "" where somebody can."""
+    """Message: why nobody can hold the handle of a measured device, and what to do; "" where somebody can."""
     missing = (response.handle or MeasuredHandle()).missing
     if not missing:
         return ""
@@ -397,7 +398,7 @@ def fit_low_frequencies(frequency: Floats, value: Complexes, deviation: Floats |
 
 
 def _fit(f: Floats, P: Complexes, error: Floats) -> tuple[Floats, Floats, Floats]:
-    """Terms, their covariance, and how far P times the fit is from 1 at each frequency."""
+    """Terms of the fit, their covariance, and how far P times the fit is from 1 at each frequency f [Hz]."""
     scale = (2.0 * np.pi * f[-1]) ** np.arange(TERMS)
     equations = P[:, None] * (2j * np.pi * f[:, None]) ** np.arange(TERMS) / scale
     weighted = np.concatenate([equations.real, equations.imag]) / np.tile(error, 2)[:, None]

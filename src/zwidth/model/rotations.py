@@ -93,6 +93,7 @@ def turned_further(v: tuple[float, float, float], turn: tuple[float, float, floa
     )
 
 
+# Unit quaternion w, x, y, z of a rotation vector [rad].
 @compiled_lean
 def _quaternion(v: tuple[float, float, float]) -> tuple[float, float, float, float]:
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
@@ -103,7 +104,7 @@ def _quaternion(v: tuple[float, float, float]) -> tuple[float, float, float, flo
 
 @compiled_lean
 def _vector(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Of a unit quaternion; of its two signs the one with the smaller turn."""
+    """Rotation vector [rad] of a unit quaternion w, x, y, z; of its two signs the one with the smaller turn."""
     length = sqrt(x * x + y * y + z * z)
     share = 2.0 / w if length == 0.0 else 2.0 * atan2(length, abs(w)) / length * (1.0 if w >= 0.0 else -1.0)
     return share * x, share * y, share * z
