@@ -78,7 +78,7 @@ def close_plant(plant: Plant, controller: Controller) -> tuple[SampledForm, Plan
 
 
 def closed_form(states: PlantStates, controller: Controller) -> SampledForm:
-    """The same for the states of a plant."""
+    """The sampled plant with all fixed feedback of a computer closed, from the states of the plant."""
     if not len(states.output):
         none = np.zeros(0)
         return SampledForm(np.zeros((0, 0)), none, none, none, 0.0, 0.0)
@@ -178,6 +178,7 @@ class _LoadRows:
     """A force that the computer adds under load: what it reads of the states, filtered, delayed and held."""
 
     def __init__(self, rows: _StateRows, sampled: SampledInput, controller: Controller, keeps: bool) -> None:
+        """Add rows for filter and delay; `keeps`: the sensor reads the force that acts just before a sample."""
         self.sampled = sampled
         self.filter = None
         if sampled.filter is not None:
@@ -195,6 +196,7 @@ class _SlowCommand:
     """The command of the wall's loop: wall, force feedback and feedforward, through the force filter."""
 
     def __init__(self, rows: _StateRows, controller: Controller) -> None:
+        """Add rows for the force filter, and for filters and delays of the feedback that acts."""
         T, self.sensor, self.ahead = controller.sampling_period, controller.force_sensor, controller.feedforward
         self.on_force = _FilterRows(rows, low_pass_states(controller.force_filter, T))
         self.period = T
@@ -232,6 +234,7 @@ class _Period:
     """
 
     def __init__(self, states: PlantStates, controller: Controller, measures: bool = False) -> None:
+        """Add rows for the states of the plant, a lagged force, all filters and all commands that wait."""
         self.states, self.controller = states, controller
         lag, sensor, local = controller.actuator_time_constant, controller.force_sensor, controller.local_loop
         self.measures = measures or (sensor is not None and acts(sensor))
@@ -281,7 +284,7 @@ class _Period:
         )
 
     def _instants(self) -> list[tuple[float, int]]:
-        """What happens when, in shares of the period and in order: samples before commands that begin to act."""
+        """Times, in shares of the period, and kinds of its events, in order; samples before new commands."""
         instants = [(self.slow.part, SLOW), (1.0, END)]
         if self.local is not None:
             N = self.local.rate_multiple
@@ -293,7 +296,7 @@ class _Period:
         return np.asarray(self.states.output @ self.rows.current(self.at))
 
     def _measured_force(self) -> Floats:
-        """What the sensor measures, with the force that acts just before the sample."""
+        """Row (N + 1,) of the force that the sensor measures, the command that acts until then included."""
         force = self.states.force_output @ self.rows.current(self.at)
         lags = self.controller.actuator_time_constant > 0.0
         if self.states.force_direct != 0.0:
@@ -309,7 +312,7 @@ class _Period:
         return np.asarray(force)
 
     def _fast_command(self) -> Floats:
-        """The local loop's own command at one of its samples."""
+        """Row (N + 1,) of the local loop's own command at one of its samples."""
         assert self.local is not None
         reading = self._reading()
         command = -self.local.stiffness * reading

@@ -51,6 +51,7 @@ class Butterworth:
     discretisation: Discretisation = "tustin"
 
     def __post_init__(self) -> None:
+        """Raise ValueError for an order, a cutoff or a discretisation that is out of range."""
         if not isinstance(self.order, int | np.integer) or self.order < 1:
             raise ValueError(f"order must be a whole number from 1 on, got {describe_value(self.order)}")
         check_number("cutoff_Hz", self.cutoff_Hz, "Hz", above=0.0)
@@ -245,7 +246,7 @@ def _text(number: Number) -> str:
 
 
 def low_passes(feedback: FixedFeedback | None) -> Iterator[tuple[str, LowPass | None]]:
-    """Its low passes, each with the name of its argument."""
+    """The low passes of a feedback, each with the name of its argument."""
     names = ("filter", "velocity_filter", "acceleration_filter")
     yield from ((name, getattr(feedback, name)) for name in names if hasattr(feedback, name))
 
@@ -324,6 +325,7 @@ class Controller:
     local_loop: LocalLoop | None = None
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a number out of range, TypeError for an estimate or part of another type."""
         T = self.sampling_period
         check_fields(self, RANGES if isinstance(T, NotKnown) else PERIOD | RANGES)
         if not isinstance(self.velocity, VelocityMethod):
@@ -336,6 +338,7 @@ class Controller:
         self._check_feedback()
 
     def _check_feedback(self) -> None:
+        """Raise TypeError for a feedback of another type, ValueError for a filter's cutoff that is too high."""
         parts: dict[str, tuple[FixedFeedback | None, type[FixedFeedback]]] = {
             "force_sensor": (self.force_sensor, ForceSensor),
             "feedforward": (self.feedforward, Feedforward),
@@ -383,7 +386,7 @@ class Controller:
         return tuple(feedback_name(feedback) for feedback in every if feedback is not None)
 
     def feedback_texts(self, moments: bool = False) -> tuple[str, ...]:
-        """The same with all numbers and their units: "a local loop at 10 times the rate (0.5 N s/m)".
+        """What is added to the wall law, in words with numbers: "a local loop at 10 times the rate (0.5 N s/m)".
 
         moments  whether moments about an axis are rendered
         """
@@ -410,7 +413,7 @@ def check_no_feedback(controller: Controller, what: str, instead: str) -> None:
 
 
 def check_no_load(plant: Plant, what: str, instead: str) -> None:
-    """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as
-    before."""
+    """Raise FeedbackError for a plant under load, whose computer adds forces to the wall's; arguments as of
+    `check_no_feedback`."""
     if plant.is_loaded:
         raise FeedbackError(f"{what} under load; {instead}")

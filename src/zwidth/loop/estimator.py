@@ -110,7 +110,7 @@ class BackwardDifference:
     """
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         return mean_difference(np.ones(1), period)
 
     def delay(self, period: float) -> float:
@@ -141,7 +141,7 @@ class WindowedDifference:
         check_whole("samples", self.samples, 1, LONGEST, "the estimate is late by half the window")
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         return mean_difference(np.full(self.samples, 1.0 / self.samples), period)
 
     def delay(self, period: float) -> float:
@@ -166,7 +166,7 @@ class CentralDifference:
     """
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         return mean_difference(np.full(2, 0.5), period)
 
     def delay(self, period: float) -> float:

@@ -112,7 +112,7 @@ def refined_root(p: Polynomial, start: complex) -> tuple[Decimal, Decimal] | Non
 
 
 def decimals(values: Floats) -> list[Decimal]:
-    """Doubles (k,) as they are."""
+    """Exact decimal values of doubles (k,)."""
     return list(map(Decimal, values.tolist()))
 
 
@@ -126,7 +126,7 @@ def _decimals(E: Floats) -> list[list[Decimal]]:
 
 
 def _newton_step(p: Polynomial, z: complex) -> complex:
-    """p(z) / p'(z)."""
+    """Newton's step p(z) / p'(z) of a polynomial at z."""
     (re, im), (slope_re, slope_im) = _value_and_slope(p, Decimal(z.real), Decimal(z.imag))
     size = slope_re * slope_re + slope_im * slope_im
     if not size:

@@ -131,7 +131,7 @@ def _numerator(decay: float, squared: float, step: Pair, response: Pair, positio
 def lagged_row(
     decay: float, squared: float, position: float, velocity: float, period: float, fraction: float, lag: float
 ) -> Row:
-    """The same row of a mode whose force lags, in front of the factor 1/(d + s).
+    """One second-order mode, whose force lags, as a row in front of the factor 1/(d + s); arguments of `held_row`.
 
     With P the mode's state after T from a unit lagged force without command, Q from a unit command from rest, and
     Q_new from one that has acted for the rest of the interval only:
@@ -224,7 +224,7 @@ def lagged_responses(decay: float, squared: float, time: float, lag: float) -> t
 
 
 def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0, lag: float = 0.0) -> Floats:
-    """One mode of unit participation as a row (8,), with or without actuator lag."""
+    """One mode that the reading counts once as a row (8,) d1, d0, n2, n1, n0, o2, o1, o0, with or without lag."""
     row = np.empty(8)
     _fill_row(decay, squared, period, fraction, lag, row)
     return row
@@ -232,7 +232,7 @@ def modal_row(decay: float, squared: float, period: float, fraction: float = 0.0
 
 @compiled
 def _fill_row(decay: float, squared: float, period: float, fraction: float, lag: float, row: Floats) -> None:
-    """`modal_row` in memory of the caller."""
+    """Fill in the row (8,) of `modal_row`."""
     if lag > 0.0:
         values = lagged_row(decay, squared, 1.0, 0.0, period, fraction, lag)
     else:
@@ -257,7 +257,7 @@ def mode_growth(
 
 @compiled
 def _fill_growth(decay: float, squared: float, time: float, lag: float, out: Floats) -> None:
-    """The step response, and both of `lagged_responses`, in memory of the caller."""
+    """Fill in `out` (6,): step response, then both of `lagged_responses`, (0, 0) and the first without lag."""
     out[0], out[1] = step_response(decay, squared, time)
     if lag > 0.0:
         (out[2], out[3]), (out[4], out[5]) = lagged_responses(decay, squared, time, lag)

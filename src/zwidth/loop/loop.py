@@ -104,6 +104,7 @@ class Loop:
         object.__setattr__(self, "results", {})
 
     def __repr__(self) -> str:
+        """The plant's coordinates, sampling, delay and feedback in words."""
         names = ", ".join(self.plant.names) or f"{self.plant.size} coordinates"
         computer = self.controller.timing_text
         computer += "".join(f", with {part}" for part in self.controller.feedback_names)
@@ -212,7 +213,7 @@ class Loop:
         return np.asarray(rows_response(self.sections.rows, split, at, d) * passed)
 
     def velocity_response(self, z: ArrayLike, z_minus_1: ArrayLike | None = None) -> Complexes:
-        """w(z) (...), the velocity estimate per reading [1/s], at complex z (...); z_minus_1 as before."""
+        """w(z) (...), velocity estimate per reading [1/s] at complex z (...); z_minus_1: `plant_response`."""
         at: Complexes = np.asarray(z, dtype=complex)
         d = at - 1.0 if z_minus_1 is None else np.asarray(z_minus_1, dtype=complex)
         w = self.estimator

@@ -111,12 +111,12 @@ def factor_roots(rows: Rows) -> list[complex]:
 
 
 def _factor_array(rows: Rows) -> Floats:
-    """Rows as an array (..., k, 3), for no rows too."""
+    """Rows c2, c1, c0 as an array (..., k, 3), (0, 3) for no rows."""
     return stack_numbers(rows) if rows else np.zeros((0, 3))
 
 
 def _in_series(first: Floats, second: Floats) -> Floats:
-    """Factors (..., k, 3), then others (..., m, 3)."""
+    """Factors (..., k + m, 3) of two filters in series, those of the first (..., k, 3) in front."""
     if first.ndim == second.ndim == 2:
         return np.concatenate([first, second])
     designs = np.broadcast_shapes(first.shape[:-2], second.shape[:-2])
@@ -241,6 +241,7 @@ def _kept_columns(controller: Controller) -> ComputerColumns:
 
 
 def _columns(controller: Controller) -> ComputerColumns:
+    """The C computers of a controller, one for each of its designs, as columns."""
     designs = design_shape(controller)
     period, delay = (
         np.ravel(np.broadcast_to(np.asarray(number, dtype=np.float64), designs))
@@ -271,7 +272,7 @@ def _factors(top: Floats, bottom: Floats, designs: tuple[int, ...]) -> Floats:
 
 
 def _table(rows: Floats, section_count: Ints, computer: Ints, columns: Sequence[ComputerColumns]) -> LoopTable:
-    """Plants, and computers one after the other."""
+    """The table of plants by their sections, the number of each one's computer, and columns of computers."""
     joined = columns[0] if len(columns) == 1 else map(_joined, zip(*columns, strict=True))
     return LoopTable(
         np.ascontiguousarray(rows),
@@ -304,7 +305,8 @@ class CircleFactors(NamedTuple):
     plant     (m, 10)    each section's denominator (3), its numerators for the new and the old force (3 each), and
                          1 where it is chained to the section before it
     force     (k, 7)     the order (1 or 2) of each factor of the force path, its numerator (3), its denominator
-    (3) velocity  (v, 7)     the same of the velocity estimate
+                         (3)
+    velocity  (v, 7)     the same of the velocity estimate
     window    (n,)       its weights of past samples
     """
 
@@ -317,7 +319,7 @@ class CircleFactors(NamedTuple):
 
 
 def factor_memory(loops: LoopTable) -> CircleFactors:
-    """Memory for the factors of any one of these loops."""
+    """Memory for the factors of any one of these loops, none filled in yet."""
     m, k, v, n = loops.rows.shape[1], loops.force.shape[1], loops.velocity.shape[1], loops.window.shape[1]
     sizes = np.zeros(8, dtype=np.int64)
     sizes[COMPUTER] = -1

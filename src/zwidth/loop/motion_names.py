@@ -64,7 +64,7 @@ def listed_names(names: Sequence[str]) -> list[str]:
 
 
 def _kind(name: str) -> tuple[str, str] | None:
-    """Noun and verb of motions that can be told by their number and range; None of another one."""
+    """Noun and verb of a motion's name, of which many can be told by number and range; None where they cannot."""
     if MODE.match(name):
         return "mode", ""
     match = SIDEWAYS.match(name)
@@ -72,7 +72,7 @@ def _kind(name: str) -> tuple[str, str] | None:
 
 
 def _of_many(kind: tuple[str, str], names: Sequence[str]) -> str:
-    """Motions of a kind by their number and range."""
+    """Name of several motions of a kind: their number and range."""
     noun, verb = kind
     pattern, group = (SIDEWAYS, 3) if verb else (MODE, 1)
     numbers = [float(match[group]) for name in names if (match := pattern.match(name))]

@@ -256,7 +256,7 @@ class MultiLoop:
 
     @cached_property
     def _whole_affine(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """`affine` with what slides unseen."""
+        """The matrices of `affine` before what slides unseen is left out."""
         held, w, F = self.sampled_plant, self.estimator, self.force_filter
         m, l = self.count, self.whole_delay
         queue = l + (self.fractional_delay > 0.0)
@@ -350,6 +350,7 @@ def set_aside(roots: Complexes, count: int) -> Complexes:
 
 
 def _unheld(loop: Loop) -> int:
+    """Roots z = 1 of one direction without stiffness: positions that force and sensor share and nobody holds."""
     plant, local = loop.plant, loop.controller.local_loop
     if plant.is_loaded or (local is not None and local.stiffness):
         return 0
@@ -365,6 +366,7 @@ def _unheld(loop: Loop) -> int:
 
 
 def _directions_unheld(loop: MultiLoop) -> int:
+    """The same of several directions: independent free motions that their forces move and their sensors read."""
     plant = loop.plant
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)
     free = shapes[:, squared == 0.0]

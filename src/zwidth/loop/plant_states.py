@@ -196,6 +196,7 @@ def _loaded_states(
         A[own, own] = -1.0 / damper.time_constant
 
     def column(vector: Floats) -> Floats:
+        """Input (size,) of a force along (n,), which changes the velocities [m per period]."""
         out = np.zeros(size)
         out[n : 2 * n] = V.T @ vector * T
         return out
@@ -262,7 +263,7 @@ def _without_fast(states: PlantStates, form: FirstOrderForm, period: float) -> P
 
 
 def _nullity(matrix: Floats) -> int:
-    """Dimension of what a matrix (r, n) with entries of the order of 1 maps to rounding."""
+    """Dimension of the null space, to rounding, of a matrix (r, n) with entries of the order of 1."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return int(matrix.shape[1] - np.count_nonzero(values > NEUTRAL))
 

@@ -225,13 +225,13 @@ def _without_subspace(G: Floats, right: Floats, left: Floats) -> Floats:
 
 
 def step_growth(form: FirstOrderForm, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-    """exp(A t) - 1 without cancellation, and the states from a unit lagged force and from a unit command."""
+    """exp(A t) - 1 (k, k), and states (k,) after a time t from a unit lagged force and from a unit command."""
     growth, lagged, pushed = steps_growth(form.dynamics, form.input[:, None], time, lag)
     return growth, lagged[:, 0], pushed[:, 0]
 
 
 def steps_growth(dynamics: Floats, inputs: Floats, time: float, lag: float) -> tuple[Floats, Floats, Floats]:
-    """The same of several forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and states (k, r)."""
+    """`step_growth` of r forces, each on a column of inputs (k, r): exp(A t) - 1 (k, k), and states (k, r)."""
     from scipy.linalg import expm
 
     A, b, (k, r) = dynamics * time, inputs * time, inputs.shape
@@ -294,7 +294,7 @@ class PoleZeroForm:
     gain: float
 
     def response(self, d: Complexes) -> Complexes:
-        """Its value (...) at d (...)."""
+        """Response (...) of the form at d = z - 1 (...)."""
         out = np.full(np.shape(d), complex(self.gain))
         for k, pole in enumerate(self.poles):
             out = out * (d - self.zeros[k]) / (d - pole) if k < len(self.zeros) else out / (d - pole)
@@ -347,6 +347,7 @@ class _Match:
     """
 
     def __init__(self, system: _Balanced, d: Complexes, zero_poles: int) -> None:
+        """Keep the system's response at d = z - 1 (k,), and the errors of it that count as 1."""
         self.d, self.wanted = d, system.response(d)
         size = np.abs(self.wanted * d**2)
         slow = np.minimum(np.abs(d) / SLOW, 1.0) ** zero_poles
@@ -396,7 +397,8 @@ def _exact_form(system: _Balanced, zero_poles: int) -> PoleZeroForm | None:
 
 
 def _exact_roots(p: Polynomial) -> Complexes | None:
-    """All roots; those at z = 0, of commands that wait, are divided out first, since equal ones do not settle."""
+    """Roots of a polynomial, None where they do not settle; those at z = 0, of commands that wait, are divided out
+    first, since equal ones do not settle."""
     rest, waiting = without_roots(p, -1)
     companion = np.diag(np.ones(len(rest) - 2), -1) if len(rest) > 1 else np.zeros((0, 0))
     if len(rest) > 1:
@@ -418,6 +420,7 @@ class _Balanced:
 
     @classmethod
     def of(cls, form: SampledForm) -> _Balanced:
+        """The form with its states scaled, which leaves its response as it is."""
         from scipy.linalg import matrix_balance
 
         with np.errstate(invalid="ignore"):  # scales beyond 2^63 are no permutation, for which it takes them, too
@@ -458,7 +461,7 @@ class _Balanced:
 
 
 def _probes(poles: Complexes) -> Complexes:
-    """z - 1 at angles of the circle, from below the slowest pole up."""
+    """Probes d = z - 1 (k,) at angles of the circle, from below the slowest pole up."""
     moving = np.abs(poles[poles != 0.0])
     least = min(LOWEST_PROBE, max(0.3 * float(np.min(moving, initial=1.0)), 1e-3 * LOWEST_PROBE))
     angles = np.geomspace(least, 0.999 * np.pi, PROBES)
@@ -466,7 +469,7 @@ def _probes(poles: Complexes) -> Complexes:
 
 
 def _off_axis(roots: Complexes) -> Complexes:
-    """Roots moved a little, each another way, so that a real pair can become a conjugate one, and vice versa."""
+    """Roots (k,) moved a little, each another way, so that real pairs can become conjugate ones and vice versa."""
     return np.asarray(roots * (1.0 + 1e-3 * np.exp(1j * np.arange(len(roots)))))
 
 

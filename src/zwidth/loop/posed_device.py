@@ -246,6 +246,7 @@ class PosedDevice:
 
     @property
     def _posture(self) -> Posture:
+        """The posture. Raises NoMechanismError for a device without a mechanism."""
         if self.posture is None:
             raise NoMechanismError
         return self.posture

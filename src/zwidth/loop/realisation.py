@@ -226,7 +226,7 @@ def state_spaces(loops: LoopTable, which: Ints) -> Iterator[tuple[Ints, StateSpa
 
 
 def _structure(loops: LoopTable, which: Ints) -> Ints:
-    """What loops have in common that are realised together, (n, s); the number of sections first."""
+    """Numbers (n, s) that loops have in common that are realised together; the number of sections first."""
     c = loops.computer[which]
     counts = (loops.whole_delay, loops.split, loops.force_count, loops.velocity_count, loops.window_count)
     orders = [factors[c, :, 3] != 0.0 for factors in (loops.force, loops.velocity)]

@@ -86,7 +86,7 @@ def _modal_sections(modes: RealModes, period: float, fraction: float, lag: float
 
 
 def equal_modes(modes: RealModes) -> list[list[int]]:
-    """Modes of one frequency and one damping, to rounding."""
+    """Groups of modes, by their indices, that have one frequency and one damping to rounding."""
     tolerance = repeat_tolerance(modes.frequency_squared)
     drag = max(float(np.max(np.abs(modes.decay))), np.finfo(float).tiny)
     groups: list[list[int]] = []
@@ -144,6 +144,7 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
     force and sensor see but one."""
 
     def size(other: Floats) -> float:
+        """Size of a row's numerators at |d| of the pole `rate`."""
         n2, n1, n0 = np.max(np.abs(other[2:].reshape(2, 3)), axis=0)
         return float((n2 * rate + n1) * rate + n0)
 
@@ -156,7 +157,7 @@ def _repeats(row: Floats, earlier: Floats) -> bool:
 
 
 def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints]:
-    """The rows (N, m, 9) of each plant, and how many of them are used (N,): 0 where its reach is nan.
+    """Rows (N, m, 9) of each plant, columns of `Sections.rows`, and how many are used (N,): 0 where reach is nan.
 
     controller  the same for all plants, or one of N designs for each
     """
@@ -168,6 +169,7 @@ def section_rows(pairs: PolePairs, controller: Controller) -> tuple[Floats, Ints
     lag = np.array(np.ravel(controller.actuator_time_constant), dtype=np.float64)
 
     def several(first: int, last: int) -> None:
+        """Fill in the rows of plants first to last - 1."""
         fill_rows(
             pairs.decay, pairs.frequency_squared, pairs.position, pairs.velocity, pairs.reach, period, fraction,
             lag, bool(lag.any()), rows, used, first, last,
@@ -241,10 +243,10 @@ MOST: Final = 12  # coordinates of which the kernel finds the modes; of more the
 
 
 def plant_rows(plant: Plant, controller: Controller) -> Floats | None:
-    """The rows (m, 9) of a plant, as of `loop.sections`.
+    """A plant's rows (m, 9): d1, d0, n2, n1, n0, o2, o1, o0 as in `loop.hold`, and 0 since none is chained.
 
-    Returns  None for a plant that `sections` says more about: dampers that couple its modes or lag, a loss factor,
-             a wall force that moves nothing that the sensor reads; and for a large one
+    Returns  None for a plant that `sampled_sections` says more about: dampers that couple its modes or lag, a loss
+             factor, a wall force that moves nothing that the sensor reads; and for a large one
     """
     if plant.lagged_dampers or plant.hysteresis is not None or plant.size > MOST:
         return None

@@ -93,6 +93,7 @@ class WallMatrices:
         return law
 
     def __str__(self) -> str:
+        """The ratios within both matrices in words."""
         stiffness, damping = ratios_text(self.stiffness), ratios_text(self.damping)
         if stiffness == damping:
             return f"stiffness and damping {stiffness}"

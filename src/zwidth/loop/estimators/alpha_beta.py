@@ -39,6 +39,7 @@ class AlphaBeta:
     beta: Number
 
     def __post_init__(self) -> None:
+        """Raise ValueError for numbers with which the filter is unstable, or remembers for too long."""
         if np.ndim(self.alpha) or np.ndim(self.beta):
             a, b = np.broadcast_arrays(self.alpha, self.beta)
             inside = (a > 0.0) & (b > 0.0) & (2.0 * a + b < 4.0) & (a * LONGEST >= 1.0) & (a <= LONGEST * b)
@@ -61,7 +62,7 @@ class AlphaBeta:
             )
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         check_period(period)
         gain = self.beta / period
         return Estimator(

@@ -59,6 +59,7 @@ class Foaw:
     fit: Fit = "end-fit"
 
     def __post_init__(self) -> None:
+        """Raise ValueError for samples, a noise bound or a fit out of range."""
         check_whole("samples", self.samples, 1, LONGEST_WINDOW, "the longest window, in periods")
         check_positive("position_noise", self.position_noise, "m")
         if self.fit not in get_args(Fit):

@@ -102,13 +102,13 @@ def _factors_and_angles(
 
 
 def _distance(angle: Floats) -> Complexes:
-    """d = e^{i theta} - 1, without cancellation."""
+    """Difference d = e^{i theta} - 1 at angles theta (...) [rad], without cancellation."""
     half = np.sin(0.5 * angle)
     return np.asarray(2j * half * np.exp(0.5j * angle))
 
 
 def _difference_quotient(angle: Floats) -> Complexes:
-    """d / (i theta)."""
+    """Quotient d / (i theta) at angles theta (...) [rad], d = e^{i theta} - 1."""
     return np.asarray(np.sinc(angle / (2.0 * np.pi)) * np.exp(0.5j * angle))
 
 

@@ -59,7 +59,7 @@ class Kalman:
         return AlphaBeta(u * (2.0 - u), 2.0 * u * u)
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         return self.alpha_beta(period).estimator(period)
 
     def delay(self, period: float) -> float:

@@ -34,6 +34,7 @@ class LeastSquaresSlope:
     samples: int
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a number of samples that is out of range."""
         check_whole(
             "samples",
             self.samples,
@@ -43,7 +44,7 @@ class LeastSquaresSlope:
         )
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         n = self.samples
         k = np.arange(n - 1)
         return mean_difference(6.0 * ((k + 1) * (n - 1 - k)) / (n * (n * n - 1)), period)

@@ -50,6 +50,7 @@ class SavitzkyGolay:
     centred: bool = False
 
     def __post_init__(self) -> None:
+        """Raise ValueError for an order or a number of samples that is out of range."""
         check_whole("order", self.order, 1, HIGHEST, "degree 0 has no slope, a higher one little but noise")
         check_whole(
             "samples",
@@ -60,7 +61,7 @@ class SavitzkyGolay:
         )
 
     def estimator(self, period: float) -> Estimator:
-        """w(z) at a sampling period [s]."""
+        """Velocity estimate per position w(z) [1/s], at a sampling period [s]."""
         return mean_difference(np.array(_weights(self.samples, self.order, self.centred)), period)
 
     def delay(self, period: float) -> float:

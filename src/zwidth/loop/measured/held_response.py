@@ -59,8 +59,8 @@ def held_response(response: Response, operator: Operator, period: float) -> Resp
 
 
 def hold_port(response: Response, port: MeasuredPort, operator: Operator) -> Response:
-    """The same of a response whose port is known already. Raises OperatorError for an arm without mass behind an
-    elastic grasp."""
+    """The response with an operator at the handle, of a device whose port is known already. Raises OperatorError
+    for an arm without mass behind an elastic grasp."""
     _check_mass(operator)
     D = operator_stiffness(operator, port.theta / port.period)
     beyond = _aliases(port, operator)
@@ -143,7 +143,7 @@ def _note(response: Response, port: MeasuredPort, share: Floats, kept: Flags) ->
 
 
 def _change(base: Mapping[str, Complexes], D: Complexes) -> Complexes:
-    """X of the responses at the frequency itself."""
+    """X (...), what a hand of stiffness D (...) [N/m] takes off the response, from paths (...) by their names."""
     return np.asarray(base["sh"] * D / (1.0 + D * base["hh"]) * base["ha"])
 
 
@@ -151,6 +151,7 @@ def _aliases(port: MeasuredPort, operator: Operator) -> Complexes:
     """Sum (n,) of X over the frequencies theta + 2 pi k, k other than 0, of the fitted modes."""
 
     def change(theta: Floats) -> Complexes:
+        """X (...) [m/N] of the fitted modes at angles (...) of any size, in radians per sample."""
         flat = theta.ravel()
         D = operator_stiffness(operator, flat / port.period)
         path = {name: port.continued(name, flat) for name in ("sh", "ha", "hh")}

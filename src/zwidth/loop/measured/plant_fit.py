@@ -194,7 +194,7 @@ def _shapes(residues: Mapping[str, Floats], at_sensor: bool, tied: bool) -> tupl
 
 
 def _refined(data: PathData, start: ModalModel, at_sensor: bool, tied_ends: bool) -> ModalModel:
-    """All numbers of the model by least squares."""
+    """The model whose numbers `_numbers_of_model` fit the data by least squares, begun from `start`."""
     from scipy.optimize import approx_fprime, least_squares
 
     unpack = partial(_model_of_numbers, data, start, at_sensor, tied_ends)
@@ -264,7 +264,7 @@ def _numbers_of_model(data: PathData, start: ModalModel, at_sensor: bool, tied_e
 
 
 def _model_residual(data: PathData, model: ModalModel) -> Floats:
-    """Weighted deviations of all paths, in a row."""
+    """Deviations of the model from all paths' data, each over its standard deviation, in one row."""
     responses = model.paths(data.values, data.theta)
     return np.concatenate(
         [stacked(responses[name] - value, data.deviations[name]) for name, value in data.values.items()]

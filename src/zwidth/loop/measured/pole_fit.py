@@ -52,7 +52,7 @@ class PathData:
     delay: float | None
 
     def thinned(self, most: int) -> PathData:
-        """Every so many of the points, at most `most`."""
+        """The data at evenly spread points, at most `most` of them."""
         every = slice(None, None, max(1, -(-len(self.theta) // most)))
         return replace(
             self,
@@ -70,7 +70,7 @@ class PoleModel:
                  ratio
     delay        of commands [samples]
     free         whether there is a free mass without damping, 1/s², beside them
-    residues     by path, of the atoms of `atoms`
+    residues     by path, of the atoms of `mode_atoms`
     misfit       root of the mean square of the weighted deviations
     delay_deviation  standard deviation of the delay [samples], 0 of a known one
     """
@@ -154,6 +154,7 @@ def _until_exact(data: PathData, starts: Sequence[tuple[Floats, float]]) -> list
 
 
 def _refined(data: PathData, modes: Floats, delay: float) -> tuple[float, float, Floats]:
+    """Misfit, delay and modes after `_refine`."""
     modes, delay = _refine(data, modes, delay)
     return float(np.sqrt(np.mean(_left(data, modes, delay) ** 2))), delay, modes
 
@@ -186,6 +187,7 @@ def mode_atoms(modes: Floats, free: bool, theta: Floats, delay: float | None) ->
 
 
 def _path_atoms(data: PathData, name: str, modes: Floats, delay: float) -> Complexes:
+    """Atoms (k, .) of a path by its name: those of commands ("a") are held, delayed and sampled."""
     return mode_atoms(modes, data.integrators == 2, data.theta, delay if name[1] == "a" else None)
 
 
@@ -196,7 +198,7 @@ def stacked(values: Complexes, deviation: Floats) -> Floats:
 
 
 def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats, Floats]]:
-    """Of every path the orthonormal basis of its atoms, and what they leave of its values."""
+    """Orthonormal basis of each path's atoms, and what they leave of its values, weighted and stacked."""
     parts = []
     inputs = {name[1]: name for name in data.values}
     of_input = {own: _path_atoms(data, name, modes, delay) for own, name in inputs.items()}
@@ -210,17 +212,19 @@ def _projected(data: PathData, modes: Floats, delay: float) -> list[tuple[Floats
 
 
 def _left(data: PathData, modes: Floats, delay: float) -> Floats:
+    """What the atoms leave of all paths' values, weighted, in a row."""
     return np.concatenate([rest for _, rest in _projected(data, modes, delay)])
 
 
 def _refine(data: PathData, modes: Floats, delay: float) -> tuple[Floats, float]:
-    """Modes and delay that leave the least of the data."""
+    """Modes and delay, searched from these, that leave the least of the data by least squares."""
     from scipy.optimize import least_squares
 
     fixed = data.delay is not None
     moving = modes[:, 0] > 0.0
 
     def unpack(x: Floats) -> tuple[Floats, float]:
+        """Modes (n, 2) and delay [samples] of the fitted numbers: the modes' logarithms, then a free delay."""
         new = np.exp(x[: 2 * len(modes)].reshape(-1, 2))
         new[~moving, 0] = 0.0
         return new, delay if fixed else float(x[-1])
@@ -258,7 +262,7 @@ def _delay_deviation(data: PathData, modes: Floats, delay: float, misfit: float)
 
 
 def _with_a_mode(data: PathData, modes: Floats, delay: float) -> Floats:
-    """The modes and the one more that takes most of what is left."""
+    """The modes (n + 1, 2) with the one more that takes most of what the n modes leave of the data."""
     parts = _projected(data, modes, delay)
     k = len(data.theta)
     left = np.sum([rest[:k] ** 2 + rest[k:] ** 2 for _, rest in parts], axis=0)
