@@ -115,6 +115,7 @@ class BoundsComparison(Result):
         }
 
     def __repr__(self) -> str:
+        """The exact limit at `damping`, and how many conditions have all assumptions met."""
         met = sum(bound.holds for bound in self.bounds)
         exact = (
             f"exact {self.exact:.6g} N/m there, {self.largest:.6g} N/m at most"

@@ -100,6 +100,8 @@ def assign_all(document: dict[str, Any], settings: Iterable[tuple[str, Any]]) ->
 
 
 def _set(document: dict[str, Any], path: str, value: Any) -> None:
+    """Set the value at a path of the document, in place; `UNSET` removes it. Missing outer tables are made; keys
+    that exclude the new one, or that a new method does not read, are removed."""
     *outer, last = resolve(document, path)
     table: Any = document
     for step in outer:
@@ -228,6 +230,8 @@ def _split(document: dict[str, Any], path: str) -> list[str]:
 def _unknown(
     document: dict[str, Any], path: str, steps: list[str | int], parts: list[str], depth: int, place: Any
 ) -> DeviceError:
+    """The error for a path whose step number `depth` of `parts` is no key of `place`, which `steps` led to; with a
+    hint of the nearest key."""
     first, *rest = path.split(".")
     if steps in ([], ["mechanism"]) and parts[depth:] == [first, *rest]:
         return fail(SETTINGS, path, f"is not a key of a device file; {_from_the_top(document, first, rest)}")
@@ -281,6 +285,7 @@ def _element(elements: list[Any], part: str) -> int | None:
 
 
 def _value(place: Any, steps: KeyPath) -> Any:
+    """The value that keys and indices lead to from `place`; `UNSET` where a key is missing."""
     for step in steps:
         if isinstance(place, dict) and step not in place:
             return UNSET
@@ -289,6 +294,7 @@ def _value(place: Any, steps: KeyPath) -> Any:
 
 
 def _children(place: Any, part: str) -> list[Any]:
+    """The values at one step of a path below `place`, all of them for `*`; [] where there is none."""
     if part == "*":
         return list(place.values()) if isinstance(place, dict) else list(place) if isinstance(place, list) else []
     if isinstance(place, dict):

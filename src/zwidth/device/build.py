@@ -77,6 +77,7 @@ def _force_sensor(section: ForceSensorSection) -> ForceSensor:
 
 
 def _feedforward(loop: LoopSection, section: FeedforwardSection) -> Feedforward:
+    """The feedforward of [loop.feedforward], of which numbers left out are 0."""
     return Feedforward(
         inertia=value_or(section.inertia_kg, 0.0),
         inertia_share=value_or(section.inertia_share, 0.0),
@@ -90,6 +91,7 @@ def _feedforward(loop: LoopSection, section: FeedforwardSection) -> Feedforward:
 
 
 def _local_loop(loop: LoopSection, section: LocalSection) -> LocalLoop:
+    """The faster loop of [loop.local] at the motor."""
     return LocalLoop(
         rate_multiple=section.rate_multiple,
         stiffness=section.stiffness_N_per_m,
@@ -108,12 +110,14 @@ def _linear_velocity(loop: LoopSection, section: VelocitySection | None) -> Line
 
 
 def _low_pass(given: FirstOrderFilter | ButterworthFilter | None) -> FirstOrder | Butterworth | None:
+    """The low pass of a filter's table; None without table or with a time constant of 0 throughout."""
     if isinstance(given, FirstOrderFilter):
         return FirstOrder(given.time_constant_s) if np.any(given.time_constant_s) else None
     return None if given is None else Butterworth(given.order, given.cutoff_Hz, given.discretisation)
 
 
 def _velocity(loop: LoopSection, section: VelocitySection) -> VelocityMethod:
+    """The velocity estimate of a table; a method whose noise is left out takes that of the encoder's step."""
     own = section.parameters()
     step = loop.encoder.resolution_m
     if isinstance(section, KalmanSection) and section.position_noise_m is None and step:

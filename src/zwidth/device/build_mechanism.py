@@ -295,6 +295,8 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _closures(loops: Sequence[LegMember], tree: Tree) -> Closures:
+    """The loop closures of a mechanism: joints a and b, points (..., k, 2, 3) [m], and of k closures some of which
+    also hold axes or a frame their kinds, unit axes and relative rotations."""
     entries: list[LoopClosure] = [member.entry for member in loops]
     kind = np.array([CLOSES[loop.closes] for loop in entries], dtype=np.int64)
     columns: dict[str, list[Any]] = {
@@ -364,6 +366,7 @@ def _links_in_loops(tree: Tree, loops: Sequence[LegMember]) -> set[str]:
 
 
 def _way_to_base(name: str, parent: dict[str, str]) -> list[str]:
+    """Names of a link and of those that carry it, down to the base, which is left out."""
     way = []
     while name != "base":
         way.append(name)
@@ -388,6 +391,7 @@ DRIVE_NUMBERS: Final = {
 def _drives(
     drives: Sequence[DriveSection], section: MechanismSection, tree: Tree, tables: Mapping[str, RatioTable]
 ) -> Drives:
+    """The drives of a mechanism, with friction, windings, couplings to other joints and the given ratio tables."""
     index = tree.last
     windings = [_winding(drive) for drive in drives]
     columns = {
@@ -409,6 +413,7 @@ def _drives(
 
 
 def _ratio_table(drive: DriveSection) -> RatioTable:
+    """The ratio table of a drive that has one: its ratio over the joint's coordinate [rad] or [m]."""
     given = drive.ratio_table
     assert given is not None
     coordinate = given.joint_m if given.joint_rad is None else given.joint_rad
@@ -429,6 +434,7 @@ def _coupling(drives: Sequence[DriveSection], index: dict[str, int]) -> Floats |
 
 
 def _motor_links(drives: Sequence[DriveSection], index: dict[str, int]) -> Ints | None:
+    """Index of the link that carries each motor (d,), -1 for the base; None where no drive names one."""
     if all(drive.motor_link is None for drive in drives):
         return None
     return np.array([index[drive.motor_link or "base"] for drive in drives], dtype=np.int64)
@@ -467,6 +473,7 @@ def with_beams(mechanism: Mechanism, links: dict[int, LinkSection], axes: dict[i
 
 
 def _flexible(mechanism: Mechanism, index: int, link: LinkSection, axis: Floats | None) -> FlexibleLink:
+    """The flexible link of a [beam]: the link of that `index` bends as finite elements or modes say."""
     section = link.beam
     assert section is not None
     return flexible_link(
@@ -504,6 +511,7 @@ def properties_of(section: BeamSection, length: float) -> BeamProperties:
 
 
 def _section(beam: BeamSection) -> CrossSection:
+    """The cross section of a beam, by the one shape that its table gives."""
     match beam.section:
         case RodShape() as rod:
             return round_rod(rod.diameter_m)
@@ -517,6 +525,7 @@ def _section(beam: BeamSection) -> CrossSection:
 
 
 def _material(beam: BeamSection) -> Material:
+    """The material of a beam: by its own numbers, or the typical one of that name."""
     if isinstance(beam.material, MaterialSection):
         own = beam.material
         return Material(own.youngs_modulus_Pa, own.shear_modulus_Pa, own.density_kg_per_m3)

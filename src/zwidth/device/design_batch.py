@@ -192,6 +192,7 @@ class DesignBatch:
         return self._with_posture(join_postures([one or solved for one in postures]), direction, model), alone
 
     def _with_posture(self, posture: Posture, direction: Any, model: str | None) -> OperatingPoint:
+        """The operating points at postures (P, ...) of P designs, each with its own numbers."""
         shape = posture.status.shape
         vector = self.device.direction(direction)
         rendered = np.broadcast_to(vector, (*shape, vector.shape[-1]))

@@ -91,6 +91,7 @@ class Device:
     document: dict[str, Any]
 
     def __repr__(self) -> str:
+        """Name, kind, file and operator of the device, and its sampling on a second line."""
         kind = self._kind if self.mechanism is None else "[mechanism]"
         computer = self.controller.timing_text
         held = f", held by {self.operator_name}" if self.operator_name else ""
@@ -504,6 +505,8 @@ class Device:
     def _posture(
         self, position: Position | ArrayLike | Posture | None, orientation: ArrayLike | None, assembly: str | None
     ) -> Posture:
+        """The postures of a mechanism at handle positions, joint angles or postures. Raises DeviceError for an
+        orientation that the drives do not control, or beside joint angles."""
         from zwidth.loop.posed_device import PROJECTION_TOLERANCE
         from zwidth.model.mechanism import POSITION
         from zwidth.model.posture import Posture, place_of_joints, solve_posture

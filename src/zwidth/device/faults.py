@@ -82,6 +82,7 @@ def nearest(word: str, allowed: Collection[str]) -> str | None:
     plain, typed = {_plain(candidate): candidate for candidate in allowed}, _plain(word)
 
     def rank(candidate: str) -> tuple[int, int]:
+        """Sort key of a key that may have been meant: least for the typed word with a unit after it."""
         if candidate.startswith(typed + "_"):
             return 0 if UNIT_ENDING.fullmatch(candidate, len(typed)) else 2, len(candidate)
         return 1 if candidate.endswith("_" + typed) else NOT_CONTAINED, len(candidate)
@@ -123,6 +124,7 @@ def dotted(path: KeyPath, document: Any = None) -> str:
 
 
 def _step(document: Any, part: str | int) -> Any:
+    """The value at a key or index of a document; None where there is none."""
     if isinstance(document, dict):
         return document.get(part)
     if isinstance(document, list) and isinstance(part, int) and 0 <= part < len(document):
@@ -139,6 +141,7 @@ def _shortened(text: str) -> str:
 
 
 def _item(value: Any) -> str:
+    """A value inside a list as it would stand in the file: lists are cut after 20 elements."""
     if isinstance(value, list):
         return "[" + ", ".join(_item(v) for v in value[:20]) + "]"
     return repr(value) if isinstance(value, str) else quote(value)

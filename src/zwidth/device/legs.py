@@ -158,6 +158,7 @@ def _renamed(entry: Any, group: str, names: frozenset[str], copy: int) -> Any:
 
 
 def _entries(owner: Any, group: str) -> Iterator[tuple[int, Any]]:
+    """Index and entry of each link, loop or drive of a mechanism or leg, as checked or as a table of a file."""
     if isinstance(owner, Section):
         return enumerate(getattr(owner, group))
     return iter(tables(owner, group))

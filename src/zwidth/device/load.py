@@ -335,6 +335,7 @@ def check(document: dict[str, Any], label: str) -> tuple[DeviceFile, dict[str, A
 
 
 def _assembled(device: Device) -> bool:
+    """Whether the loops of a device's mechanism close, in its reference assembly."""
     from zwidth.device.mechanism_check import assembles
 
     assert device.mechanism is not None
@@ -388,6 +389,7 @@ def _reference_direction(reference: ReferenceSection) -> Floats:
 
 
 def _arm(section: ArmSection) -> Arm:
+    """The operator's arm of an [arm]."""
     from zwidth.device.build_mechanism import arm  # compiled code, as of a mechanism
 
     return arm(section)
@@ -396,6 +398,8 @@ def _arm(section: ArmSection) -> Arm:
 def _mechanism(
     section: MechanismSection, document: dict[str, Any], label: str, surplus: tuple[int, ...] | None
 ) -> Mechanism:
+    """The mechanism of a checked section; its surplus drives are computed where `surplus` is None. Raises
+    DeviceError for a beam that cannot be built."""
     from zwidth.device.build_mechanism import mechanism  # compiled code, which a plant does without
     from zwidth.device.mechanism_check import surplus_drives
 
@@ -424,6 +428,7 @@ def _rank(path: KeyPath, order: dict[KeyPath, int]) -> int:
 
 
 def _paths(value: Any, path: KeyPath = ()) -> Iterable[KeyPath]:
+    """Path of every key and list element of a document, in its order, outer ones first."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, inner in items:
         yield (*path, key)

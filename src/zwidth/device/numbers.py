@@ -271,6 +271,7 @@ def _table(document: dict[str, Any], steps: KeyPath) -> dict[str, Any]:
 
 
 def _record(device: Device, steps: KeyPath, value: float | str | None, given: bool) -> DeviceNumber:
+    """The `DeviceNumber` at a path: value, unit, limits, slider and choices; `given`: whether the file has it."""
     document, path = device.document, dotted(steps, device.document)
     image = schema.mirror_image(steps)
     table = next(end for end in reversed(range(len(steps))) if isinstance(steps[end], str))

@@ -99,6 +99,7 @@ def implausible(device: Device) -> list[Fault]:
 
 
 def _loop(loop: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of a sampling period or encoder step of [loop] that looks too large."""
     period, step = loop.get("sampling_period_s", 0.0), table(loop, "encoder").get("resolution_m", 0.0)
     if period > SLOWEST:
         yield (
@@ -113,6 +114,7 @@ def _loop(loop: dict[str, Any]) -> KeyMessages:
 
 
 def _plant(plant: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of a mass of [plant] that looks too large."""
     heaviest = np.max(np.diag(np.atleast_2d(plant.get("mass_kg", 0.0))))
     if heaviest > HEAVIEST:
         yield (
@@ -122,6 +124,7 @@ def _plant(plant: dict[str, Any]) -> KeyMessages:
 
 
 def _operator(operator: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of an arm mass of [operator] that looks too large."""
     mass = operator.get("arm_mass_kg", 0.0)
     if mass > HEAVIEST_ARM:
         yield ("operator", "arm_mass_kg"), f"{mass:g} kg looks wrong for an arm; {_thousandth(mass, 'g')}"
@@ -136,6 +139,7 @@ def _lengths(mechanism: dict[str, Any]) -> KeyMessages:
 
 
 def _length_keys(mechanism: dict[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
+    """Path below [mechanism] and value of every length or position [m] of a file; None where it is left out."""
     for path, link in written(mechanism, "links"):
         for key in ("length_m", "origin_m", "center_of_mass_m"):
             yield (*path, key), link.get(key)
@@ -163,6 +167,7 @@ def _size(mechanism: dict[str, Any]) -> float:
 
 
 def _angles(mechanism: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of each angle of links and assemblies that is more than a full turn, as of degrees."""
     angles: list[tuple[KeyPath, Any]] = [
         (("mechanism", *path, "orientation_rad"), link.get("orientation_rad"))
         for path, link in written(mechanism, "links")
@@ -230,6 +235,7 @@ def _inertia_units(inertia: float, mass: float, size: float) -> str:
 
 
 def _drives(mechanism: dict[str, Any], size: float) -> KeyMessages:
+    """Path and sentence of each number of a drive that looks wrong. size: that of the device [m]."""
     for below, drive in written(mechanism, "drives"):
         path = ("mechanism", *below)
         ratio, rotor = float(largest_ratio(drive) or 1.0), float(drive.get("motor_inertia_kg_m2", 0.0))
@@ -316,6 +322,7 @@ def _beams(device: Device) -> KeyMessages:
 
 
 def _beam_numbers(path: KeyPath, link: dict[str, Any]) -> KeyMessages:
+    """Path and sentence of each number that looks wrong in a link's [beam], which stands at `path`."""
     section, material = table(link["beam"], "section"), link["beam"].get("material")
     for key in ("outer_diameter_m", "diameter_m", "width_m", "height_m"):
         across = section.get(key)
@@ -445,6 +452,7 @@ def partly_missing(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
 
 
 def _left_out(mechanism: dict[str, Any]) -> Iterator[KeyPath]:
+    """Path of each key about mass or drive that a link or drive of a file leaves out."""
     for group, keys in (("links", LINKS), ("drives", DRIVES)):
         for member in members(mechanism, group):
             yield from (("mechanism", *member.path, key) for key in keys if not _gives(member.entry, key))

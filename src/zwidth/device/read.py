@@ -292,6 +292,7 @@ def within_depth(value: Any, deepest: int = DEEPEST) -> bool:
 
 
 def _text(label: str, shelf: BundledFiles, pipes: bool) -> str:
+    """The text of a file. Raises DeviceError where it is missing or no text, with the nearest bundled name."""
     try:
         return read_text(label, LARGEST_FILE, pipes=pipes)
     except FileError as error:
@@ -300,6 +301,7 @@ def _text(label: str, shelf: BundledFiles, pipes: bool) -> str:
 
 
 def _not_found(label: str, shelf: BundledFiles) -> str:
+    """The sentence for a name that is neither a file nor a bundled one, with the nearest bundled name."""
     names = bundled_names(shelf)
     near = nearest(Path(label).name.removesuffix(".toml"), names)
     hint = f"did you mean '{near}'? " if near else ""

@@ -380,6 +380,7 @@ def _raise(path: Path, causes: Iterable[Cause]) -> None:
 
 
 def _number(cell: str) -> float:
+    """The number in a cell of a table; nan for other text."""
     try:
         return float(cell)
     except ValueError:
@@ -404,6 +405,7 @@ def _lies_in(folder: Path, path: Path) -> bool:
 
 
 def _text(path: Path) -> str:
+    """The text of a CSV file. Raises DeviceError where it cannot be read."""
     try:
         return read_text(path, LARGEST_TABLE)
     except FileError as error:

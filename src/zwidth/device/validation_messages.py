@@ -167,6 +167,8 @@ def _number_demand(kind: str, limits: Mapping[str, Any], got: object) -> str:
 
 
 def _unknown(path: KeyPath, document: dict[str, Any]) -> str:
+    """The sentence for a key that its table does not read: the kinds or the section that have it, the key in SI
+    units, or the nearest one."""
     key, table = str(path[-1]), path[:-1]
     tag, kinds = schema.kinds(table)
     kind = _value(document, table).get(tag, DEFAULT_METHOD) if kinds else None
@@ -208,6 +210,7 @@ def _value(document: Any, path: KeyPath) -> Any:
 
 
 def _length(limits: Mapping[str, Any], got: Any, about: str) -> str:
+    """The sentence for a list of too few or too many elements, by pydantic's limits."""
     if "max_length" in limits:
         return f"must have at most {limits['max_length']} elements, got {limits['actual_length']}{about}"
     least = limits["min_length"]
@@ -215,6 +218,7 @@ def _length(limits: Mapping[str, Any], got: Any, about: str) -> str:
 
 
 def _literal(expected: str, got: Any, about: str) -> str:
+    """The sentence for a value that is none of the words expected, with the nearest of them."""
     words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
     if isinstance(got, str) and (near := nearest(got, words)):
         return f"must be {expected}, got {quote(got)}; did you mean '{near}'?"

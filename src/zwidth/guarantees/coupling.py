@@ -86,6 +86,7 @@ class Couplings(Result):
         return outline_columns(self.regions, "coupling")
 
     def __repr__(self) -> str:
+        """The stiffest coupling of each region, and the one that the wall needs."""
         if self.reason is not None:
             return f"Couplings: none: {self.reason}"
         text = "Couplings: " + ", ".join(f"{name} {stiffness_text(one)}" for name, one in self.regions.items())
@@ -135,6 +136,7 @@ def coupling_region(demand: CouplingDemand, period: float) -> Region:
         return empty_region(NOTHING)
 
     def reach(direction: Floats) -> Floats:
+        """Length (k,) of rays of couplings that meet the demand, in the plane of k_c T and b_c, at angles (k,)."""
         Z = coupling_impedance(np.cos(direction) / period, np.sin(direction), demand.angles, period)
         # a negative k_c drifts away by itself
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -208,6 +210,7 @@ def softest_limit(demand: CouplingDemand, wall_stiffness: float, wall_damping: f
     direction = np.linspace(0.0, np.pi / 2.0, DIRECTIONS)[:-1]
 
     def reach(direction: Floats) -> Floats:
+        """Length (k,) of rays of allowed couplings in the plane of k_c T, b_c, at angles (k,); inf: no limit."""
         a = 1.0 / coupling_impedance(np.cos(direction) / period, np.sin(direction), angles, period)
         lean, size = np.real(a.conj() * shown), np.abs(a) ** 2
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -210,6 +210,7 @@ class Expansion:
 
 
 def _expansion(loop: Loop, held_port: Port, far: int) -> Expansion:
+    """The `Expansion` of aliases beyond number `far`, fitted at Chebyshev nodes in t = far / cycles."""
     t = (1.05 + chebyshev.chebpts1(2 * TERMS)) / 2.05
     cycles = far / t
     direct, swing = _terms(loop, held_port, cycles)

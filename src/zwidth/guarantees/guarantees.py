@@ -74,6 +74,7 @@ class Guarantees(Result):
         return outline_columns({guarantee.name: guarantee.region for guarantee in self.guarantees}, "guarantee")
 
     def __repr__(self) -> str:
+        """The stiffest wall of each guarantee, the premises that are unsure, and the couplings."""
         stiffest = ", ".join(f"{one.name} {stiffness_text(one.region)}" for one in self.guarantees)
         coupled = [] if self.couplings is None else repr(self.couplings).splitlines()
         unsure = [premise.reason for premise in self.premises if premise.reason]

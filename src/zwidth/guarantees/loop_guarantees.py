@@ -190,6 +190,7 @@ def _without_idle_motions(loop: Loop) -> Loop:
 
 
 def _check_wall(wall: object) -> None:
+    """Raise an error unless the wall is a pair of stiffness [N/m], above 0, and damping [N s/m]."""
     if not isinstance(wall, tuple | list) or len(wall) != 2:
         raise wrong_type("wall", "a pair of stiffness [N/m] and damping [N s/m]", wall)
     check_number("the wall's stiffness", wall[0], "N/m", above=0.0)

@@ -177,6 +177,8 @@ def static_compliances(plant: Plant, held: Floats) -> tuple[float, float]:
 
 
 def _static(plant: Plant) -> float:
+    """Static compliance of a plant from the wall's force to the reading [m/N]: sum of each mode's share over its
+    squared frequency; inf, with its sign, where rigid motions respond."""
     if plant.size == 0:
         return 0.0
     squared, shapes = undamped_modes(plant.mass, plant.stiffness)

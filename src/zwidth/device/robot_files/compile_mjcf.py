@@ -110,6 +110,7 @@ def _name_all(spec: Any) -> None:
 
 
 def _free_name(name: str, taken: set[str]) -> str:
+    """The name, or with -2, -3, ... after it where it is taken; it joins `taken`."""
     made, count = name, 2
     while made in taken:
         made, count = f"{name}-{count}", count + 1

@@ -149,6 +149,7 @@ def find_handle(robot: Robot, name: str | None) -> tuple[int, Place]:
 
 
 def _handles(robot: Robot) -> str:
+    """A hint of how to name the handle: the sites and bodies that it may be."""
     sites = [site.name for site in robot.sites]
     bodies = [body.name for body in robot.bodies[1:]][::-1]
     listed_sites = f"sites: {comma_list(sites, 8)}; " if sites else ""
@@ -239,6 +240,7 @@ def closure_tables(robot: Robot, tree: LinkTree) -> list[dict[str, Any]]:
 
 
 def _check_loops(robot: Robot, motions: FreeMotions) -> None:
+    """Raise DeviceError for the loops that do not close at the reference posture, with the gap of each [m]."""
     if not motions.open_loops:
         return
     faults = []
@@ -414,6 +416,7 @@ def _nothing_moves(robot: Robot, motions: FreeMotions) -> str:
 
 
 def _free_rows(robot: Robot, tree: LinkTree, motions: FreeMotions, name: str) -> list[int]:
+    """Coordinates of a joint that count as free; of a ball joint between the ends of a loop only the first."""
     rows = motions.rows(tree.link_of[name])
     found = robot.joints.get(name)
     spins = found is not None and found[1].kind == "spherical" and found[0] in _looped(robot)
@@ -423,6 +426,8 @@ def _free_rows(robot: Robot, tree: LinkTree, motions: FreeMotions, name: str) ->
 def _not_controlled(
     motions: FreeMotions, tree: LinkTree, driven: list[Motor], kept: list[int], each: list[Floats]
 ) -> str:
+    """The sentence for drives whose motions the handle does not tell: which of them do not move it, or how many
+    are too many. kept: their coordinates; each: motions of the handle (6, d) at several postures."""
     names = {motions.rows(tree.link_of[motor.joint])[0]: motor for motor in driven}
     resting = set.intersection(*(set(idle_drives(H)) for H in each))
     idle = [names[kept[k]].joint for k in sorted(resting)]
@@ -522,6 +527,7 @@ def mechanism_motions(section: dict[str, Any], label: str) -> FreeMotions:
 
 
 def _configuration(mech: MechanismArrays, angles: Floats) -> Configuration:
+    """The `Configuration` at joint coordinates (n,) that close all loops."""
     loops = int(mech.first_row[-1])
     rows = constraints(mech, 0, angles, np.zeros(6))[0] * mech.unit[0][:, None]
     return Configuration(null_space(rows[:, :loops].T), np.asarray(rows[:, loops : loops + 6].T))

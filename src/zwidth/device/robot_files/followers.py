@@ -65,6 +65,7 @@ def write_linkages(robot: Robot) -> None:
 
 
 def _refusal(one: Follower) -> str:
+    """The message for a follower that no linkage can hold."""
     curve = "" if one.linear else " and a curve"
     return (
         f"lets '{one.joint}' follow '{one.leader}' by the ratio {one.ratio:.6g}{curve}, which a device file "
@@ -123,6 +124,7 @@ def _carrier(robot: Robot, body: int) -> tuple[int, Place]:
 
 
 def _slide_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
+    """Make the slide of body `f` follow that of body `l` by massless wedges; False if they slide on two bodies."""
     (on, of_leader), (same, of_follower) = _carrier(robot, l), _carrier(robot, f)
     if on != same:
         return False
@@ -162,6 +164,8 @@ def _wedge(
 
 
 def _turn_together(robot: Robot, one: Follower, l: int, f: int) -> bool:
+    """Make the joint of body `f` turn with that of body `l`, where a linkage that keeps an orientation does it:
+    parallel axes, and the ratio 1 on one body or -1 (one body carries the other). Returns False elsewhere."""
     (under_leader, of_leader), (under_follower, of_follower) = _carrier(robot, l), _carrier(robot, f)
     leader, follower = robot.joints[one.leader][1], robot.joints[one.joint][1]
     u, v = of_leader.turn @ leader.axis, of_follower.turn @ follower.axis

@@ -142,6 +142,7 @@ def _put_joints(robot: Robot, posture: Mapping[str, float]) -> None:
 
 
 def _read_mjcf(path: Path, name: str, label: str, keyframe: str | None) -> Robot:
+    """The robot of an MJCF file, in the posture of a keyframe where one is named. Raises DeviceError."""
     compiled = compile_mjcf(label, mjcf_file(path))
     mujoco = mujoco_or_fail(label)
     robot = read_bodies(compiled, name, label, keyframe)
@@ -299,6 +300,7 @@ def add_loops(robot: Robot, path: Path) -> None:
 
 
 def _closure(loop: LoopClosure, order: dict[str, int]) -> RobotClosure:
+    """A loop closure of a device file as one of a robot; `order`: index of each body by name."""
     points: Any = loop.points_m or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     axes = np.array(loop.axes or ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), dtype=np.float64)
     return RobotClosure(
@@ -443,6 +445,7 @@ def robot_device_text(document: dict[str, Any], findings: Sequence[Finding]) -> 
 
 
 def _head(document: dict[str, Any], findings: Sequence[Finding]) -> Iterator[str]:
+    """Lines at the top of a device file: findings of the import as comments, then name and source."""
     if findings:
         yield "# What was found while importing:"
     for finding in findings:
@@ -454,12 +457,14 @@ def _head(document: dict[str, Any], findings: Sequence[Finding]) -> Iterator[str
 
 
 def _comment(text: str, indent: str = "") -> Iterator[str]:
+    """A text as lines of a TOML comment, wrapped; with an indent, as an item of a list."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     for k, line in enumerate(textwrap.wrap(printable, 110, break_long_words=False, break_on_hyphens=False)):
         yield f"# {'- ' if indent and k == 0 else indent}{line}"
 
 
 def _mechanism(mechanism: dict[str, Any]) -> Iterator[str]:
+    """Lines of the tables of [mechanism]."""
     for group in ("links", "loops"):
         yield from _tables(group, mechanism.get(group, []))
     yield from ("", "# Where the operator holds the device.", "[mechanism.handle]", *_pairs(mechanism["handle"]))
@@ -472,6 +477,7 @@ def _mechanism(mechanism: dict[str, Any]) -> Iterator[str]:
 
 
 def _tables(group: str, entries: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Lines of a list of tables of [mechanism], such as its links, below their heading; none for an empty list."""
     if entries:
         yield ""
         yield from (f"# {line}" for line in HEADINGS[group].splitlines())
@@ -482,6 +488,7 @@ def _tables(group: str, entries: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 
 def _loop(loop: dict[str, Any]) -> Iterator[str]:
+    """Lines of [loop], with a comment where the sampling period is missing."""
     yield from ("", "[loop]", *_pairs(loop))
     if "sampling_period_s" not in loop:
         yield "# sampling_period_s = 0.001   # not in the file that was imported; charts and simulations need it"

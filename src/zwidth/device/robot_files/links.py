@@ -191,6 +191,7 @@ def _joint_table(name: str, parent: str, place: Place, joint: RobotJoint, S: Flo
 
 
 def _place_table(name: str, parent: str, joint: str, place: Place) -> dict[str, Any]:
+    """A [[mechanism.links]] table: name, parent, joint, and the place of the link in its parent."""
     link: dict[str, Any] = {"name": name, "parent": parent, "joint": joint, "origin_m": listed(place.at)}
     angles = roll_pitch_yaw_of(place.turn)
     if angles.any():

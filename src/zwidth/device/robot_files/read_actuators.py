@@ -201,6 +201,7 @@ def _follow(model: Any, e: int, name: str, robot: Robot) -> None:
 
 
 def _tell_of_softness(model: Any, e: int, robot: Robot) -> None:
+    """Add the finding that MuJoCo's equality number `e` is soft and the device file's is exact."""
     where = f"equality '{model.equality(e).name or f'loop-{e + 1}'}'"
     time, ratio = (float(x) for x in model.eq_solref[e])
     soft = f"solref {time:g} {ratio:g}"

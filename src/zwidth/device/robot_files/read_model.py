@@ -64,6 +64,8 @@ def reference_coordinates(model: Any, label: str, keyframe: str | None) -> Float
 
 
 def _body(model: Any, i: int, qpos: Floats, compiled: Compiled, full: dict[str, Floats]) -> RobotBody:
+    """Body `i` of a compiled model: its joints at `qpos`, mass, centre and inertia; a mass that only the compiler
+    was given is left out. full: inertia matrices by body name, where the file has them."""
     if i == 0:
         return RobotBody("base", -1, UNMOVED)
     name = model.body(i).name
@@ -95,6 +97,7 @@ def _inertia(model: Any, i: int, six: Floats | None) -> Floats:
 
 
 def _joint(model: Any, j: int, place: Place, qpos: Floats) -> RobotJoint:
+    """Joint `j` of a compiled model, on a body at `place`; its coordinate is that of `qpos` less the rest."""
     kind = KINDS[int(model.jnt_type[j])]
     at, dof = int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
     value: Any
@@ -160,6 +163,7 @@ def _tell_of_joints(model: Any, robot: Robot, qpos: Floats) -> None:
 
 
 def _tell_of_bodies(model: Any, compiled: Compiled, robot: Robot) -> None:
+    """Add findings about bodies: moved by the simulation, gravity compensated, or without mass."""
     for i in range(1, model.nbody):
         if model.body_mocapid[i] >= 0:
             robot.note(f"body '{model.body(i).name}'", "is moved by the simulation (mocap); here it stands still")
@@ -276,6 +280,7 @@ def _number(element: ElementTree.Element | None, key: str, default: float) -> fl
 
 
 def _followers(root: ElementTree.Element) -> list[Follower]:
+    """The joints of a URDF that follow another (`mimic`), with ratio and offset."""
     found = []
     for joint in root.findall("joint"):
         mimic = joint.find("mimic")

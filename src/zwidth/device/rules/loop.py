@@ -73,6 +73,7 @@ def _reaches_nyquist(cutoff: Any, T: Any) -> Any:
 
 
 def _cutoff_sentence(cutoff: float, T: float) -> str:
+    """What is wrong with a low pass's cutoff [Hz] at a sampling period T [s]."""
     return (
         f"must be below half the sampling frequency, {0.5 / T:.10g} Hz, got {cutoff:.10g}; lower it or sample "
         "faster"

@@ -83,6 +83,7 @@ def _circle(name: Any, parents: dict[str, Any]) -> list[str]:
 
 
 def _twice(mechanism: dict[str, Any], group: str) -> KeyMessages:
+    """Path and sentence of each name that a list of [mechanism], such as its links, gives a second time."""
     names_so_far: set[str] = set()
     for index, entry in tables(mechanism, group):
         name = entry.get("name")
@@ -253,6 +254,8 @@ def _assemblies(document: Document) -> KeyMessages:
 
 
 def _coordinates(path: KeyPath, given: dict[str, Any], counts: dict[str, int], moves: str) -> KeyMessages:
+    """Path and sentence of each joint in a table of coordinates that does not exist, or has another number of them
+    (counts, by name). moves: how the table's joints move, for the sentence."""
     for joint, value in given.items():
         if joint not in counts:
             yield (*path, joint), f"names no joint that {moves}; {suggestion(joint, set(counts), 'joints')}"

@@ -122,6 +122,8 @@ def _levels(value: Any) -> list[float]:
 
 
 def _breakaway(place: KeyPath, static: Any, level: Any, key: str) -> KeyMessages:
+    """Path and sentence of a friction at rest (`static`) that is below that in sliding (`level`, given by `key`),
+    or that stands beside a sliding friction of 0."""
     if not (is_number(static) and is_number(level)) or static < 0 or level < 0:
         return
     if static > 0 and level == 0:

@@ -57,6 +57,7 @@ class Numbers(NamedTuple):
         return join_designs([np.asarray(one, dtype=float) for one in own], 0) if self.values else own
 
     def _number(self, steps: KeyPath) -> Any:
+        """The number at a path of the document, of designs their array; None where there is no number."""
         if steps in self.values:
             return self.values[steps]
         held = _held(self.document, steps)
@@ -74,6 +75,7 @@ class Numbers(NamedTuple):
 
 
 def _held(place: Any, steps: KeyPath) -> Any:
+    """The value that keys and indices lead to from `place`; None where there is none."""
     for step in steps:
         if isinstance(step, int):
             place = place[step] if isinstance(place, list) and step < len(place) else None
@@ -117,6 +119,7 @@ class KeyRule:
                 yield (*path, *steps_of(self.at)), self.sentence
 
     def _broken(self, document: Document, own: dict[str, Any]) -> bool:
+        """Whether a table breaks the rule: all conditions of `given` hold and none of `without`."""
         for condition in _conditions(self.given):
             if not _holds(document, own, *condition):
                 return False
@@ -131,6 +134,7 @@ def _conditions(words: str) -> tuple[tuple[bool, KeyPath, str], ...]:
 
 
 def _holds(document: Document, own: dict[str, Any], in_file: bool, steps: KeyPath, value: str) -> bool:
+    """Whether a condition holds: the file, or the table `own`, has a value at a path: any, or the one given."""
     held = _held(document if in_file else own, steps)
     wanted = True if value == "true" else value
     return held is not None and (not value or (type(held) is type(wanted) and held == wanted))

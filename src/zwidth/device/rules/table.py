@@ -158,6 +158,7 @@ def _allowed_alone(document: Document, steps: KeyPath, numbers: Floats) -> Flags
         known = dict[int, bool]()
 
         def allowed(place: int, ordered: Floats = ordered, known: dict[int, bool] = known) -> bool:
+            """Whether the file may have the number at a place among the ordered ones; each is tried once."""
             if place not in known:
                 known[place] = _may_be(document, steps, float(ordered[place]))
             return known[place]

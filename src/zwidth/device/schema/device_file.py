@@ -230,6 +230,7 @@ def _inside(place: Any, part: str | int) -> Any:
 
 
 def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
+    """The JSON Schema of what stands at a key or index below a schema; nothing where it allows none."""
     if isinstance(part, int):
         if isinstance(subschema.get("items"), dict):
             yield subschema["items"]
@@ -240,6 +241,7 @@ def _step(subschema: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]
 
 
 def _alternatives(subschema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The schemas that a value may follow: references resolved and each branch of anyOf and oneOf by itself."""
     if "$ref" in subschema:
         yield from _alternatives(schema()["$defs"][subschema["$ref"].removeprefix("#/$defs/")])
         return

@@ -196,6 +196,7 @@ class LevantSection(_Method):
 
 
 def _method(table: Any) -> Any:
+    """Name of the velocity method of a table or section, the default where it has none; None if no text."""
     method = (
         table.get("method", DEFAULT_METHOD)
         if isinstance(table, dict)

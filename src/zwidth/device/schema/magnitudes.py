@@ -59,6 +59,7 @@ def within(least: float, most: float, unit: str, besides: str = "") -> AfterVali
     """
 
     def check(value: float) -> float:
+        """The number itself. Raises ValueError where it is positive, finite and out of bounds."""
         if 0 < value < np.inf and not least <= value <= most:
             raise ValueError(
                 f"must be {besides}{_between(least, most, unit)}, got {value:.6g}; is the unit right?"
@@ -93,10 +94,12 @@ def principal_within(least: float, most: float, unit: str) -> AfterValidator:
     """A positive definite matrix whose eigenvalues, the masses of its principal motions, lie between bounds."""
 
     def judge(matrix: Floats) -> Judgement:
+        """Whether an eigenvalue of matrices (..., n, n) is out of bounds, and the sentence of one."""
         values = np.linalg.eigvalsh(matrix)
         low, high = values[..., 0], values[..., -1]
 
         def sentence() -> str:
+            """What is wrong with the one matrix (n, n) that was judged."""
             one = matrix.shape[-1] == 1
             got = f", got {low:.6g}" if one else f" for every motion, got masses from {low:.6g} to {high:.6g}"
             return f"must be {_between(least, most, unit)}{got}; is the unit right?"
@@ -110,6 +113,7 @@ def largest_within(least: float, most: float, unit: str, besides: str) -> AfterV
     """A matrix that is zero, or has its largest eigenvalue between bounds: a body's moments of inertia."""
 
     def judge(matrix: Floats) -> Judgement:
+        """Whether the largest eigenvalue of matrices (..., n, n) is out of bounds, and the sentence of one."""
         moment = np.linalg.eigvalsh(matrix)[..., -1]
         return (moment > 0.0) & ~(
             (least <= moment) & (moment <= most)
@@ -122,6 +126,7 @@ def elements_up_to(most: float, unit: str) -> AfterValidator:
     """A matrix without elements beyond a bound, in either sign."""
 
     def judge(matrix: Floats) -> Judgement:
+        """Whether an element of matrices (..., n, n) is too large, and the sentence of one."""
         return (
             np.abs(matrix).max(axis=(-2, -1)) > most,
             lambda: f"must be at most {most:g} {unit} in size, got {_largest(matrix):.6g}; is the unit right?",
@@ -134,6 +139,7 @@ def largest_share_within(least: float, most: float) -> AfterValidator:
     """A vector whose largest component has a size between bounds; one of zeros is left to another rule."""
 
     def judge(vector: Floats) -> Judgement:
+        """Whether the largest size in vectors (..., n) is out of bounds and not 0, and the sentence of one."""
         size = np.abs(vector).max(axis=-1)
         return (size != 0.0) & ~(
             (least <= size) & (size <= most)

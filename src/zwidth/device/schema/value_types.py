@@ -56,12 +56,14 @@ VERSION: Final[Any] = documented_key(
 
 
 def _not_nan(value: float) -> float:
+    """The number itself. Raises ValueError for nan."""
     if np.isnan(value):
         raise ValueError("must be a number or inf, got nan")
     return value
 
 
 def _thinkable(value: float) -> float:
+    """The number itself. Raises ValueError for a finite one of more than `LARGEST` in size."""
     if LARGEST < abs(value) < np.inf:
         raise ValueError(f"must be between -{LARGEST:g} and {LARGEST:g}, got {value:.6g}; is the unit right?")
     return value
@@ -77,12 +79,14 @@ def _not_zero(vector: Floats) -> magnitudes.Judgement:
 
 
 def _has_length(vector: Floats) -> magnitudes.Judgement:
+    """Whether vectors (..., n) are all zeros, which breaks the rule, and the sentence of one that is."""
     return _zeros(
         vector
     ), lambda: f"has zero length, got {quote(vector.tolist())}; give any vector along it, such as [0, 1, 0]"
 
 
 def _rising(bounds: tuple[float, ...]) -> tuple[float, ...]:
+    """The bounds (lower, upper) themselves. Raises ValueError where they do not rise."""
     low, high = bounds
     if not low < high:
         raise ValueError(f"must be [lower, upper] with lower < upper, got {quote(list(bounds))}")
@@ -90,6 +94,7 @@ def _rising(bounds: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _increasing(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """The numbers themselves. Raises ValueError where one is not larger than the one before."""
     for i in range(1, len(numbers)):
         if not numbers[i - 1] < numbers[i]:
             raise ValueError(
@@ -104,6 +109,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _as_vector(value: Any) -> Any:
+    """A number or list as a list. Raises ValueError for anything else."""
     if not isinstance(value, list | tuple) and not _is_number(value):
         raise ValueError(f"must be a number or a list of numbers, got {quote(value)}")
     return [value] if _is_number(value) else value
@@ -118,6 +124,7 @@ def _few(value: Any) -> Any:
 
 
 def _as_matrix(value: Any) -> Any:
+    """A number or list of rows as a list of rows. Raises ValueError for anything else, a single row too."""
     if isinstance(value, list) and value and all(map(_is_number, value)):
         raise ValueError(f"must be a list of rows, got {quote(value)}; write [[...], [...]]")
     if not isinstance(value, list | tuple) and not _is_number(value):
@@ -136,6 +143,7 @@ def _as_inertia(value: Any) -> Any:
 
 
 def _square(rows: Rows) -> Rows:
+    """The rows themselves. Raises ValueError where they are no square matrix."""
     lengths = [len(row) for row in rows]
     if not rows or any(length != len(rows) for length in lengths):
         got = f"{len(rows)} rows of {', '.join(map(str, lengths[:8]))} numbers" if rows else "an empty list"
@@ -148,6 +156,7 @@ def _symmetric(matrix: Floats) -> magnitudes.Judgement:
     gap = np.abs(matrix - np.swapaxes(matrix, -1, -2))
 
     def sentence() -> str:
+        """What is wrong with a matrix (n, n): the two elements that differ most."""
         i, j = (int(k) for k in np.unravel_index(int(gap.argmax()), gap.shape))
         return (
             f"must be symmetric, but row {i} column {j} holds {matrix[i, j]:.10g} "
@@ -189,6 +198,7 @@ def _possible_body(matrix: Floats) -> magnitudes.Judgement:
     negative = moments[..., 0] < -slack
 
     def sentence() -> str:
+        """What is wrong with the principal moments [kg m^2] of one body."""
         listed = ", ".join(f"{moment:.6g}" for moment in moments)
         if negative:
             return f"must have no negative principal moment, got {listed}; no body has one"
